@@ -1,0 +1,1 @@
+"""The physics: fields, elements, load, system and screen. Solves nothing."""

@@ -1,0 +1,162 @@
+"""Elements of a machine: the spring that acts beyond a clearance, and what excites it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.errors import InputError
+
+ContactLaw = Literal["paper", "compression-only"]
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceSpring:
+    r"""A spring and damper that act only beyond a clearance, on one side or on both.
+
+    With the gap coordinate :math:`y = d^T x`, stiffness k, damping c and gaps e+ and e-, the
+    paper's law (Eq. 2) is, for :math:`y > e_+`,
+
+    .. math:: H = k (y - e_+) + c \dot y,
+
+    and for :math:`y < -e_-` the same with :math:`y + e_-`; zero between. At the gap itself the
+    force jumps by :math:`c \dot y` on entry and pulls for a moment before release. The
+    "compression-only" law clips that pull: it lets go where the force has fallen to zero.
+
+    Parameters
+    ----------
+    direction
+        d, shape (N,): the gap coordinate is ``direction @ x``.
+    stiffness, damping
+        k in N/m and c in N s/m of one engaged side.
+    clearance, clearance_minus
+        e+ and e- in m; None means the same on both sides, infinity no stop on that side.
+    law
+        ``"paper"`` or ``"compression-only"``.
+
+    Raises
+    ------
+    InputError
+        For negative, non-finite or contradictory values.
+    """
+
+    direction: NDArray[np.float64]
+    stiffness: float
+    damping: float
+    clearance: float
+    clearance_minus: float | None = None
+    law: ContactLaw = "paper"
+
+    def __init__(
+        self,
+        direction: ArrayLike,
+        stiffness: float,
+        damping: float = 0.0,
+        clearance: float = 0.0,
+        clearance_minus: float | None = None,
+        law: ContactLaw = "paper",
+    ) -> None:
+        vector = frozen_array(direction)
+        minus = clearance if clearance_minus is None else clearance_minus
+        if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
+            raise InputError("direction", direction, "give a finite vector that is not zero")
+        for name, value in (("stiffness", stiffness), ("damping", damping)):
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError(name, value, "give a finite number of at least 0")
+        for name, value in (("clearance", clearance), ("clearance_minus", minus)):
+            if not value >= 0.0:
+                raise InputError(name, value, "give a gap of at least 0 m, or inf for no stop")
+        if law not in get_args(ContactLaw):
+            raise InputError("law", law, f"choose one of {', '.join(get_args(ContactLaw))}")
+        object.__setattr__(self, "direction", vector)
+        object.__setattr__(self, "stiffness", float(stiffness))
+        object.__setattr__(self, "damping", float(damping))
+        object.__setattr__(self, "clearance", float(clearance))
+        object.__setattr__(self, "clearance_minus", float(minus))
+        object.__setattr__(self, "law", law)
+
+    @property
+    def gaps(self) -> tuple[float, float]:
+        """The gaps (e+, e-) in m."""
+        minus = self.clearance if self.clearance_minus is None else self.clearance_minus
+        return self.clearance, minus
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether both gaps are equal."""
+        return self.gaps[0] == self.gaps[1]
+
+    @property
+    def bonded(self) -> bool:
+        """Whether the spring always acts: no gap on either side."""
+        return self.gaps == (0.0, 0.0) and self.law == "paper"
+
+    @property
+    def acts(self) -> bool:
+        """Whether the spring can ever carry a force."""
+        return (self.stiffness > 0.0 or self.damping > 0.0) and not all(map(math.isinf, self.gaps))
+
+    def force(self, gap: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
+        """H in N at gap coordinate y in m and its rate in m/s; zero exactly at the gap."""
+        y, v = np.asarray(gap, float), np.asarray(rate, float)
+        plus, minus = self.gaps
+        penetration = np.where(y > plus, y - plus, np.where(y < -minus, y + minus, 0.0))
+        pushed = self.stiffness * penetration + self.damping * v
+        if self.law == "compression-only":
+            pushed = np.where(pushed * penetration > 0.0, pushed, 0.0)
+        return np.where(penetration == 0.0, 0.0, pushed)
+
+
+@dataclass(frozen=True, eq=False)
+class Unbalance:
+    """Rotating unbalance: the force on the machine is ``Re(vector w^2 exp(i w t))``.
+
+    Parameters
+    ----------
+    vector
+        m0 r in kg m on each degree of freedom, shape (N,); complex for a phase.
+    """
+
+    vector: NDArray[np.complex128]
+
+    def __init__(self, vector: ArrayLike) -> None:
+        object.__setattr__(self, "vector", _force_vector(vector))
+
+    power: int = 2
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicForce:
+    """Force of constant amplitude: ``Re(vector exp(i w t))``.
+
+    Parameters
+    ----------
+    vector
+        Force in N on each degree of freedom, shape (N,); complex for a phase.
+    """
+
+    vector: NDArray[np.complex128]
+
+    def __init__(self, vector: ArrayLike) -> None:
+        object.__setattr__(self, "vector", _force_vector(vector))
+
+    power: int = 0
+
+
+def _force_vector(vector: ArrayLike) -> NDArray[np.complex128]:
+    array = np.array(vector, dtype=np.complex128)
+    if array.ndim != 1 or not np.all(np.isfinite(array)):
+        raise InputError("vector", vector, "give a finite vector, one number per degree of freedom")
+    array.setflags(write=False)
+    return array
+
+
+def frozen_array(values: ArrayLike) -> NDArray[np.float64]:
+    """Return a read-only copy as float64."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array

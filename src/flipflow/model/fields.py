@@ -1,0 +1,190 @@
+"""One table of fields: it feeds the machine file, its schema and template, checks and reports.
+
+Values are SI inside; ``unit`` is the SI unit of the value and ``file_unit`` the one an engineer
+writes. ``bounds`` are what physics allows, ``plausible`` what a flip-flow screen can look like:
+outside the first a value is refused, outside the second it is questioned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flipflow.errors import InputError
+
+
+@dataclass(frozen=True)
+class Field:
+    """One scalar of a flip-flow screen.
+
+    Parameters
+    ----------
+    name
+        Keyword of :class:`~flipflow.FlipFlowScreen`.
+    symbol
+        Symbol of the literature, ASCII.
+    unit, file_unit
+        SI unit, and the unit an engineer writes in a machine file.
+    key
+        Place in the machine file, ``section.key``.
+    sentence
+        What it is, for people.
+    lower, upper
+        What physics allows. ``lower_open`` excludes the lower bound itself.
+    plausible
+        Range of machines that exist; None where any value may occur.
+    default
+        Value where the field is left out; ``...`` when it must be given.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    file_unit: str
+    key: str
+    sentence: str
+    lower: float = 0.0
+    upper: float = math.inf
+    lower_open: bool = False
+    plausible: tuple[float, float] | None = None
+    default: float | None | type(Ellipsis) = ...  # type: ignore[valid-type]
+
+    @property
+    def required(self) -> bool:
+        """Whether the field must be given."""
+        return self.default is ...
+
+    def check(self, value: object, *, label: str | None = None) -> float | None:
+        """Return ``value`` as float, or raise :class:`InputError` when physics forbids it."""
+        field = label or self.name
+        if value is None and not self.required:
+            return None
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InputError(field, value, f"a number in {self.unit or 'plain units'} belongs here")
+        number = float(value)
+        too_low = number <= self.lower if self.lower_open else number < self.lower
+        if math.isnan(number) or too_low or number > self.upper:
+            raise InputError(field, value, f"give {self._allowed()}")
+        if math.isinf(number) and self.plausible is not None and self.default != math.inf:
+            raise InputError(field, value, "give a finite number")
+        return number
+
+    def is_plausible(self, value: float | None) -> bool:
+        """Whether ``value`` (SI) lies in the range of machines that exist."""
+        if value is None or self.plausible is None or value == self.default:
+            return True
+        low, high = self.plausible
+        return low <= value <= high
+
+    def _allowed(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        if self.upper < math.inf:
+            return f"a number between {self.lower:g} and {self.upper:g}{unit}"
+        return f"a number {'above' if self.lower_open else 'of at least'} {self.lower:g}{unit}"
+
+
+FIELDS: tuple[Field, ...] = (
+    Field(
+        "main_mass", "m1", "kg", "kg", "frames.main_mass",
+        "Mass of the main frame, the unbalance mass included.",
+        lower_open=True, plausible=(10.0, 50e3),
+    ),
+    Field(
+        "floating_mass", "m2", "kg", "kg", "frames.floating_mass",
+        "Mass of the floating frame, which the shear springs carry.",
+        lower_open=True, plausible=(2.0, 30e3),
+    ),
+    Field(
+        "eccentric_moment", "m0r", "kg m", "kg mm", "exciter.eccentric_moment",
+        "Unbalance mass times its radius; the exciting force is this times the speed squared.",
+        plausible=(1e-3, 200.0),
+    ),
+    Field(
+        "isolation_stiffness", "k1", "N/m", "kN/m", "isolation.stiffness",
+        "Stiffness of all isolation springs together, along the screen surface.",
+        lower_open=True, plausible=(1e3, 50e6),
+    ),
+    Field(
+        "isolation_damping", "c1", "N s/m", "kN s/m", "isolation.damping",
+        "Viscous damping of all isolation springs together, along the screen surface.",
+        plausible=(0.0, 2e6),
+    ),
+    Field(
+        "shear_stiffness", "k2", "N/m", "kN/m", "shear_springs.stiffness",
+        "Dynamic shear stiffness of all shear springs together.",
+        lower_open=True, plausible=(1e4, 500e6),
+    ),
+    Field(
+        "shear_damping", "c2", "N s/m", "kN s/m", "shear_springs.damping",
+        "Viscous damping of all shear springs together.",
+        plausible=(0.0, 2e6),
+    ),
+    Field(
+        "stop_stiffness", "k3", "N/m", "kN/m", "stops.stiffness",
+        "Stiffness of the stop springs of one side, engaged.",
+        default=0.0, plausible=(1e4, 5e9),
+    ),
+    Field(
+        "stop_damping", "c3", "N s/m", "kN s/m", "stops.damping",
+        "Viscous damping of the stop springs of one side, engaged.",
+        default=0.0, plausible=(0.0, 2e6),
+    ),
+    Field(
+        "clearance", "e", "m", "mm", "stops.clearance",
+        "Gap per side before a stop is touched; infinite means no stop.",
+        default=math.inf, plausible=(0.0, 0.1),
+    ),
+    Field(
+        "clearance_minus", "e_minus", "m", "mm", "stops.clearance_minus",
+        "Gap of the other side where it differs; left out, both sides are equal.",
+        default=None, plausible=(0.0, 0.1),
+    ),
+    Field(
+        "normal_stiffness", "k1n", "N/m", "kN/m", "isolation.normal_stiffness",
+        "Stiffness of all isolation springs together, normal to the screen surface.",
+        lower_open=True, default=None, plausible=(1e3, 50e6),
+    ),
+    Field(
+        "normal_damping", "c1n", "N s/m", "kN s/m", "isolation.normal_damping",
+        "Viscous damping of all isolation springs together, normal to the screen surface.",
+        default=None, plausible=(0.0, 2e6),
+    ),
+    Field(
+        "deck_angle", "alpha", "rad", "deg", "frames.deck_angle",
+        "Inclination of the screen surface to the horizontal.",
+        lower=-math.pi / 2, upper=math.pi / 2, default=None, plausible=(0.0, math.radians(45.0)),
+    ),
+    Field(
+        "deck_area", "A", "m^2", "m^2", "frames.deck_area",
+        "Area of the screen surface, for load cases given per area.",
+        lower_open=True, default=None, plausible=(0.05, 100.0),
+    ),
+    Field(
+        "shear_height", "h2", "m", "mm", "shear_springs.height",
+        "Rubber height of a shear spring; relative amplitude over height is its shear strain.",
+        lower_open=True, default=None, plausible=(5e-3, 0.5),
+    ),
+    Field(
+        "shear_pieces", "n2", "", "", "shear_springs.pieces",
+        "Number of shear springs.",
+        lower=1.0, default=None, plausible=(1.0, 500.0),
+    ),
+    Field(
+        "stop_pieces", "n3", "", "", "stops.pieces_per_side",
+        "Number of stop springs on each side.",
+        lower=1.0, default=None, plausible=(1.0, 200.0),
+    ),
+    Field(
+        "supports", "n1", "", "", "isolation.supports",
+        "Number of supports that carry the isolation springs.",
+        lower=1.0, default=None, plausible=(1.0, 100.0),
+    ),
+    Field(
+        "bearings", "nb", "", "", "exciter.bearings",
+        "Number of exciter bearings that share the unbalance force.",
+        lower=1.0, default=None, plausible=(1.0, 32.0),
+    ),
+)
+
+FIELD: Mapping[str, Field] = {field.name: field for field in FIELDS}

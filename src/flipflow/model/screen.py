@@ -1,0 +1,178 @@
+"""The flip-flow screen: two frames, shear springs between them, stops beyond a clearance."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Self, get_args
+
+import numpy as np
+
+from flipflow.errors import InputError
+from flipflow.model.elements import ClearanceSpring, ContactLaw, Unbalance
+from flipflow.model.fields import FIELDS
+from flipflow.model.system import MechanicalSystem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """What a load or the weather does to a screen.
+
+    Parameters
+    ----------
+    stiffness_factor, damping_factor
+        Factors on the shear spring's stiffness and damping.
+    main_mass, floating_mass
+        Carried material in kg that joins each frame; the unbalance does not change.
+    temperature
+        Temperature of the shear springs in degrees Celsius; needs the screen's temperature table.
+    name
+        What the case is called in reports.
+    """
+
+    stiffness_factor: float = 1.0
+    damping_factor: float = 1.0
+    main_mass: float = 0.0
+    floating_mass: float = 0.0
+    temperature: float | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness_factor", "damping_factor"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(name, value, "give a finite factor above 0")
+        for name in ("main_mass", "floating_mass"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise InputError(name, value, "give a carried mass of at least 0 kg")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlipFlowScreen:
+    """A flip-flow vibrating screen, SI units. Frozen: :meth:`replace` makes a new one.
+
+    Parameters
+    ----------
+    main_mass, floating_mass
+        m1 (unbalance mass included) and m2 in kg.
+    eccentric_moment
+        m0 r in kg m.
+    isolation_stiffness, isolation_damping
+        k1 in N/m and c1 in N s/m along the screen surface.
+    shear_stiffness, shear_damping
+        k2 in N/m and c2 in N s/m, all shear springs together.
+    stop_stiffness, stop_damping
+        k3 in N/m and c3 in N s/m of one engaged side.
+    clearance, clearance_minus
+        Gap per side e+ and, where it differs, e- in m; infinite means no stop on that side.
+    stop_law
+        ``"paper"`` or ``"compression-only"``; see :class:`~flipflow.ClearanceSpring`.
+    normal_stiffness, normal_damping
+        k1n in N/m and c1n in N s/m normal to the surface; None leaves that direction unchecked.
+    temperature_factor
+        Pairs (degrees Celsius, factor on the shear stiffness), rising in temperature.
+    deck_angle, deck_area, shear_height, shear_pieces, stop_pieces, supports, bearings
+        What some checks need, in SI; None leaves those checks out.
+
+    Raises
+    ------
+    InputError
+        For a value that physics forbids; the sentence names field, value and remedy.
+    """
+
+    main_mass: float
+    floating_mass: float
+    eccentric_moment: float
+    isolation_stiffness: float
+    isolation_damping: float
+    shear_stiffness: float
+    shear_damping: float
+    stop_stiffness: float = 0.0
+    stop_damping: float = 0.0
+    clearance: float = math.inf
+    clearance_minus: float | None = None
+    stop_law: ContactLaw = "paper"
+    normal_stiffness: float | None = None
+    normal_damping: float | None = None
+    temperature_factor: tuple[tuple[float, float], ...] = ()
+    deck_angle: float | None = None
+    deck_area: float | None = None
+    shear_height: float | None = None
+    shear_pieces: float | None = None
+    stop_pieces: float | None = None
+    supports: float | None = None
+    bearings: float | None = None
+
+    def __post_init__(self) -> None:
+        for field in FIELDS:
+            object.__setattr__(self, field.name, field.check(getattr(self, field.name)))
+        if self.stop_law not in get_args(ContactLaw):
+            choices = ", ".join(get_args(ContactLaw))
+            raise InputError("stop_law", self.stop_law, f"choose one of {choices}")
+        temperatures = [t for t, _ in self.temperature_factor]
+        if any(b <= a for a, b in zip(temperatures, temperatures[1:], strict=False)):
+            raise InputError("temperature_factor", temperatures, "list temperatures in rising order")
+        if any(not (math.isfinite(f) and f > 0.0) for _, f in self.temperature_factor):
+            raise InputError("temperature_factor", self.temperature_factor, "give factors above 0")
+
+    def replace(self, **changes: object) -> Self:
+        """Return a new screen with some fields changed; unknown names raise InputError."""
+        known = {field.name for field in dataclasses.fields(self)}
+        for name, value in changes.items():
+            if name not in known:
+                raise InputError(name, value, f"choose one of {', '.join(sorted(known))}")
+        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+
+    def loaded(self, load: Load) -> Self:
+        """Return the screen as it is under ``load``: softer or stiffer, heavier, warmer."""
+        factor = load.stiffness_factor * self.temperature_stiffness_factor(load.temperature)
+        return self.replace(
+            main_mass=self.main_mass + load.main_mass,
+            floating_mass=self.floating_mass + load.floating_mass,
+            shear_stiffness=self.shear_stiffness * factor,
+            shear_damping=self.shear_damping * load.damping_factor,
+        )
+
+    def temperature_stiffness_factor(self, temperature: float | None) -> float:
+        """Factor on k2 at a temperature in degrees Celsius, linear between the table's rows."""
+        if temperature is None:
+            return 1.0
+        if not self.temperature_factor:
+            raise InputError(
+                "temperature", temperature, "add shear_springs.temperature_factor to the machine"
+            )
+        degrees, factors = zip(*self.temperature_factor, strict=True)
+        if not degrees[0] <= temperature <= degrees[-1]:
+            raise InputError(
+                "temperature", temperature,
+                f"stay within the table of the shear springs, {degrees[0]:g} to {degrees[-1]:g} degC",
+            )
+        return float(np.interp(temperature, degrees, factors))
+
+    @property
+    def has_stop(self) -> bool:
+        """Whether a stop spring can ever act."""
+        return self.stop().acts
+
+    def stop(self) -> ClearanceSpring:
+        """The stop springs as one clearance spring on the relative motion x1 - xf."""
+        return ClearanceSpring(
+            (1.0, -1.0), self.stop_stiffness, self.stop_damping,
+            self.clearance, self.clearance_minus, self.stop_law,
+        )
+
+    def system(self) -> MechanicalSystem:
+        """Return the equations of motion in (x1, xf), absolute, along the screen surface."""
+        m1, m2 = self.main_mass, self.floating_mass
+        c1, c2 = self.isolation_damping, self.shear_damping
+        k1, k2 = self.isolation_stiffness, self.shear_stiffness
+        return MechanicalSystem(
+            M=[[m1, 0.0], [0.0, m2]],
+            C=[[c1 + c2, -c2], [-c2, c2]],
+            K=[[k1 + k2, -k2], [-k2, k2]],
+            springs=(self.stop(),) if self.has_stop else (),
+            excitation=Unbalance([self.eccentric_moment, 0.0]),
+            coordinates={"main": (1.0, 0.0), "floating": (0.0, 1.0), "relative": (1.0, -1.0)},
+        )

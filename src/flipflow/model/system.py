@@ -1,0 +1,140 @@
+"""A linear machine whose masses meet over clearances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.errors import InputError
+from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance, frozen_array
+
+Coordinate = str | int
+
+
+@runtime_checkable
+class Machine(Protocol):
+    """Whatever can be flattened into a :class:`MechanicalSystem`."""
+
+    def system(self) -> MechanicalSystem:
+        """Return the machine as mass, damping and stiffness matrices with its springs."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class MechanicalSystem:
+    r"""N degrees of freedom, any number of clearance springs, one harmonic excitation.
+
+    .. math:: M \ddot x + C \dot x + K x + \sum_j d_j H_j(d_j^T x, d_j^T \dot x)
+              = \mathrm{Re}(F(\omega) e^{i \omega t})
+
+    Parameters
+    ----------
+    M, C, K
+        Mass (kg), damping (N s/m) and stiffness (N/m), shape (N, N), symmetric; M positive
+        definite.
+    springs
+        Clearance springs.
+    excitation
+        :class:`Unbalance` or :class:`HarmonicForce`.
+    coordinates
+        Names for vectors of shape (N,): ``{"relative": (1, -1)}`` lets results be asked for
+        ``amplitude("relative")``. An integer always means that degree of freedom.
+
+    Raises
+    ------
+    InputError
+        When shapes disagree, M is not positive definite, or a matrix is not finite.
+    """
+
+    M: NDArray[np.float64]
+    C: NDArray[np.float64]
+    K: NDArray[np.float64]
+    springs: tuple[ClearanceSpring, ...]
+    excitation: Unbalance | HarmonicForce
+    coordinates: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    def __init__(
+        self,
+        M: ArrayLike,
+        C: ArrayLike,
+        K: ArrayLike,
+        springs: Sequence[ClearanceSpring] = (),
+        excitation: Unbalance | HarmonicForce | None = None,
+        coordinates: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        mass = _square("M", M, None)
+        n = mass.shape[0]
+        if np.linalg.eigvalsh(mass)[0] <= 0.0:
+            raise InputError("M", M, "the mass matrix must be positive definite")
+        if excitation is None:
+            raise InputError("excitation", None, "give ff.Unbalance(...) or ff.HarmonicForce(...)")
+        if excitation.vector.shape != (n,):
+            raise InputError("excitation", excitation.vector, f"give {n} numbers, one per mass")
+        for spring in springs:
+            if spring.direction.shape != (n,):
+                raise InputError("direction", spring.direction, f"give {n} numbers, one per mass")
+        named = {name: frozen_array(vector) for name, vector in (coordinates or {}).items()}
+        for name, vector in named.items():
+            if vector.shape != (n,):
+                raise InputError(f"coordinates[{name!r}]", vector, f"give {n} numbers")
+        object.__setattr__(self, "M", mass)
+        object.__setattr__(self, "C", _square("C", C, n))
+        object.__setattr__(self, "K", _square("K", K, n))
+        object.__setattr__(self, "springs", tuple(springs))
+        object.__setattr__(self, "excitation", excitation)
+        object.__setattr__(self, "coordinates", MappingProxyType(named))
+
+    @property
+    def size(self) -> int:
+        """N, the number of degrees of freedom."""
+        return int(self.M.shape[0])
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the machine is its own mirror image: equal gaps on every spring."""
+        return all(spring.symmetric for spring in self.springs if spring.acts)
+
+    def system(self) -> MechanicalSystem:
+        """Return itself, so that functions take screens and systems alike."""
+        return self
+
+    def coordinate(self, which: Coordinate) -> NDArray[np.float64]:
+        """Vector of shape (N,) that picks a coordinate by name or by degree of freedom."""
+        if isinstance(which, str):
+            if which not in self.coordinates:
+                known = ", ".join(map(repr, self.coordinates)) or "none is named"
+                raise InputError("coordinate", which, f"choose one of {known}, or an index")
+            return self.coordinates[which]
+        if isinstance(which, bool) or not 0 <= which < self.size:
+            raise InputError("coordinate", which, f"choose an index from 0 to {self.size - 1}")
+        return np.eye(self.size)[which]
+
+    def with_bonded(self) -> MechanicalSystem:
+        """Return the same machine with springs that always act moved into C and K."""
+        C, K = self.C.copy(), self.K.copy()
+        kept = []
+        for spring in self.springs:
+            if spring.bonded:
+                outer = np.outer(spring.direction, spring.direction)
+                C, K = C + spring.damping * outer, K + spring.stiffness * outer
+            elif spring.acts:
+                kept.append(spring)
+        return MechanicalSystem(self.M, C, K, kept, self.excitation, self.coordinates)
+
+
+def _square(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
+    array = frozen_array(values)
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] == 0:
+        raise InputError(name, array.shape, "give a square matrix")
+    if size is not None and array.shape[0] != size:
+        raise InputError(name, array.shape, f"give a {size} x {size} matrix, as M is")
+    if not np.all(np.isfinite(array)):
+        raise InputError(name, "not finite", "give finite numbers")
+    if not np.allclose(array, array.T, rtol=1e-12, atol=0.0):
+        raise InputError(name, "not symmetric", "give a symmetric matrix")
+    return array
