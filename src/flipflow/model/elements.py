@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -126,7 +126,7 @@ class Unbalance:
     def __init__(self, vector: ArrayLike) -> None:
         object.__setattr__(self, "vector", _force_vector(vector))
 
-    power: int = 2
+    power: ClassVar[int] = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,7 @@ class HarmonicForce:
     def __init__(self, vector: ArrayLike) -> None:
         object.__setattr__(self, "vector", _force_vector(vector))
 
-    power: int = 0
+    power: ClassVar[int] = 0
 
 
 def _force_vector(vector: ArrayLike) -> NDArray[np.complex128]:

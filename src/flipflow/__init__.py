@@ -1,0 +1,38 @@
+"""flipflow: dynamics, design and diagnosis of flip-flow vibrating screens.
+
+The names below are the public face. They are loaded when first used, so that
+``import flipflow`` and ``flipflow --help`` start at once.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "ClearanceSpring": "flipflow.model.elements",
+    "HarmonicForce": "flipflow.model.elements",
+    "Unbalance": "flipflow.model.elements",
+    "MechanicalSystem": "flipflow.model.system",
+    "FlipFlowScreen": "flipflow.model.screen",
+    "Load": "flipflow.model.screen",
+}
+
+__all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
+
+if TYPE_CHECKING:
+    from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+    from flipflow.model.screen import FlipFlowScreen, Load
+    from flipflow.model.system import MechanicalSystem
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'flipflow' has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
