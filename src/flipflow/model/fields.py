@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import EllipsisType
 
 from flipflow.errors import InputError
 
@@ -36,6 +37,14 @@ class Field:
         Range of machines that exist; None where any value may occur.
     default
         Value where the field is left out; ``...`` when it must be given.
+    example
+        Value of a generic screen as an engineer writes it; the template is made of these.
+    count
+        Name of the field that counts the pieces this total is made of, where there is one.
+    whole
+        Whether only whole numbers make sense.
+    needed_for
+        What cannot be checked where the field is left out.
     """
 
     name: str
@@ -48,7 +57,11 @@ class Field:
     upper: float = math.inf
     lower_open: bool = False
     plausible: tuple[float, float] | None = None
-    default: float | None | type(Ellipsis) = ...  # type: ignore[valid-type]
+    default: float | EllipsisType | None = ...
+    example: str | float | tuple[str, str] = ""
+    count: str | None = None
+    whole: bool = False
+    needed_for: str = ""
 
     @property
     def required(self) -> bool:
@@ -68,6 +81,8 @@ class Field:
             raise InputError(field, value, f"give {self._allowed()}")
         if math.isinf(number) and self.plausible is not None and self.default != math.inf:
             raise InputError(field, value, "give a finite number")
+        if self.whole and not number.is_integer():
+            raise InputError(field, value, "give a whole number")
         return number
 
     def is_plausible(self, value: float | None) -> bool:
@@ -84,107 +99,139 @@ class Field:
         return f"a number {'above' if self.lower_open else 'of at least'} {self.lower:g}{unit}"
 
 
+# A table reads as a table: one line for the names, one for the sentence, one for the numbers.
+# fmt: off
 FIELDS: tuple[Field, ...] = (
     Field(
         "main_mass", "m1", "kg", "kg", "frames.main_mass",
         "Mass of the main frame, the unbalance mass included.",
         lower_open=True, plausible=(10.0, 50e3),
+        example="1000 kg",
     ),
     Field(
         "floating_mass", "m2", "kg", "kg", "frames.floating_mass",
         "Mass of the floating frame, which the shear springs carry.",
         lower_open=True, plausible=(2.0, 30e3),
+        example="350 kg",
     ),
     Field(
         "eccentric_moment", "m0r", "kg m", "kg mm", "exciter.eccentric_moment",
         "Unbalance mass times its radius; the exciting force is this times the speed squared.",
         plausible=(1e-3, 200.0),
+        example="4500 kg mm",
     ),
     Field(
         "isolation_stiffness", "k1", "N/m", "kN/m", "isolation.stiffness",
         "Stiffness of all isolation springs together, along the screen surface.",
         lower_open=True, plausible=(1e3, 50e6),
+        example="700 kN/m", count="supports",
     ),
     Field(
         "isolation_damping", "c1", "N s/m", "kN s/m", "isolation.damping",
         "Viscous damping of all isolation springs together, along the screen surface.",
         plausible=(0.0, 2e6),
+        example="10 kN s/m", count="supports",
     ),
     Field(
         "shear_stiffness", "k2", "N/m", "kN/m", "shear_springs.stiffness",
         "Dynamic shear stiffness of all shear springs together.",
         lower_open=True, plausible=(1e4, 500e6),
+        example="3000 kN/m", count="shear_pieces",
     ),
     Field(
         "shear_damping", "c2", "N s/m", "kN s/m", "shear_springs.damping",
         "Viscous damping of all shear springs together.",
         plausible=(0.0, 2e6),
+        example="3 kN s/m", count="shear_pieces",
     ),
     Field(
         "stop_stiffness", "k3", "N/m", "kN/m", "stops.stiffness",
         "Stiffness of the stop springs of one side, engaged.",
         default=0.0, plausible=(1e4, 5e9),
+        example="9000 kN/m", count="stop_pieces",
     ),
     Field(
         "stop_damping", "c3", "N s/m", "kN s/m", "stops.damping",
         "Viscous damping of the stop springs of one side, engaged.",
         default=0.0, plausible=(0.0, 2e6),
+        example="3 kN s/m", count="stop_pieces",
     ),
     Field(
         "clearance", "e", "m", "mm", "stops.clearance",
         "Gap per side before a stop is touched; infinite means no stop.",
         default=math.inf, plausible=(0.0, 0.1),
+        example="6 mm",
     ),
     Field(
         "clearance_minus", "e_minus", "m", "mm", "stops.clearance_minus",
         "Gap of the other side where it differs; left out, both sides are equal.",
         default=None, plausible=(0.0, 0.1),
+        example="6 mm",
     ),
     Field(
         "normal_stiffness", "k1n", "N/m", "kN/m", "isolation.normal_stiffness",
         "Stiffness of all isolation springs together, normal to the screen surface.",
         lower_open=True, default=None, plausible=(1e3, 50e6),
+        example="700 kN/m", count="supports",
+        needed_for="throw number, and the limits on g and foundation force",
     ),
     Field(
         "normal_damping", "c1n", "N s/m", "kN s/m", "isolation.normal_damping",
         "Viscous damping of all isolation springs together, normal to the screen surface.",
         default=None, plausible=(0.0, 2e6),
+        example="10 kN s/m", count="supports",
+        needed_for="throw number, and the limits on g and foundation force",
     ),
     Field(
         "deck_angle", "alpha", "rad", "deg", "frames.deck_angle",
         "Inclination of the screen surface to the horizontal.",
         lower=-math.pi / 2, upper=math.pi / 2, default=None, plausible=(0.0, math.radians(45.0)),
+        example="15 deg",
+        needed_for="throw number",
     ),
     Field(
         "deck_area", "A", "m^2", "m^2", "frames.deck_area",
         "Area of the screen surface, for load cases given per area.",
         lower_open=True, default=None, plausible=(0.05, 100.0),
+        example="2.5 m^2",
+        needed_for="load cases given per area",
     ),
     Field(
         "shear_height", "h2", "m", "mm", "shear_springs.height",
         "Rubber height of a shear spring; relative amplitude over height is its shear strain.",
         lower_open=True, default=None, plausible=(5e-3, 0.5),
+        example="50 mm",
+        needed_for="the limit on shear strain",
     ),
     Field(
         "shear_pieces", "n2", "", "", "shear_springs.pieces",
         "Number of shear springs.",
         lower=1.0, default=None, plausible=(1.0, 500.0),
+        example=12, whole=True,
+        needed_for="force and power of one shear spring",
     ),
     Field(
         "stop_pieces", "n3", "", "", "stops.pieces_per_side",
         "Number of stop springs on each side.",
         lower=1.0, default=None, plausible=(1.0, 200.0),
+        example=4, whole=True,
+        needed_for="force on one stop spring",
     ),
     Field(
         "supports", "n1", "", "", "isolation.supports",
         "Number of supports that carry the isolation springs.",
         lower=1.0, default=None, plausible=(1.0, 100.0),
+        example=4, whole=True,
+        needed_for="force on one support",
     ),
     Field(
         "bearings", "nb", "", "", "exciter.bearings",
         "Number of exciter bearings that share the unbalance force.",
         lower=1.0, default=None, plausible=(1.0, 32.0),
+        example=2, whole=True,
+        needed_for="force on one bearing",
     ),
 )
+# fmt: on
 
 FIELD: Mapping[str, Field] = {field.name: field for field in FIELDS}
