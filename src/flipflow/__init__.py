@@ -18,12 +18,18 @@ _HOME = {
     "MechanicalSystem": "flipflow.model.system",
     "FlipFlowScreen": "flipflow.model.screen",
     "Load": "flipflow.model.screen",
+    "Limits": "flipflow.model.limits",
+    "Project": "flipflow.io.project",
+    "load": "flipflow.io.project",
+    "load_project": "flipflow.io.project",
 }
 
 __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
+    from flipflow.io.project import Project, load, load_project
     from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+    from flipflow.model.limits import Limits
     from flipflow.model.screen import FlipFlowScreen, Load
     from flipflow.model.system import MechanicalSystem
 

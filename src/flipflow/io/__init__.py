@@ -1,1 +1,1 @@
-"""flipflow.io"""
+"""Files in and out: machine files, and the units people write in them."""

@@ -1,0 +1,197 @@
+"""The layout of a machine file: every section and key, from the table of fields.
+
+Parser, schema and template walk over the same entries, so none can know a key the others miss.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from flipflow.errors import InputError
+from flipflow.model.elements import ContactLaw
+from flipflow.model.fields import FIELD, FIELDS, Field
+from flipflow.model.limits import LIMIT_FIELDS
+
+FORMAT = 1
+
+Kind = Literal[
+    "quantity", "each", "interval", "choice", "text", "temperatures", "material", "split"
+]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One key of a machine file.
+
+    Parameters
+    ----------
+    section, key
+        Where it stands.
+    kind
+        How its value is read: "quantity", "each" (one piece of a total), "interval", and so on.
+    sentence
+        What it is, for people.
+    example
+        What a file may hold there.
+    field
+        The field of the table behind it, if it is a number.
+    choices
+        The words it may be, for "choice".
+    """
+
+    section: str
+    key: str
+    kind: Kind
+    sentence: str
+    example: object
+    field: Field | None = None
+    choices: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """``section.key``, as errors and sources name it."""
+        return f"{self.section}.{self.key}"
+
+
+SECTION_SENTENCES: Mapping[str, str] = {
+    "document": "Title block of the report; every key may stay empty.",
+    "frames": "Main frame and floating frame.",
+    "exciter": "Exciter, fixed to the main frame.",
+    "isolation": "Isolation springs between main frame and foundation.",
+    "shear_springs": "Shear springs between main frame and floating frame.",
+    "stops": "Stop springs, touched beyond a gap; leave the section out for a machine without.",
+    "operation": "How the machine is run.",
+    "limits": "What the machine may do; a limit left out is not checked.",
+    "load_cases": "Loads and weather the machine must bear; the empty machine should be one.",
+    "sources": 'Where values come from: "section.key" = "drawing 4711, sheet 2".',
+}
+
+_DOCUMENT = (
+    ("name", "Name of the machine.", "My screen"),
+    ("project", "Project it belongs to.", ""),
+    ("customer", "Who it is for.", ""),
+    ("drawing", "Number of its drawing.", ""),
+    ("revision", "Revision of this file.", "A"),
+    ("prepared_by", "Who wrote this file.", ""),
+    ("checked_by", "Who checked it.", ""),
+)
+
+SPEED = Field(
+    "speed", "omega", "rad/s", "rpm", "operation.speed",
+    "Shaft speed the machine is run at.",
+    lower_open=True, default=None, plausible=(6.2831, 314.16), example="850 rpm",
+    needed_for="the verdict at the operating speed",
+)  # fmt: skip
+
+# fmt: off
+LOAD_FIELDS: tuple[Field, ...] = (
+    Field(
+        "stiffness_factor", "", "", "", "load_cases.shear_stiffness_factor",
+        "Factor on the stiffness of the shear springs under this load.",
+        lower_open=True, default=1.0, plausible=(0.2, 5.0), example=1.1,
+    ),
+    Field(
+        "damping_factor", "", "", "", "load_cases.shear_damping_factor",
+        "Factor on the damping of the shear springs under this load.",
+        lower_open=True, default=1.0, plausible=(0.1, 10.0), example=1.0,
+    ),
+    Field(
+        "temperature", "T", "degC", "degC", "load_cases.temperature",
+        "Temperature of the shear springs; needs shear_springs.temperature_factor.",
+        lower=-273.15, default=None, plausible=(-60.0, 120.0), example="50 degC",
+    ),
+)
+# fmt: on
+
+MATERIAL = Field(
+    "material", "", "kg", "kg", "load_cases.material",
+    'Carried material, a mass ("60 kg") or a mass per deck area ("30 kg/m^2").',
+    default=None, plausible=(0.0, 20e3), example="30 kg/m^2",
+)  # fmt: skip
+MATERIAL_PER_AREA = Field(
+    "material", "", "kg/m^2", "kg/m^2", "load_cases.material", MATERIAL.sentence,
+    default=None, plausible=(0.0, 1e3), example="30 kg/m^2",
+)  # fmt: skip
+
+
+def entry_of(field: Field) -> Entry:
+    """Return the entry that holds ``field`` in a machine file."""
+    section, key = field.key.split(".")
+    kind: Kind = "interval" if isinstance(field.example, tuple) else "quantity"
+    example = list(field.example) if isinstance(field.example, tuple) else field.example
+    return Entry(section, key, kind, field.sentence, example, field)
+
+
+def each_of(field: Field) -> Entry | None:
+    """Return the entry for one piece of ``field``, where the field counts pieces."""
+    if field.count is None:
+        return None
+    section, key = field.key.split(".")
+    count = FIELD[field.count].key
+    sentence = f"The same for one piece, instead of the total; needs {count}."
+    return Entry(section, f"{key}_each", "each", sentence, "", field)
+
+
+def _machine_entries() -> Iterable[Entry]:
+    for field in FIELDS:
+        yield entry_of(field)
+        each = each_of(field)
+        if each is not None:
+            yield each
+    yield Entry(
+        "exciter", "type", "choice",
+        "How the unbalance moves.", "circular", choices=("circular",),
+    )  # fmt: skip
+    yield Entry(
+        "stops", "law", "choice",
+        "Force law: as the paper writes it, or without the pull at release.",
+        "paper", choices=get_args(ContactLaw),
+    )  # fmt: skip
+    yield Entry(
+        "shear_springs", "temperature_factor", "temperatures",
+        "Factor on the stiffness over the temperature of the rubber.",
+        [["-10 degC", 1.15], ["20 degC", 1.0], ["50 degC", 0.85]],
+    )  # fmt: skip
+
+
+def _load_entries() -> Iterable[Entry]:
+    yield Entry("load_cases", "name", "text", "What the case is called in reports.", "full")
+    yield from map(entry_of, LOAD_FIELDS)
+    yield Entry("load_cases", "material", "material", MATERIAL.sentence, MATERIAL.example, MATERIAL)
+    yield Entry(
+        "load_cases", "split_main_floating", "split",
+        "Shares of the material that main and floating frame carry.", [0.5, 0.5],
+    )  # fmt: skip
+
+
+def _by_section() -> Mapping[str, tuple[Entry, ...]]:
+    document = (Entry("document", key, "text", text, show) for key, text, show in _DOCUMENT)
+    entries = (
+        *document,
+        *_machine_entries(),
+        entry_of(SPEED),
+        *map(entry_of, LIMIT_FIELDS),
+        *_load_entries(),
+    )
+    return {
+        section: tuple(entry for entry in entries if entry.section == section)
+        for section in SECTION_SENTENCES
+    }
+
+
+SECTIONS: Mapping[str, tuple[Entry, ...]] = _by_section()
+
+
+def refuse_unknown(table: Mapping[str, object], known: Iterable[str], *, place: str) -> None:
+    """Raise InputError for the first key that is not known, with the nearest that is."""
+    known = tuple(known)
+    for key, value in table.items():
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]!r}" if near else f"choose one of {', '.join(known)}"
+            label = f"{place}.{key}" if place else f"[{key}]"
+            shown = "{...}" if isinstance(value, dict) else value
+            raise InputError(label, shown, f"this name is not known, {hint}")

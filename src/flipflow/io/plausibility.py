@@ -1,0 +1,89 @@
+"""Slips of units that parse: values and figures that no flip-flow screen has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from flipflow.errors import InputError
+from flipflow.io.derived import Derived, derive
+from flipflow.io.layout import LOAD_FIELDS, SPEED
+from flipflow.io.units import in_unit, shown
+from flipflow.model.fields import FIELDS, Field
+from flipflow.model.limits import LIMIT_FIELDS, Limits
+from flipflow.model.screen import FlipFlowScreen, Load
+
+_HERTZ = 2.0 * math.pi
+NATURAL_FREQUENCIES = (0.2 * _HERTZ, 60.0 * _HERTZ)
+STATIC_AMPLITUDES = (0.1e-3, 30e-3)
+# Below the lesser, a damper is so weak that kN s/m was likely read as N s/m; zero is a choice.
+DAMPING_RATIOS = (5e-4, 1.5)
+_FORCE = "or let it through with --force (force=True)"
+
+
+def implausible(
+    screen: FlipFlowScreen, limits: Limits, cases: Sequence[Load], speed: float | None
+) -> tuple[InputError, ...]:
+    """Return what looks wrong, as errors to be raised or shown; empty when nothing does.
+
+    Derived figures are judged only where every single value is plausible: otherwise they would
+    repeat in other words what is wrong already.
+    """
+    values = tuple(_values(screen, limits, cases, speed))
+    return values or tuple(_figures(derive(screen)))
+
+
+def _values(
+    screen: FlipFlowScreen, limits: Limits, cases: Sequence[Load], speed: float | None
+) -> Iterator[InputError]:
+    for field in FIELDS:
+        yield from _question(field, getattr(screen, field.name))
+    yield from _question(SPEED, speed)
+    for limit in LIMIT_FIELDS:
+        value = getattr(limits, limit.name)
+        for end in value if isinstance(value, tuple) else (value,):
+            yield from _question(limit, end)
+    for case in cases:
+        for field in LOAD_FIELDS:
+            yield from _question(field, getattr(case, field.name), of=f" of {case.name!r}")
+        carried = case.main_mass + case.floating_mass
+        if carried > 3.0 * (screen.main_mass + screen.floating_mass):
+            yield InputError(
+                f"load_cases.material of {case.name!r}", f"{carried:.4g} kg",
+                f"this looks wrong, it is more than three times the machine, check it {_FORCE}",
+            )  # fmt: skip
+
+
+def _question(field: Field, value: float | None, *, of: str = "") -> Iterator[InputError]:
+    if value is None or field.plausible is None or field.is_plausible(value):
+        return
+    low, high = (in_unit(end, field.file_unit, field.unit) for end in field.plausible)
+    yield InputError(
+        field.key + of,
+        shown(value, field.file_unit, field.unit),
+        f"this looks wrong, screens have {low:.4g} to {high:.6g} {field.file_unit}".rstrip()
+        + f", check the unit {_FORCE}",
+    )
+
+
+def _figures(derived: Derived) -> Iterator[InputError]:
+    low, high = NATURAL_FREQUENCIES
+    for name, omega in zip(("w01", "w02"), derived.natural_frequencies, strict=True):
+        if not low <= omega <= high:
+            yield InputError(
+                f"natural frequency {name}", f"{omega / _HERTZ:.4g} Hz",
+                "this looks wrong, screens have 0.2 to 60 Hz, check the units of masses and "
+                f"stiffnesses {_FORCE}",
+            )  # fmt: skip
+    if not STATIC_AMPLITUDES[0] <= derived.static_amplitude <= STATIC_AMPLITUDES[1]:
+        yield InputError(
+            "exciter.eccentric_moment over all mass", shown(derived.static_amplitude, "mm", "m"),
+            f"this looks wrong, screens have 0.1 to 30 mm, check the unit of kg mm {_FORCE}",
+        )  # fmt: skip
+    for section, ratio in derived.damping_ratios.items():
+        if ratio != 0.0 and not DAMPING_RATIOS[0] <= ratio <= DAMPING_RATIOS[1]:
+            yield InputError(
+                f"{section}.damping as damping ratio", f"{ratio:.3g}",
+                f"this looks wrong, screens have {DAMPING_RATIOS[0]:g} to {DAMPING_RATIOS[1]:g}, "
+                f"check the unit, kN s/m against N s/m, {_FORCE}",
+            )  # fmt: skip

@@ -1,0 +1,218 @@
+"""Machine files: from a bundled name or a path to the project they describe."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+
+from flipflow.errors import InputError
+from flipflow.io.layout import FORMAT, SECTIONS, SPEED, refuse_unknown
+from flipflow.io.load_cases import read_load_cases
+from flipflow.io.machine import Tables, read_screen
+from flipflow.io.plausibility import implausible
+from flipflow.io.source import read_source
+from flipflow.io.values import Notes, Table, read_interval, read_number, read_text
+from flipflow.model.limits import LIMIT_FIELDS, Limits
+from flipflow.model.screen import FlipFlowScreen, Load
+
+
+@dataclass(frozen=True, kw_only=True)
+class Document:
+    """Title block of a report."""
+
+    name: str = ""
+    project: str = ""
+    customer: str = ""
+    drawing: str = ""
+    revision: str = ""
+    prepared_by: str = ""
+    checked_by: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Project:
+    """A machine file: the machine, what it must bear, what it may do, and where that is known from.
+
+    Parameters
+    ----------
+    screen
+        The machine, empty.
+    limits
+        What it may do; a limit at None is not checked.
+    load_cases
+        At least one; the empty machine where the file names none.
+    speed
+        Operating speed in rad/s, None where the file gives none.
+    document
+        Title block.
+    sources
+        Where values come from, by ``section.key``, by section, or by ``load_cases.<name>``.
+    name, path
+        Bundled name or the file's stem, and the path; None for a bundled machine.
+    written
+        Values as the file has them, by ``section.key``.
+    sums
+        Totals that were given in pieces, as sentences, by ``section.key``.
+    assumed
+        What was taken because the file leaves it out.
+    warnings
+        What looked implausible and was let through by ``force``.
+    """
+
+    screen: FlipFlowScreen
+    limits: Limits
+    load_cases: tuple[Load, ...]
+    speed: float | None
+    document: Document
+    sources: Mapping[str, str]
+    name: str
+    path: Path | None
+    written: Mapping[str, object] = field(repr=False)
+    sums: Mapping[str, str]
+    assumed: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def load(name_or_path: str | os.PathLike[str], *, force: bool = False) -> FlipFlowScreen:
+    """Load the screen of a bundled machine or of a machine file.
+
+    Parameters
+    ----------
+    name_or_path
+        ``"ffs0827"``, ``"ffs0827-linear"``, or the path of a ``.toml`` file.
+    force
+        Let values through that are possible but look like a slip of units.
+
+    Returns
+    -------
+    FlipFlowScreen
+        The machine, empty, in SI.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, or a value in it that is wrong, missing or implausible.
+    """
+    return load_project(name_or_path, force=force).screen
+
+
+def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -> Project:
+    """Load a whole machine file: screen, limits, load cases, speed, document, sources.
+
+    Parameters
+    ----------
+    name_or_path
+        ``"ffs0827"``, ``"ffs0827-linear"``, or the path of a ``.toml`` file.
+    force
+        Let values through that are possible but look like a slip of units; they are then listed
+        in ``warnings``.
+
+    Returns
+    -------
+    Project
+        What the file says, in SI, with what it leaves out noted in ``assumed``.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, or a value in it that is wrong, missing or implausible.
+    """
+    source = read_source(name_or_path)
+    tables, cases = _sections(source.tables)
+    notes = Notes()
+    _check_format(source.tables, notes)
+    screen = read_screen(tables, notes)
+    project = Project(
+        screen=screen,
+        limits=_limits(tables.get("limits", {}), notes),
+        load_cases=read_load_cases(cases, screen, notes),
+        speed=_speed(tables.get("operation", {}), notes),
+        document=_document(tables.get("document", {}), source.name, notes),
+        sources=_sources(tables.get("sources", {}), cases),
+        name=source.name,
+        path=source.path,
+        written=MappingProxyType(notes.written),
+        sums=MappingProxyType(notes.sums),
+        assumed=tuple(notes.assumed),
+    )
+    return _plausible(project, force=force)
+
+
+def _plausible(project: Project, *, force: bool) -> Project:
+    found = implausible(project.screen, project.limits, project.load_cases, project.speed)
+    if found and not force:
+        raise found[0]
+    return replace(project, warnings=tuple(map(str, found)))
+
+
+def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
+    """Check that every section is there in the right shape and holds only known keys."""
+    refuse_unknown(tables, ["format", *SECTIONS], place="")
+    sections: Tables = {}
+    for name, entries in SECTIONS.items():
+        table = tables.get(name)
+        if table is None or name == "load_cases":
+            continue
+        if not isinstance(table, dict):
+            raise InputError(name, table, f"write it as a section, [{name}] on a line of its own")
+        if name != "sources":
+            refuse_unknown(table, [entry.key for entry in entries], place=name)
+        sections[name] = table
+    cases = tables.get("load_cases", [])
+    if not isinstance(cases, list) or not all(isinstance(case, dict) for case in cases):
+        shown = "{...}" if isinstance(cases, dict) else cases
+        raise InputError(
+            "load_cases", shown, "write each case as a section of its own, [[load_cases]]"
+        )
+    return sections, cases
+
+
+def _check_format(tables: Mapping[str, object], notes: Notes) -> None:
+    if "format" not in tables:
+        notes.assumed.append(f"format = {FORMAT}")
+    written = tables.get("format", FORMAT)
+    if isinstance(written, bool) or written != FORMAT:
+        raise InputError("format", written, f"this version of flipflow reads format = {FORMAT}")
+
+
+def _limits(table: Table, notes: Notes) -> Limits:
+    values = {}
+    for limit in LIMIT_FIELDS:
+        if limit.name in table:
+            written = notes.written[limit.key] = table[limit.name]
+            read = read_interval if limit.interval else read_number
+            values[limit.name] = read(written, limit)
+    return Limits(**values)  # type: ignore[arg-type]
+
+
+def _speed(table: Table, notes: Notes) -> float | None:
+    if "speed" not in table:
+        return None
+    notes.written[SPEED.key] = table["speed"]
+    return read_number(table["speed"], SPEED)
+
+
+def _document(table: Table, stem: str, notes: Notes) -> Document:
+    values = {entry.key: read_text(table, entry) for entry in SECTIONS["document"]}
+    if not values["name"]:
+        notes.assumed.append(f'document.name = "{stem}"')
+        values["name"] = stem
+    return Document(**values)
+
+
+def _sources(table: Table, cases: list[Table]) -> Mapping[str, str]:
+    """Read the sources; TOML reads an unquoted ``section.key`` as a table in a table."""
+    flat: dict[str, object] = {}
+    for key, value in table.items():
+        inner = value if isinstance(value, dict) else {"": value}
+        flat.update({f"{key}.{name}".rstrip("."): text for name, text in inner.items()})
+    known = [*(entry.label for entries in SECTIONS.values() for entry in entries), *SECTIONS]
+    known += [f"load_cases.{case.get('name')}" for case in cases]
+    refuse_unknown(flat, known, place="sources")
+    for key, text in flat.items():
+        if not isinstance(text, str):
+            raise InputError(f"sources.{key}", text, 'write text in quotes, such as "drawing 4711"')
+    return MappingProxyType({key: str(text) for key, text in flat.items()})
