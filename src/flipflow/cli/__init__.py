@@ -1,1 +1,1 @@
-"""flipflow.cli"""
+"""The command line: one command a file; parse, call, show."""

@@ -194,7 +194,6 @@ FIELDS: tuple[Field, ...] = (
         "Area of the screen surface, for load cases given per area.",
         lower_open=True, default=None, plausible=(0.05, 100.0),
         example="2.5 m^2",
-        needed_for="load cases given per area",
     ),
     Field(
         "shear_height", "h2", "m", "mm", "shear_springs.height",

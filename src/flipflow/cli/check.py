@@ -1,0 +1,142 @@
+"""``flipflow check``: what a machine file says, in SI, and what it leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from flipflow.io.check import Case, Check, Value
+
+
+def check(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
+    ],
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
+    ] = False,
+) -> None:
+    """Check a machine file: what it says, assumes and leaves open."""
+    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.check import check_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415
+
+    result = check_project(load_project(file, force=force))
+    if json is not None:
+        write_json(result.document(), json)
+    if json != "-":
+        _show(result, console())
+
+
+def _show(result: Check, out: Console) -> None:
+    for warning in result.warnings:
+        out.print(f"Warning: {_printable(warning)}\n", style="bold yellow")
+    out.print(f"{_printable(result.name)}: {_verdict(result)}", style="bold")
+    out.print()
+    out.print(_values(result.values))
+    _list(out, "Sums of pieces", (f"{key}: {text}" for key, text in result.sums.items()))
+    out.print()
+    out.print(_speeds(result))
+    out.print()
+    ratios = (f"{name} {ratio:.3g}" for name, ratio in result.damping_ratios.items())
+    out.print(f"Damping ratios: {', '.join(ratios)}")
+    out.print(f"Unbalance over all mass (m0r/(m1+m2)): {1e3 * result.static_amplitude:.4g} mm")
+    out.print()
+    out.print(_cases(result.load_cases))
+    _list(out, "Sources", _sources(result))
+    _list(out, "Assumed", result.assumed)
+    _list(out, "Missing", (f"{g.missing}: disables {g.disables}" for g in result.missing))
+
+
+def _verdict(result: Check) -> str:
+    gaps = {gap.disables for gap in result.missing}
+    parts = [
+        "the file is complete" if not gaps else "the file can be used, but not everything checked",
+        *([f"{len(result.warnings)} value(s) let through by --force"] if result.warnings else []),
+    ]
+    return ", ".join(parts) + "."
+
+
+def _values(values: Iterable[Value]) -> Table:
+    table = _table("Value", "Symbol", "As written", "In SI", fixed=True)
+    for section, rows in groupby(values, key=lambda value: value.key.split(".")[0]):
+        table.add_row(f"[{section}]", style="bold")
+        for value in rows:
+            digits = 6 if len(value.si) == 1 else 5  # two ends must fit the column
+            numbers = " to ".join(_plain(number, digits) for number in value.si)
+            si = f"{numbers} {value.unit}".strip()
+            table.add_row(value.key.split(".")[1], value.symbol, _printable(value.written), si)
+    return table
+
+
+def _plain(number: float, digits: int) -> str:
+    """Write so many digits, and large numbers without a power of ten."""
+    return f"{number:.0f}" if 1e5 <= abs(number) < 1e10 else f"{number:.{digits}g}"
+
+
+def _speeds(result: Check) -> Table:
+    table = _table("Speed", "Symbol", "rpm", "Hz", "rad/s", right=3)
+    for speed in result.speeds:
+        row = (f"{speed.rpm:.1f}", f"{speed.hz:.3f}", f"{speed.rad_s:.3f}")
+        table.add_row(speed.meaning, speed.name, *row)
+    return table
+
+
+def _cases(cases: Iterable[Case]) -> Table:
+    table = _table("Load case", "k2 x", "c2 x", "main kg", "floating kg", "degC", right=5)
+    for case in cases:
+        numbers = (case.stiffness_factor, case.damping_factor, case.main_mass, case.floating_mass)
+        warm = "" if case.temperature is None else f"{case.temperature:.4g}"
+        table.add_row(_printable(case.name), *(f"{number:.4g}" for number in numbers), warm)
+    return table
+
+
+def _sources(result: Check) -> Iterator[str]:
+    """Group by source; a value without one stands last."""
+    named = [(value.source, value.key) for value in result.values]
+    named += [(case.source, f"load case {case.name!r}") for case in result.load_cases]
+    for source, rows in groupby(sorted(named, key=_no_source_last), key=lambda row: row[0]):
+        keys = ", ".join(_printable(key) for _, key in rows)
+        yield f"{_printable(source) or 'no source given'}: {keys}"
+
+
+def _no_source_last(row: tuple[str, str]) -> tuple[bool, str]:
+    return not row[0], row[0]
+
+
+def _list(out: Console, title: str, lines: Iterable[str]) -> None:
+    """Print a titled list whose lines wrap under their own beginning."""
+    from rich.padding import Padding  # noqa: PLC0415  slow to import
+
+    lines = tuple(lines)
+    if lines:
+        out.print(f"\n{title}", style="bold")
+    for line in lines:
+        out.print(Padding(line, (0, 0, 0, 2)))
+
+
+def _table(*names: str, right: int = 0, fixed: bool = False) -> Table:
+    """Make a table without frame; the last ``right`` columns are numbers, a fixed first holds."""
+    from rich.table import Table  # noqa: PLC0415  slow to import
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    for index, name in enumerate(names):
+        numeric = index >= len(names) - right
+        justify = "right" if numeric else "left"
+        table.add_column(name, justify=justify, overflow="fold", no_wrap=fixed and index == 0)
+    return table
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)

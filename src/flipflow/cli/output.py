@@ -1,0 +1,57 @@
+"""Where commands write: an 80-column console, and JSON documents."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flipflow.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+COLUMNS = 80
+
+
+def console() -> Console:
+    """Return a console of at most 80 columns that takes text as it is, brackets included."""
+    from rich.console import Console  # noqa: PLC0415  slow to import
+
+    width = min(shutil.get_terminal_size().columns, COLUMNS)
+    return Console(width=max(width, 40), highlight=False, markup=False, emoji=False)
+
+
+def write_json(document: Mapping[str, object], target: str) -> None:
+    """Write a document to a file, or to stdout for ``-``; what is not finite becomes null.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    text = json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    try:
+        Path(target).write_text(text, encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(
+            "--json", target, f"it cannot be written ({reason}), name a file in a folder you own"
+        ) from None
+
+
+def _finite(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,19 @@
+"""``flipflow schema``: the JSON schema of the machine file."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def schema(
+    json: Annotated[
+        str, typer.Option("--json", metavar="FILE", help="Where to write it, - for the terminal.")
+    ] = "-",
+) -> None:
+    """Print the JSON schema of the machine file, for editors."""
+    from flipflow.cli.output import write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.schema import machine_schema  # noqa: PLC0415
+
+    write_json(machine_schema(), json)

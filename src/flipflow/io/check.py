@@ -1,0 +1,187 @@
+"""What a machine file says, in SI, what follows from it, and what it leaves open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+
+from flipflow.io.derived import Derived, derive
+from flipflow.io.layout import SECTIONS, SPEED, Entry
+from flipflow.io.project import Project
+from flipflow.io.units import in_unit
+from flipflow.io.values import read_interval, read_number
+from flipflow.model.fields import FIELD, FIELDS
+from flipflow.model.limits import LIMIT_FIELDS
+
+
+@dataclass(frozen=True)
+class Value:
+    """One value of the file: as written, in SI (least and greatest for an interval), its source."""
+
+    key: str
+    symbol: str
+    written: str
+    si: tuple[float, ...]
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
+class Speed:
+    """A speed that follows from the values, rad/s first."""
+
+    name: str
+    meaning: str
+    rad_s: float
+    hz: float
+    rpm: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a load case does to the machine."""
+
+    name: str
+    stiffness_factor: float
+    damping_factor: float
+    main_mass: float
+    floating_mass: float
+    temperature: float | None
+    source: str
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What is missing, and what cannot be checked because of it."""
+
+    missing: str
+    disables: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """The outcome of :func:`check_project`; every part is plain data."""
+
+    name: str
+    values: tuple[Value, ...]
+    sums: Mapping[str, str]
+    speeds: tuple[Speed, ...]
+    static_amplitude: float
+    damping_ratios: Mapping[str, float]
+    load_cases: tuple[Case, ...]
+    assumed: tuple[str, ...]
+    missing: tuple[Gap, ...]
+    warnings: tuple[str, ...]
+
+    def document(self) -> dict[str, object]:
+        """Return everything as plain data with a schema name."""
+        parts = {**asdict(self), "sums": dict(self.sums)}
+        return {"schema": "flipflow/check/1", **parts}
+
+
+def check_project(project: Project) -> Check:
+    """Collect what a machine file says and leaves open.
+
+    Parameters
+    ----------
+    project
+        A loaded machine file.
+
+    Returns
+    -------
+    Check
+        Values as written and in SI, sums of pieces, derived speeds, load cases, what was assumed
+        and what is missing.
+    """
+    derived = derive(project.screen)
+    return Check(
+        name=project.document.name,
+        values=tuple(_values(project)),
+        sums=dict(project.sums),
+        speeds=tuple(_speeds(project, derived)),
+        static_amplitude=derived.static_amplitude,
+        damping_ratios=derived.damping_ratios,
+        load_cases=tuple(_cases(project)),
+        assumed=project.assumed,
+        missing=tuple(_missing(project)),
+        warnings=project.warnings,
+    )
+
+
+def _values(project: Project) -> Iterator[Value]:
+    for section, entries in SECTIONS.items():
+        for entry in entries:
+            if entry.label in project.written:
+                source = project.sources.get(entry.label, project.sources.get(section, ""))
+                yield _value(entry, project.written[entry.label], source)
+
+
+def _value(entry: Entry, written: object, source: str) -> Value:
+    field = entry.field
+    if field is None:
+        return Value(entry.label, "", _shown(written), (), "", source)
+    if entry.kind == "interval":
+        si: tuple[float, ...] = read_interval(written, field)
+    else:
+        si = (read_number(written, field),)
+    symbol = f"{field.symbol} each" if entry.kind == "each" else field.symbol
+    return Value(entry.label, symbol, _shown(written), si, field.unit, source)
+
+
+def _shown(written: object) -> str:
+    if not isinstance(written, list):
+        return str(written)
+    if written and isinstance(written[0], list):
+        return ", ".join(f"{factor} at {temperature}" for temperature, factor in written)
+    return " to ".join(map(str, written))
+
+
+def _speeds(project: Project, derived: Derived) -> Iterator[Speed]:
+    low, high = derived.natural_frequencies
+    rows = (
+        ("w01", "first natural frequency", low),
+        ("w02", "second natural frequency", high),
+        ("w_ea", "both frames swing alike", derived.omega_ea),
+        ("w_ar", "antiresonance of the main frame", derived.omega_ar),
+        (SPEED.symbol, "operating speed", project.speed),
+    )
+    for name, meaning, omega in rows:
+        if omega is not None:
+            hz, rpm = (in_unit(omega, unit, "rad/s") for unit in ("Hz", "rpm"))
+            yield Speed(name, meaning, omega, hz, rpm)
+
+
+def _cases(project: Project) -> Iterator[Case]:
+    screen, sources = project.screen, project.sources
+    for load in project.load_cases:
+        warm = screen.temperature_stiffness_factor(load.temperature)
+        yield Case(
+            name=load.name,
+            stiffness_factor=load.stiffness_factor * warm,
+            damping_factor=load.damping_factor,
+            main_mass=load.main_mass,
+            floating_mass=load.floating_mass,
+            temperature=load.temperature,
+            source=sources.get(f"load_cases.{load.name}", sources.get("load_cases", "")),
+        )
+
+
+def _missing(project: Project) -> Iterator[Gap]:
+    screen = project.screen
+    for field in FIELDS:
+        idle = field.name == "stop_pieces" and not screen.has_stop
+        if field.needed_for and getattr(screen, field.name) is None and not idle:
+            yield Gap(field.key, field.needed_for)
+    if project.speed is None:
+        yield Gap(SPEED.key, SPEED.needed_for)
+    for limit in LIMIT_FIELDS:
+        idle = limit.name in {"stop_force", "jump_margin"} and not screen.has_stop
+        if getattr(project.limits, limit.name) is None:
+            if not idle:
+                yield Gap(limit.key, "this limit")
+        elif lacking := [FIELD[n].key for n in limit.needs if getattr(screen, n) is None]:
+            yield Gap(", ".join(lacking), limit.key)
+    dampers = (screen.isolation_damping, screen.shear_damping)
+    if math.isclose(sum(dampers), 0.0):
+        yield Gap("isolation.damping, shear_springs.damping", "steady states: nothing settles")
