@@ -133,8 +133,8 @@ def _table(*names: str, right: int = 0, fixed: bool = False) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     for index, name in enumerate(names):
         numeric = index >= len(names) - right
-        justify = "right" if numeric else "left"
-        table.add_column(name, justify=justify, overflow="fold", no_wrap=fixed and index == 0)
+        held = fixed and index == 0
+        table.add_column(name, justify="right" if numeric else "left", no_wrap=held)
     return table
 
 

@@ -6,6 +6,7 @@ Parser, schema and template walk over the same entries, so none can know a key t
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -82,7 +83,7 @@ _DOCUMENT = (
 SPEED = Field(
     "speed", "omega", "rad/s", "rpm", "operation.speed",
     "Shaft speed the machine is run at.",
-    lower_open=True, default=None, plausible=(6.2831, 314.16), example="850 rpm",
+    lower_open=True, default=None, plausible=(2.0 * math.pi, 100.0 * math.pi), example="850 rpm",
     needed_for="the verdict at the operating speed",
 )  # fmt: skip
 
@@ -186,12 +187,14 @@ SECTIONS: Mapping[str, tuple[Entry, ...]] = _by_section()
 
 
 def refuse_unknown(table: Mapping[str, object], known: Iterable[str], *, place: str) -> None:
-    """Raise InputError for the first key that is not known, with the nearest that is."""
+    """Raise InputError for the first key that is not known, with the nearest that is.
+
+    ``place`` stands before the key in the sentence; it is empty for the sections themselves.
+    """
     known = tuple(known)
     for key, value in table.items():
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
             hint = f"did you mean {near[0]!r}" if near else f"choose one of {', '.join(known)}"
-            label = f"{place}.{key}" if place else f"[{key}]"
-            shown = "{...}" if isinstance(value, dict) else value
+            label, shown = (place + key, value) if place else ("section", f"[{key}]")
             raise InputError(label, shown, f"this name is not known, {hint}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from flipflow.errors import InputError
 from flipflow.io.derived import Derived, derive
@@ -22,30 +22,38 @@ _FORCE = "or let it through with --force (force=True)"
 
 
 def implausible(
-    screen: FlipFlowScreen, limits: Limits, cases: Sequence[Load], speed: float | None
+    screen: FlipFlowScreen,
+    limits: Limits,
+    cases: Sequence[Load],
+    speed: float | None,
+    written: Mapping[str, object],
 ) -> tuple[InputError, ...]:
     """Return what looks wrong, as errors to be raised or shown; empty when nothing does.
 
     Derived figures are judged only where every single value is plausible: otherwise they would
-    repeat in other words what is wrong already.
+    repeat in other words what is wrong already. ``written`` holds values as the file has them.
     """
-    values = tuple(_values(screen, limits, cases, speed))
+    values = tuple(_values(screen, limits, cases, speed, written))
     return values or tuple(_figures(derive(screen)))
 
 
 def _values(
-    screen: FlipFlowScreen, limits: Limits, cases: Sequence[Load], speed: float | None
+    screen: FlipFlowScreen,
+    limits: Limits,
+    cases: Sequence[Load],
+    speed: float | None,
+    written: Mapping[str, object],
 ) -> Iterator[InputError]:
     for field in FIELDS:
-        yield from _question(field, getattr(screen, field.name))
-    yield from _question(SPEED, speed)
+        yield from _question(field, getattr(screen, field.name), written)
+    yield from _question(SPEED, speed, written)
     for limit in LIMIT_FIELDS:
         value = getattr(limits, limit.name)
         for end in value if isinstance(value, tuple) else (value,):
-            yield from _question(limit, end)
+            yield from _question(limit, end, written)
     for case in cases:
         for field in LOAD_FIELDS:
-            yield from _question(field, getattr(case, field.name), of=f" of {case.name!r}")
+            yield from _question(field, getattr(case, field.name), {}, of=f" of {case.name!r}")
         carried = case.main_mass + case.floating_mass
         if carried > 3.0 * (screen.main_mass + screen.floating_mass):
             yield InputError(
@@ -54,13 +62,15 @@ def _values(
             )  # fmt: skip
 
 
-def _question(field: Field, value: float | None, *, of: str = "") -> Iterator[InputError]:
+def _question(
+    field: Field, value: float | None, written: Mapping[str, object], *, of: str = ""
+) -> Iterator[InputError]:
     if value is None or field.plausible is None or field.is_plausible(value):
         return
     low, high = (in_unit(end, field.file_unit, field.unit) for end in field.plausible)
     yield InputError(
         field.key + of,
-        shown(value, field.file_unit, field.unit),
+        written.get(field.key, shown(value, field.file_unit, field.unit)),
         f"this looks wrong, screens have {low:.4g} to {high:.6g} {field.file_unit}".rstrip()
         + f", check the unit {_FORCE}",
     )

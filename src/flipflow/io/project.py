@@ -6,7 +6,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 
 from flipflow.errors import InputError
 from flipflow.io.layout import FORMAT, SECTIONS, SPEED, refuse_unknown
@@ -134,15 +133,17 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
         sources=_sources(tables.get("sources", {}), cases),
         name=source.name,
         path=source.path,
-        written=MappingProxyType(notes.written),
-        sums=MappingProxyType(notes.sums),
+        written=notes.written,
+        sums=notes.sums,
         assumed=tuple(notes.assumed),
     )
     return _plausible(project, force=force)
 
 
 def _plausible(project: Project, *, force: bool) -> Project:
-    found = implausible(project.screen, project.limits, project.load_cases, project.speed)
+    found = implausible(
+        project.screen, project.limits, project.load_cases, project.speed, project.written
+    )
     if found and not force:
         raise found[0]
     return replace(project, warnings=tuple(map(str, found)))
@@ -159,11 +160,11 @@ def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
         if not isinstance(table, dict):
             raise InputError(name, table, f"write it as a section, [{name}] on a line of its own")
         if name != "sources":
-            refuse_unknown(table, [entry.key for entry in entries], place=name)
+            refuse_unknown(table, [entry.key for entry in entries], place=f"{name}.")
         sections[name] = table
     cases = tables.get("load_cases", [])
     if not isinstance(cases, list) or not all(isinstance(case, dict) for case in cases):
-        shown = "{...}" if isinstance(cases, dict) else cases
+        shown = "[load_cases]" if isinstance(cases, dict) else cases
         raise InputError(
             "load_cases", shown, "write each case as a section of its own, [[load_cases]]"
         )
@@ -211,8 +212,8 @@ def _sources(table: Table, cases: list[Table]) -> Mapping[str, str]:
         flat.update({f"{key}.{name}".rstrip("."): text for name, text in inner.items()})
     known = [*(entry.label for entries in SECTIONS.values() for entry in entries), *SECTIONS]
     known += [f"load_cases.{case.get('name')}" for case in cases]
-    refuse_unknown(flat, known, place="sources")
+    refuse_unknown(flat, known, place="sources.")
     for key, text in flat.items():
         if not isinstance(text, str):
             raise InputError(f"sources.{key}", text, 'write text in quotes, such as "drawing 4711"')
-    return MappingProxyType({key: str(text) for key, text in flat.items()})
+    return {key: str(text) for key, text in flat.items()}

@@ -9,7 +9,7 @@ from flipflow.model.fields import FIELDS, Field
 
 Schema = dict[str, object]
 
-_QUANTITY = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*[^0-9\s,].*$"
+_QUANTITY = r"^\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*[^0-9\s,.].*$"
 
 
 def machine_schema() -> Schema:
@@ -82,7 +82,7 @@ def _number(field: Field) -> Schema:
         plain = {"type": "number", bound: field.lower}
         return {"anyOf": [plain, {"type": "string", "pattern": r"%\s*$"}]}
     text: Schema = {"type": "string", "pattern": _QUANTITY, "x-unit": field.unit}
-    if field.default == float("inf"):
+    if field.infinite:
         text["pattern"] = rf"{_QUANTITY}|^\s*\+?inf\s*$"
     return text
 

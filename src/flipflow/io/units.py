@@ -168,7 +168,7 @@ def _bare(written: float, unit: str, field: str, example: str, *, allow_infinite
     if unit:
         raise InputError(field, written, f"write the unit and quotes, for example {example!r}")
     if not math.isfinite(value):
-        raise InputError(field, value, f"give a finite number, for example {example}")
+        raise InputError(field, written, f"give a finite number, for example {example}")
     return value
 
 

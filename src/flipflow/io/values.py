@@ -50,12 +50,12 @@ def read_number(written: object, of: Field, *, label: str | None = None) -> floa
         of.unit,
         field=name,
         example=str(of.example),
-        allow_infinite=of.default == math.inf,
+        allow_infinite=of.infinite,
     )
     try:
         of.check(value)
     except InputError as error:
-        raise InputError(name, written, error.remedy) from None
+        raise InputError(name, written, f"{error.remedy}, for example {of.example!r}") from None
     return value
 
 
@@ -161,5 +161,5 @@ def _end(written: object, of: Field, index: int) -> float:
     try:
         of.check(value)
     except InputError as error:
-        raise InputError(of.key, written, error.remedy) from None
+        raise InputError(of.key, written, f"{error.remedy}, for example {example!r}") from None
     return value

@@ -43,6 +43,8 @@ class Field:
         Name of the field that counts the pieces this total is made of, where there is one.
     whole
         Whether only whole numbers make sense.
+    infinite
+        Whether infinity is a value.
     needed_for
         What cannot be checked where the field is left out.
     """
@@ -61,6 +63,7 @@ class Field:
     example: str | float | tuple[str, str] = ""
     count: str | None = None
     whole: bool = False
+    infinite: bool = False
     needed_for: str = ""
 
     @property
@@ -79,7 +82,7 @@ class Field:
         too_low = number <= self.lower if self.lower_open else number < self.lower
         if math.isnan(number) or too_low or number > self.upper:
             raise InputError(field, value, f"give {self._allowed()}")
-        if math.isinf(number) and self.plausible is not None and self.default != math.inf:
+        if math.isinf(number) and not self.infinite:
             raise InputError(field, value, "give a finite number")
         if self.whole and not number.is_integer():
             raise InputError(field, value, "give a whole number")
@@ -88,6 +91,8 @@ class Field:
     def is_plausible(self, value: float | None) -> bool:
         """Whether ``value`` (SI) lies in the range of machines that exist."""
         if value is None or self.plausible is None or value == self.default:
+            return True
+        if self.infinite and math.isinf(value):
             return True
         low, high = self.plausible
         return low <= value <= high
@@ -160,13 +165,13 @@ FIELDS: tuple[Field, ...] = (
         "clearance", "e", "m", "mm", "stops.clearance",
         "Gap per side before a stop is touched; infinite means no stop.",
         default=math.inf, plausible=(0.0, 0.1),
-        example="6 mm",
+        example="6 mm", infinite=True,
     ),
     Field(
         "clearance_minus", "e_minus", "m", "mm", "stops.clearance_minus",
         "Gap of the other side where it differs; left out, both sides are equal.",
         default=None, plausible=(0.0, 0.1),
-        example="6 mm",
+        example="6 mm", infinite=True,
     ),
     Field(
         "normal_stiffness", "k1n", "N/m", "kN/m", "isolation.normal_stiffness",
