@@ -1,0 +1,122 @@
+"""The command line: check, new, schema, version, and how quickly help is there."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from flipflow import __version__
+from flipflow.cli import main as cli
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["flipflow", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capsys.readouterr()
+        return ended.value.code or 0, captured.out, captured.err
+
+    return call
+
+
+@pytest.mark.parametrize("name", ["ffs0827", "ffs0827-linear"])
+def test_check_fits_80_columns(run, name):
+    code, out, err = run("check", name)
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_check_shows_values_speeds_and_sources(run):
+    _, out, _ = run("check", "ffs0827")
+    assert "4168.25 kg mm" in out
+    assert "4.16825 kg m" in out
+    assert "631.5  10.524   66.125" in out
+    assert "891.2  14.853   93.326" in out
+    assert "assumed for demonstration" in out
+
+
+def test_check_json_to_stdout_is_only_json(run):
+    code, out, _ = run("check", "ffs0827", "--json", "-")
+    document = json.loads(out)
+    assert code == 0
+    assert document["schema"] == "flipflow/check/1"
+    assert document["values"][0]["si"] == [916.0]
+
+
+def test_check_json_to_a_file(run, tmp_path):
+    _, out, _ = run("check", "ffs0827-linear", "--json", "check.json")
+    assert "natural frequency" in out
+    assert json.loads((tmp_path / "check.json").read_text(encoding="utf-8"))["name"]
+
+
+def test_brackets_in_a_file_are_text(run, tmp_path):
+    run("new", "a.toml")
+    text = (tmp_path / "a.toml").read_text(encoding="utf-8")
+    text = text.replace('"My screen"', '"[bold]Screen[/nothing]"')
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    assert "[bold]Screen[/nothing]" in run("check", "a.toml")[1]
+
+
+def test_new_writes_a_file_that_checks_and_never_overwrites(run, tmp_path):
+    assert run("new", "a.toml")[0] == 0
+    before = (tmp_path / "a.toml").read_bytes()
+    code, out, _ = run("check", "a.toml")
+    assert code == 0
+    assert "the file is complete" in out
+    code, _, err = run("new", "a.toml")
+    assert code == 2
+    assert "not overwritten" in err
+    assert (tmp_path / "a.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(("name", "word"), [("a.txt", ".toml"), ("no/folder.toml", "written")])
+def test_new_refuses(run, name, word):
+    code, _, err = run("new", name)
+    assert code == 2
+    assert word in err
+    assert "Traceback" not in err
+
+
+def test_schema(run, tmp_path):
+    code, out, _ = run("schema")
+    assert code == 0
+    assert json.loads(out)["title"] == "flipflow machine file"
+    run("schema", "--json", "schema.json")
+    assert json.loads((tmp_path / "schema.json").read_text(encoding="utf-8")) == json.loads(out)
+
+
+def test_version(run):
+    assert run("--version") == (0, f"flipflow {__version__}\n", "")
+
+
+def test_nothing_asked_shows_help(run):
+    code, out, err = run()
+    assert code == 2
+    assert "check" in out + err
+
+
+def test_interrupt_ends_with_130(run, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flipflow.io.project.load_project", interrupted)
+    assert run("check", "ffs0827")[0] == 130
+
+
+def test_help_loads_nothing_heavy():
+    """Seconds depend on the machine that runs the test; what is imported does not."""
+    code = (
+        "import sys; from flipflow.cli.main import app; "
+        "heavy = {'numpy', 'scipy', 'numba', 'xarray', 'pint', 'pydantic', 'rich', 'plotly'}; "
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip() == "[]"
