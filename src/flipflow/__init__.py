@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 _HOME = {
+    "HarmonicBalance": "flipflow.methods.options",
+    "PiecewiseExact": "flipflow.methods.options",
+    "frequency_response": "flipflow.analyses.frequency_response",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
     "Unbalance": "flipflow.model.elements",

@@ -113,7 +113,9 @@ class FlipFlowScreen:
             raise InputError("stop_law", self.stop_law, f"choose one of {choices}")
         temperatures = [t for t, _ in self.temperature_factor]
         if any(b <= a for a, b in zip(temperatures, temperatures[1:], strict=False)):
-            raise InputError("temperature_factor", temperatures, "list temperatures in rising order")
+            raise InputError(
+                "temperature_factor", temperatures, "list temperatures in rising order"
+            )
         if any(not (math.isfinite(f) and f > 0.0) for _, f in self.temperature_factor):
             raise InputError("temperature_factor", self.temperature_factor, "give factors above 0")
 
@@ -146,7 +148,8 @@ class FlipFlowScreen:
         degrees, factors = zip(*self.temperature_factor, strict=True)
         if not degrees[0] <= temperature <= degrees[-1]:
             raise InputError(
-                "temperature", temperature,
+                "temperature",
+                temperature,
                 f"stay within the table of the shear springs, {degrees[0]:g} to {degrees[-1]:g} degC",
             )
         return float(np.interp(temperature, degrees, factors))
@@ -159,8 +162,12 @@ class FlipFlowScreen:
     def stop(self) -> ClearanceSpring:
         """The stop springs as one clearance spring on the relative motion x1 - xf."""
         return ClearanceSpring(
-            (1.0, -1.0), self.stop_stiffness, self.stop_damping,
-            self.clearance, self.clearance_minus, self.stop_law,
+            (1.0, -1.0),
+            self.stop_stiffness,
+            self.stop_damping,
+            self.clearance,
+            self.clearance_minus,
+            self.stop_law,
         )
 
     def system(self) -> MechanicalSystem:

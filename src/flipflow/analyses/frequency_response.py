@@ -1,0 +1,210 @@
+"""Which periodic motions exist over frequency."""
+
+from __future__ import annotations
+
+import math
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow import __version__
+from flipflow.errors import InputError
+from flipflow.kernels import arclength, status
+from flipflow.kernels.shooting import settle
+from flipflow.methods.balance import BalanceSolver
+from flipflow.methods.exact import ExactSolver
+from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
+from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced
+from flipflow.methods.special import Found, find_special_points
+from flipflow.methods.stability import full_turn, stability_words
+from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.results.orbit import Orbit
+from flipflow.results.status import BranchStatus
+
+SETTLING_TURNS = 4000
+OMEGA_MOST = 1e6
+
+
+def frequency_response(
+    machine: Machine, omega: tuple[float, float], method: Method | None = None
+) -> Branch:
+    """Follow the periodic motions of a machine over an interval of frequency.
+
+    The branch is the one reached from below: it starts from the motion that hangs together with
+    the contact-free one at lower frequency, and is followed through its folds by pseudo-arclength
+    until it leaves the interval. Every point has its stability and error, every special point is
+    refined. Motions detached from this branch are not seen.
+
+    Parameters
+    ----------
+    machine
+        Whatever has ``.system()``: a screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        The interval (low, high) in rad/s.
+    method
+        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`.
+
+    Returns
+    -------
+    Branch
+        Its ``status`` says whether the whole interval was covered.
+
+    Raises
+    ------
+    InputError
+        For an interval that is empty, reversed or absurd, and for a machine without damping.
+    """
+    low, high = check_interval(omega)
+    method = method or PiecewiseExact()
+    solver = solver_for(machine.system(), method)
+    course = arclength.Course(low, high, (high - low) / method.points, STEP_SHARE, 1.0)
+    return followed(machine, method, solver, course)
+
+
+def followed(machine: Machine, method: Method, solver: Solver, course: arclength.Course) -> Branch:
+    """The branch over ``course`` with stability and special points."""
+    traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
+    if traced.omega.size == 0:
+        return _finished(machine, method, solver, traced, np.zeros((0, 0, 0)), [], [])
+    maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
+    eigenvalues = np.linalg.eigvals(maps).astype(np.complex128)
+    found, notes = find_special_points(solver, traced, maps, eigenvalues)
+    return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
+
+
+def solver_for(system: MechanicalSystem, method: Method, *, half_turn: bool | None = None) -> Solver:
+    """The solver of a method. Without stops both are the closed form, which shooting meets."""
+    symmetric = system.symmetric if half_turn is None else half_turn
+    if isinstance(method, HarmonicBalance) and system.with_bonded().springs:
+        return BalanceSolver(system, method.harmonics, half_turn=symmetric)
+    return ExactSolver(system, half_turn=symmetric)
+
+
+def check_interval(omega: object) -> tuple[float, float]:
+    """The interval (low, high) in rad/s, or a sentence that says what is wrong with it."""
+    try:
+        low, high = (float(x) for x in cast("tuple[float, float]", omega))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give an interval (low, high) in rad/s") from None
+    if not (math.isfinite(low) and math.isfinite(high) and low > 0.0):
+        raise InputError("omega", omega, "give two finite frequencies above 0 rad/s")
+    if high <= low:
+        raise InputError("omega", omega, "the interval is empty or reversed; give (low, high)")
+    if high > OMEGA_MOST:
+        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
+    return low, high
+
+
+def first_unknowns(solver: Solver, omega: float) -> Real:
+    """Unknowns of the motion at ``omega`` that is reached from below.
+
+    Below the first contact that is the contact-free motion. Otherwise the branch is followed up
+    from a frequency without contact, and where there is none, the machine is let settle from rest.
+    """
+    if contact_free(solver, omega):
+        return contact_free_unknowns(solver, omega)
+    lower = omega
+    while lower > 1e-3 * omega:
+        lower *= 0.96
+        if contact_free(solver, lower):
+            course = arclength.Course(lower, omega, (omega - lower) / 50, STEP_SHARE, 1.0)
+            traced = solver.trace(contact_free_unknowns(solver, lower), lower, course)
+            if traced.code == status.REACHED_UPPER:
+                return np.asarray(traced.u[-1])
+            break
+    return settled_unknowns(solver, omega)
+
+
+def contact_free(solver: Solver, omega: float) -> bool:
+    """Whether the linear motion at ``omega`` stays within all gaps."""
+    system = solver.system
+    X = linear_amplitudes(system, np.array([omega]))[0]
+    return all(
+        abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs
+    )
+
+
+def linear_amplitudes(system: MechanicalSystem, omega: Real) -> NDArray[np.complex128]:
+    """X in x = Re(X exp(i omega t)) without contact, (n, N): (K - w^2 M + i w C) X = F."""
+    w = omega[:, None, None]
+    Z = system.K - w**2 * system.M + 1j * w * system.C
+    F = system.excitation.vector * omega[:, None] ** system.excitation.power
+    return np.asarray(np.linalg.solve(Z, F[:, :, None])[:, :, 0])
+
+
+def contact_free_unknowns(solver: Solver, omega: float) -> Real:
+    """The solver's unknowns of the linear motion."""
+    X = linear_amplitudes(solver.system, np.array([omega]))[0]
+    if isinstance(solver, BalanceSolver):
+        u = np.zeros(solver.unknowns)
+        at = int(np.flatnonzero(solver.harmonics == 1)[0])
+        D = np.array([spring.direction for spring in solver.builder.springs])
+        m = D.shape[0]
+        begin = 2 * m * at if solver.harmonics[0] != 0 else m + 2 * m * (at - 1)
+        A = D @ X
+        u[begin : begin + 2 * m] = np.stack([A.real, A.imag], axis=1).ravel()
+        return u
+    return np.concatenate([X.real, (1j * omega * X).real])
+
+
+def settled_unknowns(solver: Solver, omega: float) -> Real:
+    """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
+    exact = solver if isinstance(solver, ExactSolver) else ExactSolver(solver.system, half_turn=False)
+    z = np.zeros(exact.unknowns)
+    while settle(exact.turn, z, omega, SETTLING_TURNS) == status.MISSING_CONFIGURATION:
+        exact.problem.flow.state[:] = exact.turn.flow.state
+        exact.add_missing_configuration()
+        z[:] = 0.0
+    if exact is solver:
+        return z
+    point = exact.solve(z, omega)
+    return solver.unknowns_from(exact.motion(z if point is None else point.u, omega))
+
+
+def _finished(
+    machine: Machine,
+    method: Method,
+    solver: Solver,
+    traced: Traced,
+    maps: Real,
+    found: list[Found],
+    notes: list[str],
+    eigenvalues: NDArray[np.complex128] | None = None,
+) -> Branch:
+    if eigenvalues is None:
+        eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
+    special = tuple(
+        SpecialPoint(
+            one.kind,
+            Orbit(solver, one.point.u, one.point.omega, one.point.return_map),
+            one.index + one.share,
+            one.spring,
+            one.side,
+        )
+        for one in found
+    )
+    return Branch(
+        machine=machine,
+        method=method,
+        solver=solver,
+        traced=traced,
+        return_maps=maps,
+        multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
+        stability=stability_words(eigenvalues, _saddle_side(traced, eigenvalues)),
+        special_points=special,
+        status=BranchStatus.from_code(traced.code),
+        notes=tuple(notes),
+        version=__version__,
+    )
+
+
+def _saddle_side(traced: Traced, eigenvalues: NDArray[np.complex128]) -> NDArray[np.bool_] | None:
+    """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
+    if traced.omega.size == 0:
+        return None
+    first = eigenvalues[0]
+    beyond = int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
+    backwards = traced.tangent[:, -1] * np.sign(traced.tangent[0, -1]) < 0.0
+    return np.asarray(backwards ^ beyond)

@@ -1,0 +1,295 @@
+"""Pseudo-arclength continuation of a branch in omega, compiled whole.
+
+Unknowns w = (u, omega) are measured in steps: each unknown by its own size times ``u_step``,
+omega by ``omega_step``, so that a step of length one is as long as is wanted in any of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from flipflow.kernels import status
+from flipflow.kernels.compile import kernel
+from flipflow.kernels.dense import lu_factor, lu_solve
+from flipflow.kernels.plan import Int, Real
+from flipflow.kernels.problem import residual, signature, unknown_scale
+
+NEWTON_MOST = 8
+NEWTON_FEW, NEWTON_MANY = 3, 5
+CONVERGED = 1e-8
+GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
+LONGEST, SHORTEST = 1.0, 1e-7
+TURN_MOST = 0.90
+CONTACT_STEP = 0.03
+REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND = range(5)
+
+
+class Branch(NamedTuple):
+    """Record of up to P points with n unknowns each."""
+
+    u: Real  # (P, n)
+    omega: Real  # (P,)
+    tangent: Real  # (P, n + 1) unit in scaled unknowns, stored unscaled
+    jacobian: Real  # (P, n, n) dr/du
+    signature: Int  # (P,)
+    iterations: Int  # (P,) Newton iterations
+    rejected: Int  # (P,) steps rejected on the way to the point
+    reason: Int  # (P,) why the last of them was
+
+
+class Course(NamedTuple):
+    """Where the branch is followed, and how long a step is."""
+
+    lower: float  # bounds of omega
+    upper: float
+    omega_step: float  # longest step in omega, rad/s
+    u_step: float  # longest step in the unknowns, as a share of their size
+    direction: float  # +1 or -1: sign of d omega at the start
+
+
+class Corrector(NamedTuple):
+    """Scratch of the bordered Newton solves."""
+
+    w: Real  # (n + 1,)
+    guess: Real  # (n + 1,)
+    border: Real  # (n + 1,) normal of the plane to solve in
+    before: Real  # (n + 1,) tangent at the point before
+    tangent: Real  # (n + 1,)
+    scale: Real  # (n + 1,)
+    r: Real  # (n,)
+    J: Real  # (n, n + 1)
+    A: Real  # (n + 1, n + 1)
+    b: Real  # (n + 1,)
+    pivot: Int  # (n + 1,)
+
+
+@kernel
+def set_scale(
+    problem: Any, work: Corrector, u: Real, omega: float, course: Course
+) -> None:
+    """Length of one step in each unknown."""
+    n = work.r.shape[0]
+    unknown_scale(problem, u, omega, work.scale)
+    for k in range(n):
+        work.scale[k] *= course.u_step
+    work.scale[n] = course.omega_step
+
+
+@kernel
+def bordered(work: Corrector) -> bool:
+    """Factor [J; work.border] in scaled unknowns; False when it is singular."""
+    n = work.r.shape[0]
+    for i in range(n):
+        for j in range(n + 1):
+            work.A[i, j] = work.J[i, j] * work.scale[j] / work.scale[i]
+    for j in range(n + 1):
+        work.A[n, j] = work.border[j]
+    return lu_factor(work.A, work.pivot)
+
+
+@kernel
+def correct(problem: Any, work: Corrector) -> tuple[int, int]:
+    """Newton from work.guess within the plane through it normal to work.border (scaled).
+
+    The plane omega = constant has the border (0, ..., 0, 1). Returns status and iterations; the
+    solution stands in work.w, J and its factors belong to the last iterate but one.
+    """
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        work.w[k] = work.guess[k]
+    for iteration in range(1, NEWTON_MOST + 1):
+        if not work.w[n] > 0.0:
+            return status.NO_CONVERGENCE, iteration
+        code = residual(problem, work.w, work.w[n], work.r, work.J)
+        if code != status.OK:
+            return code, iteration
+        if not bordered(work):
+            return status.SINGULAR, iteration
+        plane = 0.0
+        for k in range(n):
+            work.b[k] = -work.r[k] / work.scale[k]
+        for k in range(n + 1):
+            plane += work.border[k] * (work.w[k] - work.guess[k]) / work.scale[k]
+        work.b[n] = -plane
+        lu_solve(work.A, work.pivot, work.b)
+        length = 0.0
+        for k in range(n + 1):
+            length += work.b[k] ** 2
+            work.w[k] += work.b[k] * work.scale[k]
+        length = math.sqrt(length)
+        if not length < 1e3:
+            return status.NO_CONVERGENCE, iteration
+        if length < CONVERGED:
+            return status.OK, iteration
+    return status.NO_CONVERGENCE, NEWTON_MOST
+
+
+@kernel
+def new_tangent(work: Corrector) -> float:
+    """Unit tangent (scaled) from the last factors, into work.tangent; its cosine to work.before."""
+    n = work.r.shape[0]
+    for k in range(n):
+        work.b[k] = 0.0
+    work.b[n] = 1.0
+    lu_solve(work.A, work.pivot, work.b)
+    norm = 0.0
+    cosine = 0.0
+    for k in range(n + 1):
+        norm += work.b[k] ** 2
+    norm = math.sqrt(norm)
+    for k in range(n + 1):
+        work.tangent[k] = work.b[k] / norm
+        cosine += work.tangent[k] * work.before[k]
+    return cosine
+
+
+@kernel
+def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
+    """Write point p of the branch from the corrector's scratch."""
+    n = work.r.shape[0]
+    for i in range(n):
+        branch.u[p, i] = work.w[i]
+        for j in range(n):
+            branch.jacobian[p, i, j] = work.J[i, j]
+    branch.omega[p] = work.w[n]
+    for k in range(n + 1):
+        branch.tangent[p, k] = work.tangent[k] * work.scale[k]
+    branch.signature[p] = signature(problem)
+
+
+@kernel
+def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course) -> None:
+    """Scale of point p, and its unit tangent in scaled unknowns into work.before."""
+    n = work.r.shape[0]
+    for k in range(n):
+        work.guess[k] = branch.u[p, k]
+    set_scale(problem, work, work.guess, branch.omega[p], course)
+    norm = 0.0
+    for k in range(n + 1):
+        work.before[k] = branch.tangent[p, k] / work.scale[k]
+        norm += work.before[k] ** 2
+    for k in range(n + 1):
+        work.before[k] /= math.sqrt(norm)
+
+
+@kernel
+def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course) -> bool:
+    """Guess a step along the tangent of point p; True when it ends on a bound of omega.
+
+    A guess beyond the bound is drawn back to it and corrected at that omega.
+    """
+    n = work.r.shape[0]
+    omega = branch.omega[p] + step * work.before[n] * work.scale[n]
+    share = 1.0
+    ends = omega > course.upper or omega < course.lower
+    if ends:
+        bound = course.upper if omega > course.upper else course.lower
+        share = (bound - branch.omega[p]) / (omega - branch.omega[p])
+        omega = bound
+    for k in range(n):
+        work.guess[k] = branch.u[p, k] + share * step * work.before[k] * work.scale[k]
+        work.border[k] = 0.0 if ends else work.before[k]
+    work.guess[n] = omega
+    work.border[n] = 1.0 if ends else work.before[n]
+    return ends
+
+
+@kernel
+def judge(
+    problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, course: Course
+) -> int:
+    """Why the corrected step from point p is refused, REASON_NONE when it is good."""
+    n = work.r.shape[0]
+    if code != status.OK:
+        return REASON_NEWTON
+    if work.w[n] > course.upper or work.w[n] < course.lower:
+        return REASON_BOUND
+    cosine = new_tangent(work)
+    if cosine < 0.0:
+        for k in range(work.tangent.shape[0]):
+            work.tangent[k] = -work.tangent[k]
+    if abs(cosine) < TURN_MOST:
+        return REASON_TURN
+    if signature(problem) != branch.signature[p] and step > CONTACT_STEP:
+        return REASON_CONTACT
+    return REASON_NONE
+
+
+@kernel(entry=True)
+def trace(
+    problem: Any, work: Corrector, branch: Branch, u: Real, omega: float, course: Course
+) -> tuple[int, int]:
+    """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
+
+    The first point is corrected at fixed omega, the last stands exactly on the bound. A step is
+    refused and halved when Newton fails, when the tangent turns too far, and, down to a small
+    length, when the contacts of a turn change: points then gather where a contact begins, for
+    what is narrow hides there.
+    """
+    n = work.r.shape[0]
+    for k in range(n):
+        work.guess[k] = u[k]
+        work.border[k] = 0.0
+        work.before[k] = 0.0
+    work.guess[n] = omega
+    work.border[n] = 1.0
+    work.before[n] = course.direction
+    set_scale(problem, work, work.guess, omega, course)
+    p, step, length = 0, 0.0, 0.1
+    ends = False
+    while p < branch.omega.shape[0]:
+        if p > 0:
+            step = min(length, 0.999 / max(abs(work.before[n]), 1e-3))
+            ends = predict(work, branch, p - 1, step, course)
+        code, iterations = correct(problem, work)
+        if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
+            return code, p
+        reason = judge(problem, work, branch, max(p - 1, 0), step, code, course)
+        if reason != REASON_NONE and p > 0:
+            branch.reason[p] = reason
+            branch.rejected[p] += 1
+            length = step * HALVE
+            if length < SHORTEST:
+                return status.STEP_TOO_SMALL, p
+            continue
+        store(problem, work, branch, p)
+        branch.iterations[p] = iterations
+        if ends:
+            at_upper = branch.omega[p] == course.upper
+            return status.REACHED_UPPER if at_upper else status.REACHED_LOWER, p + 1
+        if p > 0 and iterations <= NEWTON_FEW:
+            length = min(step * GROW, LONGEST)
+        elif iterations >= NEWTON_MANY:
+            length = step * SHRINK
+        recall(problem, work, branch, p, course)
+        p += 1
+    return status.POINT_LIMIT, p
+
+
+@kernel(entry=True)
+def correct_between(
+    problem: Any, work: Corrector, branch: Branch, p: int, share: float, course: Course
+) -> int:
+    """A point of the branch between points p and p + 1: in the plane at ``share`` of their chord.
+
+    It stands in work.w, its Jacobian in work.J, its tangent, in the branch's direction, in
+    work.tangent (scaled by work.scale).
+    """
+    n = work.r.shape[0]
+    recall(problem, work, branch, p, course)
+    norm = 0.0
+    for k in range(n + 1):
+        first = branch.u[p, k] if k < n else branch.omega[p]
+        last = branch.u[p + 1, k] if k < n else branch.omega[p + 1]
+        work.guess[k] = first + share * (last - first)
+        work.border[k] = (last - first) / work.scale[k]
+        norm += work.border[k] ** 2
+    for k in range(n + 1):
+        work.border[k] /= math.sqrt(norm)
+        work.before[k] = work.border[k]
+    code, _ = correct(problem, work)
+    if code != status.OK:
+        return code
+    new_tangent(work)
+    return residual(problem, work.w, work.w[n], work.r, work.J)

@@ -1,0 +1,386 @@
+r"""Harmonic balance, exact at the contact and condensed to the motion at the gaps.
+
+With theta = omega t and y_j = Re sum_h A_hj exp(i h theta), the linear part of the machine answers
+the contact forces through its receptance G_h(omega), so that only the A_hj are unknown:
+
+    r_h = A_h + G_h Lambda_h(A) - delta_h1 A_linear.
+
+Lambda_h are the Fourier coefficients of the contact force over its intervals of contact, whose
+limits are found by the certified search and never sampled. With the penetration p, zero at a
+limit that lies at the gap, integration by parts turns the force k p + c p' into
+
+    Lambda_h = (k + i c omega h) p_h + boundary,
+
+where the boundary is left only by a clipped spring that lets go beyond its gap. In the same form
+the derivative needs no term for the moving limits: what they add to dLambda_h / dA_l cancels
+against (k + i c omega l) - (k + i c omega h).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flipflow.kernels import status
+from flipflow.kernels.compile import kernel
+from flipflow.kernels.flow import Flow, configuration, kick_sign, prepare_drive
+from flipflow.kernels.gapmotion import (
+    GapMotion,
+    exponential,
+    exponentials,
+    gap_state,
+    next_change,
+    push_state,
+)
+from flipflow.kernels.plan import Complex, Int, Plan, Real
+
+NO_SPRING = -1
+
+
+class Balance(NamedTuple):
+    """The problem: n_h harmonics at m gaps; unknowns as :func:`place` orders them."""
+
+    plan: Plan
+    flow: Flow  # record of the contacts in a turn; its contact damping is c omega
+    motion: GapMotion  # the series itself
+    harmonics: Int  # (n_h,) 0 first when there is a mean, equally spaced otherwise
+    receptance: Complex  # (n_h, m, m) G_h
+    receptance_slope: Complex  # (n_h, m, m) dG_h / d omega
+    linear: Complex  # (m,) A_linear
+    linear_slope: Complex  # (m,)
+    integral: Complex  # (m, 2 H + 1) int exp(i k theta) over the contacts, k = 0 ... 2 H
+    integral_gap: Complex  # (m, 2 H + 1) the same times the signed gap
+    edge: Complex  # (m, 4 H + 1) sum +-exp(i k theta) at clipped limits, k = -2 H ... 2 H
+    edge_depth: Complex  # (m, 2 H + 1) sum +-p exp(-i k theta) there, k = 0 ... 2 H
+    force: Complex  # (n_h, m) Lambda_h
+    force_slope: Complex  # (n_h, m) its derivative in omega at fixed A
+    length: float
+
+
+@kernel
+def place(problem: Balance, a: int, j: int) -> int:
+    """Where the real part of harmonic a at gap j stands; the imaginary part follows it."""
+    m = problem.linear.shape[0]
+    if problem.harmonics[0] != 0:
+        return 2 * (a * m + j)
+    return j if a == 0 else m + 2 * ((a - 1) * m + j)
+
+
+@kernel
+def set_series(problem: Balance, u: Real) -> None:
+    """The unknowns as offsets and amplitudes at the gaps."""
+    m = problem.linear.shape[0]
+    mean = 1 if problem.harmonics[0] == 0 else 0
+    for j in range(m):
+        problem.motion.offset[j] = u[j] if mean == 1 else 0.0
+        for a in range(mean, problem.harmonics.shape[0]):
+            k = place(problem, a, j)
+            problem.motion.amplitude[j, a - mean] = complex(u[k], u[k + 1])
+
+
+@kernel
+def amplitude_of(problem: Balance, a: int, j: int) -> complex:
+    """A_hj of the series last set."""
+    if problem.harmonics[0] != 0:
+        return problem.motion.amplitude[j, a]
+    return problem.motion.offset[j] + 0j if a == 0 else problem.motion.amplitude[j, a - 1]
+
+
+@kernel
+def prepare_receptance(problem: Balance, omega: float) -> None:
+    """G_h = D (K - h^2 omega^2 M + i h omega C)^-1 D^T by modes, and its derivative in omega."""
+    plan = problem.plan
+    m = problem.linear.shape[0]
+    n = plan.direction.shape[1]
+    prepare_drive(plan, problem.flow, 0, omega)
+    for j in range(m):
+        problem.linear[j] = 0.0
+        problem.linear_slope[j] = 0.0
+        for k in range(n):
+            problem.linear[j] += plan.direction[j, k] * problem.flow.drive[0, k]
+            problem.linear_slope[j] += plan.direction[j, k] * problem.flow.drive_slope[0, k]
+    for a in range(problem.harmonics.shape[0]):
+        h = problem.harmonics[a]
+        for j in range(m):
+            for c in range(m):
+                total = 0j
+                slope = 0j
+                for i in range(plan.count[0]):
+                    share = plan.gap_shape[0, j, i] * plan.gap_pick[i, c]
+                    gap = 1.0 / (1j * h * omega - plan.rate[0, i])
+                    total += share * gap
+                    slope -= 1j * h * share * gap * gap
+                    if plan.weight[0, i] == 2.0:
+                        gap = 1.0 / (1j * h * omega - plan.rate[0, i].conjugate())
+                        total += share.conjugate() * gap
+                        slope -= 1j * h * share.conjugate() * gap * gap
+                problem.receptance[a, j, c] = total
+                problem.receptance_slope[a, j, c] = slope
+
+
+@kernel
+def series_contact_state(problem: Balance) -> None:
+    """Contact state of each spring at theta = 0."""
+    contact = problem.flow.contact
+    count = problem.motion.rate.shape[0]
+    exponentials(problem.motion, count, 0.0)
+    for j in range(problem.linear.shape[0]):
+        y, v, _ = gap_state(problem.motion, count, j)
+        side = 0
+        if y > contact.gap_plus[j]:
+            side = 1
+        elif y < -contact.gap_minus[j]:
+            side = -1
+        if side != 0 and contact.clipped[j] == 1:
+            gap = contact.gap_plus[j] if side > 0 else -contact.gap_minus[j]
+            if side * (contact.stiffness[j] * (y - gap) + contact.damping[j] * v) < 0.0:
+                side *= 2
+        problem.flow.state[j] = side
+
+
+@kernel
+def record_contacts(problem: Balance, omega: float) -> int:
+    """Walk once round the series and record who touches when, as a flow does (times in s)."""
+    flow = problem.flow
+    for j in range(problem.linear.shape[0]):
+        flow.contact.damping[j] = problem.plan.damping[j] * omega
+    series_contact_state(problem)
+    rest = 2.0 * math.pi
+    theta = 0.0
+    fired = NO_SPRING
+    for e in range(flow.start.shape[0]):
+        slot = problem.plan.slot[configuration(flow.state)]
+        flow.segments[0] = e + 1
+        if slot < 0:
+            return status.MISSING_CONFIGURATION
+        flow.slot[e] = slot
+        flow.start[e] = theta / omega
+        for j in range(flow.state.shape[0]):
+            flow.states[e, j] = flow.state[j]
+        length, spring, new = next_change_from(problem, theta, rest, fired)
+        if math.isnan(length):
+            return status.NOT_FINITE
+        flow.length[e] = length / omega
+        flow.spring[e] = spring
+        flow.kick[e] = 0.0
+        if spring < 0:
+            return status.OK
+        flow.kick[e] = kick_sign(flow.state[spring], new)
+        flow.state[spring] = new
+        fired = spring
+        theta += length
+        rest -= length
+    return status.TOO_MANY_EVENTS
+
+
+@kernel
+def next_change_from(
+    problem: Balance, theta: float, horizon: float, fired: int
+) -> tuple[float, int, int]:
+    """The next change of contact after theta: the series is turned to start there."""
+    motion = problem.motion
+    turned = problem.flow.motion
+    count = motion.rate.shape[0]
+    exponentials(motion, count, theta)
+    for j in range(motion.offset.shape[0]):
+        turned.offset[j] = motion.offset[j]
+        for i in range(count):
+            turned.amplitude[j, i] = motion.amplitude[j, i] * motion.factor[i]
+    return next_change(turned, problem.flow.contact, problem.flow.state, count, horizon, fired)
+
+
+@kernel
+def contact_integrals(problem: Balance, omega: float) -> None:
+    """int exp(i k theta) over the contacts, and what clipped limits leave."""
+    flow = problem.flow
+    m, most = problem.integral.shape
+    for j in range(m):
+        for k in range(most):
+            problem.integral[j, k] = 0.0
+            problem.integral_gap[j, k] = 0.0
+            problem.edge_depth[j, k] = 0.0
+        for k in range(2 * most - 1):
+            problem.edge[j, k] = 0.0
+    for e in range(flow.segments[0]):
+        first = flow.start[e] * omega
+        last = first + flow.length[e] * omega
+        for j in range(m):
+            if abs(flow.states[e, j]) == 1:
+                gap = flow.contact.gap_plus[j]
+                if flow.states[e, j] < 0:
+                    gap = -flow.contact.gap_minus[j]
+                _add_interval(problem, j, first, last, gap)
+        spring = flow.spring[e]
+        if spring >= 0 and flow.kick[e] == 0.0:
+            before, after = flow.states[e, spring], flow.states[e + 1, spring]
+            if abs(before) == 1 and abs(after) == 2:
+                _add_edge(problem, spring, last, 1.0, before)
+            elif abs(before) == 2 and abs(after) == 1:
+                _add_edge(problem, spring, last, -1.0, after)
+
+
+@kernel
+def _add_interval(problem: Balance, j: int, first: float, last: float, gap: float) -> None:
+    start, start_turn = 1.0 + 0j, exponential(1j * first)
+    end, end_turn = 1.0 + 0j, exponential(1j * last)
+    problem.integral[j, 0] += last - first
+    problem.integral_gap[j, 0] += gap * (last - first)
+    for k in range(1, problem.integral.shape[1]):
+        start *= start_turn
+        end *= end_turn
+        value = (end - start) * (-1j / k)
+        problem.integral[j, k] += value
+        problem.integral_gap[j, k] += gap * value
+
+
+@kernel
+def _add_edge(problem: Balance, j: int, theta: float, sign: float, side: int) -> None:
+    """A limit of contact beyond the gap: +1 where a clipped spring lets go, -1 where it holds."""
+    most = problem.integral.shape[1]
+    count = problem.motion.rate.shape[0]
+    exponentials(problem.motion, count, theta)
+    y, _, _ = gap_state(problem.motion, count, j)
+    contact = problem.flow.contact
+    depth = y - contact.gap_plus[j] if side > 0 else y + contact.gap_minus[j]
+    for k in range(-(most - 1), most):
+        turn = sign * exponential(1j * (k * theta))
+        problem.edge[j, k + most - 1] += turn
+        if k <= 0:
+            problem.edge_depth[j, -k] += depth * turn
+
+
+@kernel
+def whole_integral(problem: Balance, j: int, k: int) -> complex:
+    """int exp(i k theta) over the contacts of gap j, any sign of k."""
+    return problem.integral[j, k] if k >= 0 else problem.integral[j, -k].conjugate()
+
+
+@kernel
+def contact_forces(problem: Balance, omega: float) -> None:
+    """Lambda_h and its derivative in omega at fixed A, from the integrals."""
+    plan = problem.plan
+    for j in range(problem.linear.shape[0]):
+        for a in range(problem.harmonics.shape[0]):
+            h = problem.harmonics[a]
+            depth = -problem.integral_gap[j, h].conjugate()
+            for b in range(problem.harmonics.shape[0]):
+                k = problem.harmonics[b]
+                A = amplitude_of(problem, b, j)
+                if k == 0:
+                    depth += A * whole_integral(problem, j, -h)
+                else:
+                    depth += 0.5 * A * whole_integral(problem, j, k - h)
+                    depth += 0.5 * A.conjugate() * whole_integral(problem, j, -k - h)
+            share = 1.0 / math.pi if h > 0 else 0.5 / math.pi
+            k_spring, c = plan.stiffness[j], plan.damping[j]
+            edge = problem.edge_depth[j, h]
+            problem.force[a, j] = share * (
+                (k_spring + 1j * c * omega * h) * depth + c * omega * edge
+            )
+            problem.force_slope[a, j] = share * c * (1j * h * depth + edge)
+
+
+@kernel
+def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) -> int:
+    """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
+    m = problem.linear.shape[0]
+    set_series(problem, u)
+    prepare_receptance(problem, omega)
+    code = record_contacts(problem, omega)
+    if code != status.OK:
+        return code
+    contact_integrals(problem, omega)
+    contact_forces(problem, omega)
+    size = r.shape[0]
+    for a in range(problem.harmonics.shape[0]):
+        h = problem.harmonics[a]
+        for j in range(m):
+            value = amplitude_of(problem, a, j)
+            slope = 0j
+            if h == 1:
+                value -= problem.linear[j]
+                slope -= problem.linear_slope[j]
+            for c in range(m):
+                value += problem.receptance[a, j, c] * problem.force[a, c]
+                slope += problem.receptance_slope[a, j, c] * problem.force[a, c]
+                slope += problem.receptance[a, j, c] * problem.force_slope[a, c]
+            k = place(problem, a, j)
+            r[k] = value.real
+            J[k, size] = slope.real
+            if h > 0:
+                r[k + 1] = value.imag
+                J[k + 1, size] = slope.imag
+    _jacobian(problem, omega, J)
+    for k in range(size):
+        if not math.isfinite(r[k]):
+            return status.NOT_FINITE
+    return status.OK
+
+
+@kernel
+def _jacobian(problem: Balance, omega: float, J: Real) -> None:
+    """dr = c1 dA + c2 conj(dA): Toeplitz (l - h) and Hankel (-l - h) parts of the integrals."""
+    plan = problem.plan
+    m = problem.linear.shape[0]
+    middle = problem.integral.shape[1] - 1
+    for a in range(problem.harmonics.shape[0]):
+        h = problem.harmonics[a]
+        share = 0.5 / math.pi if h > 0 else 0.25 / math.pi
+        for b in range(problem.harmonics.shape[0]):
+            k = problem.harmonics[b]
+            for c in range(m):
+                dynamic = plan.stiffness[c] + 1j * plan.damping[c] * omega * h
+                # What the moving limit of a clipped spring adds; zero for limits at the gap.
+                moving = plan.damping[c] * omega
+                direct = share * (
+                    dynamic * whole_integral(problem, c, k - h)
+                    + moving * problem.edge[c, k - h + middle]
+                )
+                mirror = share * (
+                    dynamic * whole_integral(problem, c, -k - h)
+                    + moving * problem.edge[c, -k - h + middle]
+                )
+                for j in range(m):
+                    G = problem.receptance[a, j, c]
+                    unit = 1.0 if a == b and j == c else 0.0
+                    _write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
+
+
+@kernel
+def _write_block(
+    problem: Balance, a: int, j: int, b: int, c: int, direct: complex, mirror: complex,
+    unit: float, J: Real,
+) -> None:  # fmt: skip
+    """Real block of c1 dA + c2 conj(dA) for harmonic a at gap j against harmonic b at gap c."""
+    row, column = place(problem, a, j), place(problem, b, c)
+    with_real = direct + mirror
+    with_imag = 1j * (direct - mirror)
+    J[row, column] = with_real.real + unit
+    if problem.harmonics[a] > 0:
+        J[row + 1, column] = with_real.imag
+    if problem.harmonics[b] > 0:
+        J[row, column + 1] = with_imag.real
+        if problem.harmonics[a] > 0:
+            J[row + 1, column + 1] = with_imag.imag + unit
+
+
+@kernel
+def contact_count(problem: Balance) -> int:
+    """A number that changes when the contacts met in a turn change."""
+    total = 0
+    for e in range(problem.flow.segments[0] - 1):
+        total += 1 + 1000 * problem.flow.spring[e]
+    return total
+
+
+@kernel
+def series_scale(problem: Balance, u: Real, omega: float, scale: Real) -> None:  # noqa: ARG001
+    """Size of each unknown: the largest amplitude of all."""
+    size = problem.linear.shape[0] * (2 * problem.harmonics.shape[0])
+    if problem.harmonics[0] == 0:
+        size -= problem.linear.shape[0]
+    largest = problem.length
+    for k in range(size):
+        largest = max(largest, abs(u[k]))
+    for k in range(size):
+        scale[k] = largest

@@ -1,0 +1,295 @@
+"""The exact flow: closed form between contacts, certified events, exact tangent with saltation.
+
+In one configuration the state z = (x, x') follows
+
+    z(t) = rest + Re(drive exp(i omega t)) + Re sum_i weight_i v_i q_i exp(rate_i (t - t_s)),
+
+with drive the particular answer to the excitation. A flow is recorded segment by segment; the
+tangent is then carried over the record.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.kernels import status
+from flipflow.kernels.compile import kernel
+from flipflow.kernels.gapmotion import (
+    MINUS,
+    OPEN,
+    PLUS,
+    Contact,
+    GapMotion,
+    exponential,
+    next_change,
+)
+from flipflow.kernels.plan import Complex, Int, Plan, Real
+
+
+class Flow(NamedTuple):
+    """Scratch and record of one flow of up to E segments."""
+
+    drive: Complex  # (S, 2 N) particular answer of each configuration
+    drive_slope: Complex  # (S, 2 N) its derivative with respect to omega
+    driven_at: Real  # (S,) omega for which ``drive`` holds, NaN: none
+    motion: GapMotion
+    contact: Contact
+    state: Int  # (m,) contact state of each spring
+    z: Real  # (2 N,) running state
+    segments: Int  # (1,) number recorded
+    slot: Int  # (E,) configuration of each segment
+    start: Real  # (E,) its starting time
+    length: Real  # (E,) its duration
+    modes: Complex  # (E, R) q_i at its start
+    spring: Int  # (E,) the spring that changed at its end, -1 at the end of the flow
+    kick: Real  # (E,) +1 or -1 times c M^-1 d d^T jumps into the tangent there
+    states: Int  # (E, m) contact states during the segment
+
+
+@kernel
+def configuration(state: NDArray[np.int64]) -> int:
+    """Code of a contact state: base 3, a released spring counts as open."""
+    code = 0
+    place = 1
+    for j in range(state.shape[0]):
+        if state[j] == PLUS:
+            code += place
+        elif state[j] == MINUS:
+            code += 2 * place
+        place *= 3
+    return code
+
+
+@kernel
+def set_contact_state(plan: Plan, z: Real, state: NDArray[np.int64]) -> None:
+    """Contact state of each spring as the position (and the push) at ``z`` says."""
+    n = plan.direction.shape[1]
+    for j in range(state.shape[0]):
+        y = 0.0
+        v = 0.0
+        for i in range(n):
+            y += plan.direction[j, i] * z[i]
+            v += plan.direction[j, i] * z[n + i]
+        state[j] = OPEN
+        if y > plan.gap_plus[j] or (y == plan.gap_plus[j] and v > 0.0):
+            pushes = plan.stiffness[j] * (y - plan.gap_plus[j]) + plan.damping[j] * v >= 0.0
+            state[j] = PLUS if plan.clipped[j] == 0 or pushes else 2 * PLUS
+        elif y < -plan.gap_minus[j] or (y == -plan.gap_minus[j] and v < 0.0):
+            pushes = plan.stiffness[j] * (y + plan.gap_minus[j]) + plan.damping[j] * v <= 0.0
+            state[j] = MINUS if plan.clipped[j] == 0 or pushes else 2 * MINUS
+
+
+@kernel
+def prepare_drive(plan: Plan, flow: Flow, slot: int, omega: float) -> None:
+    """drive = (i omega - A)^-1 (0, M^-1 F(omega)) by modes, and its derivative in omega."""
+    if flow.driven_at[slot] == omega:
+        return
+    size = flow.z.shape[0]
+    scale = omega**plan.power
+    scale_slope = plan.power * omega ** (plan.power - 1) if plan.power > 0 else 0.0
+    for k in range(size):
+        flow.drive[slot, k] = 0.0
+        flow.drive_slope[slot, k] = 0.0
+    for i in range(plan.count[slot]):
+        gap = 1.0 / (1j * omega - plan.rate[slot, i])
+        plain = plan.force[slot, i] * gap
+        plain_slope = plain * (scale_slope - 1j * scale * gap)
+        gap_conj = 1.0 / (1j * omega - plan.rate[slot, i].conjugate())
+        conj = plan.force_conj[slot, i] * gap_conj
+        conj_slope = conj * (scale_slope - 1j * scale * gap_conj)
+        pair = plan.weight[slot, i] == 2.0
+        for k in range(size):
+            v = plan.right[slot, k, i]
+            flow.drive[slot, k] += v * plain * scale
+            flow.drive_slope[slot, k] += v * plain_slope
+            if pair:
+                flow.drive[slot, k] += v.conjugate() * conj * scale
+                flow.drive_slope[slot, k] += v.conjugate() * conj_slope
+    flow.driven_at[slot] = omega
+
+
+@kernel
+def begin_segment(plan: Plan, flow: Flow, e: int, slot: int, omega: float, t: float) -> None:
+    """Write the segment that starts at time t from flow.z: its modes and the motion at the gaps."""
+    size = flow.z.shape[0]
+    n = size // 2
+    count = plan.count[slot]
+    turn = exponential(1j * omega * t)
+    flow.slot[e] = slot
+    flow.start[e] = t
+    for j in range(flow.state.shape[0]):
+        flow.states[e, j] = flow.state[j]
+    for i in range(count):
+        q = 0j
+        for k in range(size):
+            steady = plan.rest[slot, k] + (flow.drive[slot, k] * turn).real
+            q += plan.left[slot, i, k] * (flow.z[k] - steady)
+        flow.modes[e, i] = q
+    gap_segment(plan, flow, e, omega)
+    flow.motion.rate[count] = 1j * omega
+    for i in range(count):
+        flow.motion.rate[i] = plan.rate[slot, i]
+    for j in range(flow.state.shape[0]):
+        flow.motion.offset[j] = 0.0
+        for k in range(n):
+            flow.motion.offset[j] += plan.direction[j, k] * plan.rest[slot, k]
+
+
+@kernel
+def gap_segment(plan: Plan, flow: Flow, e: int, omega: float) -> None:
+    """Amplitudes of the recorded segment e at the gaps, the drive as the last term."""
+    slot = flow.slot[e]
+    count = plan.count[slot]
+    turn = exponential(1j * omega * flow.start[e])
+    n = plan.direction.shape[1]
+    for j in range(plan.direction.shape[0]):
+        for i in range(count):
+            shape = plan.gap_shape[slot, j, i]
+            flow.motion.amplitude[j, i] = plan.weight[slot, i] * shape * flow.modes[e, i]
+        driven = 0j
+        for k in range(n):
+            driven += plan.direction[j, k] * flow.drive[slot, k]
+        flow.motion.amplitude[j, count] = driven * turn
+
+
+@kernel
+def segment_state(
+    plan: Plan, flow: Flow, e: int, omega: float, elapsed: float, z: Real, rate: Real
+) -> None:
+    """State z and its time derivative, ``elapsed`` after the start of segment e."""
+    slot = flow.slot[e]
+    turn = exponential(1j * omega * (flow.start[e] + elapsed))
+    for k in range(z.shape[0]):
+        steady = flow.drive[slot, k] * turn
+        z[k] = plan.rest[slot, k] + steady.real
+        rate[k] = (1j * omega * steady).real
+    for i in range(plan.count[slot]):
+        term = plan.weight[slot, i] * flow.modes[e, i] * exponential(plan.rate[slot, i] * elapsed)
+        slope = term * plan.rate[slot, i]
+        for k in range(z.shape[0]):
+            v = plan.right[slot, k, i]
+            z[k] += v.real * term.real - v.imag * term.imag
+            rate[k] += v.real * slope.real - v.imag * slope.imag
+
+
+@kernel
+def kick_sign(before: int, after: int) -> float:
+    """Sign of c M^-1 d d^T in the saltation of a change of contact.
+
+    Entry at the gap switches c y' on and gives -1, exit at the gap +1. Where a clipped spring
+    lets go, or takes hold again beyond the gap, its force is zero and the tangent does not jump.
+    """
+    if before == OPEN and abs(after) == 1:
+        return -1.0
+    if abs(before) == 1 and after == OPEN:
+        return 1.0
+    return 0.0
+
+
+@kernel
+def run_flow(plan: Plan, flow: Flow, omega: float, t: float, duration: float, rate: Real) -> int:
+    """Carry flow.z over ``duration`` from time t, recording segments; ``rate`` is z' at the end."""
+    capacity = flow.start.shape[0]
+    set_contact_state(plan, flow.z, flow.state)
+    end = t + duration
+    fired = -1
+    for e in range(capacity):
+        slot = plan.slot[configuration(flow.state)]
+        flow.segments[0] = e + 1
+        if slot < 0:
+            return status.MISSING_CONFIGURATION
+        prepare_drive(plan, flow, slot, omega)
+        begin_segment(plan, flow, e, slot, omega, t)
+        length, spring, new = next_change(
+            flow.motion, flow.contact, flow.state, plan.count[slot] + 1, end - t, fired
+        )
+        if math.isnan(length):
+            return status.NOT_FINITE
+        flow.length[e] = length
+        flow.spring[e] = spring
+        flow.kick[e] = 0.0
+        segment_state(plan, flow, e, omega, length, flow.z, rate)
+        if spring < 0:
+            return status.OK
+        flow.kick[e] = kick_sign(flow.state[spring], new)
+        flow.state[spring] = new
+        fired = spring
+        t += length
+    return status.TOO_MANY_EVENTS
+
+
+@kernel
+def carry_tangent(
+    plan: Plan, flow: Flow, omega: float, until: float, U: Real, work: Complex
+) -> None:
+    """Carry columns of U, (2 N, 2 N) or (2 N, 2 N + 1), over the recorded contacts up to ``until``.
+
+    The first 2 N columns are the tangent of the state. One more is dz/d omega at fixed time: it
+    follows the same linear equation around the derivative of the driven motion,
+    Re((drive' + i t drive) exp(i omega t)). ``work`` is (R, columns).
+    """
+    size = U.shape[0]
+    driven = U.shape[1] > size
+    for e in range(flow.segments[0]):
+        slot = flow.slot[e]
+        length = min(flow.length[e], until - flow.start[e])
+        if length < 0.0:
+            break
+        if driven:
+            _add_driven_slope(flow, slot, omega, flow.start[e], -1.0, U)
+        _carry_free(plan, slot, length, U, work)
+        if driven:
+            _add_driven_slope(flow, slot, omega, flow.start[e] + length, 1.0, U)
+        if flow.kick[e] != 0.0 and length == flow.length[e]:
+            saltation(plan, flow.spring[e], flow.kick[e], U, size)
+
+
+@kernel
+def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, sign: float, U: Real) -> None:
+    turn = exponential(1j * omega * t)
+    last = U.shape[1] - 1
+    for k in range(U.shape[0]):
+        slope = (flow.drive_slope[slot, k] + 1j * t * flow.drive[slot, k]) * turn
+        U[k, last] += sign * slope.real
+
+
+@kernel
+def _carry_free(plan: Plan, slot: int, length: float, U: Real, work: Complex) -> None:
+    """U = exp(A length) U by the modes of the configuration."""
+    size, columns = U.shape
+    count = plan.count[slot]
+    for i in range(count):
+        factor = plan.weight[slot, i] * exponential(plan.rate[slot, i] * length)
+        for c in range(columns):
+            q = 0j
+            for k in range(size):
+                q += plan.left[slot, i, k] * U[k, c]
+            work[i, c] = factor * q
+    for k in range(size):
+        for c in range(columns):
+            total = 0.0
+            for i in range(count):
+                v = plan.right[slot, k, i]
+                total += v.real * work[i, c].real - v.imag * work[i, c].imag
+            U[k, c] = total
+
+
+@kernel
+def saltation(plan: Plan, spring: int, sign: float, U: Real, size: int) -> None:
+    """U = S U with S = I + sign (0, M^-1 d c) (d, 0)^T.
+
+    In general S = I + (f+ - f-) n^T / (n^T f-), n normal to the gap surface. Here f+ - f- is
+    proportional to the gap velocity n^T f-, which therefore cancels: S is constant, and exact at
+    grazing too.
+    """
+    n = size // 2
+    for c in range(U.shape[1]):
+        gap = 0.0
+        for k in range(n):
+            gap += plan.direction[spring, k] * U[k, c]
+        for k in range(n):
+            U[n + k, c] += sign * plan.kick[spring, k] * gap

@@ -1,0 +1,255 @@
+"""What is read off periodic motions, point by point along a branch: the only loops over points."""
+
+from __future__ import annotations
+
+import math
+
+from flipflow.kernels import status
+from flipflow.kernels.balance import Balance, contact_forces, contact_integrals, prepare_receptance
+from flipflow.kernels.balance import record_contacts, set_series
+from flipflow.kernels.compile import kernel
+from flipflow.kernels.dense import lu_factor, lu_solve
+from flipflow.kernels.flow import carry_tangent, run_flow, segment_state
+from flipflow.kernels.gapmotion import GapMotion, exponential, extremes
+from flipflow.kernels.plan import Complex, Int, Real
+from flipflow.kernels.shooting import Shooting, shooting_residual
+
+
+@kernel(entry=True)
+def observe_flow(
+    problem: Shooting,
+    states: Real,
+    omega: Real,
+    coordinate: Real,
+    motion: GapMotion,
+    low: Real,
+    high: Real,
+    first: Complex,
+    code: Int,
+) -> None:
+    """Extremes and first harmonic of coordinates (G, N) over the turns from each state (P, 2 N).
+
+    ``motion`` is scratch for G coordinates; low, high, first are (P, G), code (P,).
+    """
+    plan, flow = problem.plan, problem.flow
+    for p in range(omega.shape[0]):
+        for k in range(flow.z.shape[0]):
+            flow.z[k] = states[p, k]
+        turn = problem.fraction * 2.0 * math.pi / omega[p]
+        code[p] = run_flow(plan, flow, omega[p], 0.0, turn, problem.rate)
+        if code[p] != status.OK:
+            continue
+        for g in range(coordinate.shape[0]):
+            low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
+        for e in range(flow.segments[0]):
+            _coordinate_segment(problem, e, omega[p], coordinate, motion)
+            count = plan.count[flow.slot[e]] + 1
+            for g in range(coordinate.shape[0]):
+                smallest, largest = extremes(motion, count, g, flow.length[e])
+                low[p, g] = min(low[p, g], smallest)
+                high[p, g] = max(high[p, g], largest)
+                share = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega[p])
+                first[p, g] += 2.0 * share / turn
+
+
+@kernel
+def _coordinate_segment(
+    problem: Shooting, e: int, omega: float, coordinate: Real, motion: GapMotion
+) -> None:
+    """Segment e as sums of exponentials in the given coordinates, the drive as the last term."""
+    plan, flow = problem.plan, problem.flow
+    slot = flow.slot[e]
+    count = plan.count[slot]
+    n = coordinate.shape[1]
+    turn = exponential(1j * omega * flow.start[e])
+    motion.rate[count] = 1j * omega
+    for i in range(count):
+        motion.rate[i] = plan.rate[slot, i]
+    for g in range(coordinate.shape[0]):
+        motion.offset[g] = 0.0
+        driven = 0j
+        for k in range(n):
+            motion.offset[g] += coordinate[g, k] * plan.rest[slot, k]
+            driven += coordinate[g, k] * flow.drive[slot, k]
+        motion.amplitude[g, count] = driven * turn
+        for i in range(count):
+            shape = 0j
+            for k in range(n):
+                shape += coordinate[g, k] * plan.right[slot, k, i]
+            motion.amplitude[g, i] = plan.weight[slot, i] * shape * flow.modes[e, i]
+
+
+@kernel
+def first_harmonic(
+    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
+) -> complex:
+    """int y exp(-i omega t) dt over one segment, in closed form."""
+    turn = exponential(-1j * omega * start)
+    total = motion.offset[g] * _mean_of_exponential(-1j * omega, length)
+    for i in range(count):
+        amplitude = motion.amplitude[g, i]
+        total += 0.5 * amplitude * _mean_of_exponential(motion.rate[i] - 1j * omega, length)
+        conjugate = motion.rate[i].conjugate() - 1j * omega
+        total += 0.5 * amplitude.conjugate() * _mean_of_exponential(conjugate, length)
+    return total * turn
+
+
+@kernel
+def _mean_of_exponential(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt."""
+    if abs(rate) * length < 1e-9:
+        return length * (1.0 + 0.5 * rate * length)
+    return (exponential(rate * length) - 1.0) / rate
+
+
+@kernel(entry=True)
+def observe_series(motion: GapMotion, offset: Real, amplitude: Complex, low: Real, high: Real) -> None:
+    """Extremes over a turn of series with means (P, G) and amplitudes (P, G, n_h)."""
+    count = motion.rate.shape[0]
+    for p in range(offset.shape[0]):
+        for g in range(offset.shape[1]):
+            motion.offset[0] = offset[p, g]
+            for i in range(count):
+                motion.amplitude[0, i] = amplitude[p, g, i]
+            low[p, g], high[p, g] = extremes(motion, count, 0, 2.0 * math.pi)
+
+
+@kernel(entry=True)
+def describe_balance(
+    problem: Balance,
+    until: float,
+    u: Real,
+    omega: Real,
+    tangent: Real,
+    work: Complex,
+    series: Complex,
+    monodromy: Real,
+    code: Int,
+) -> None:
+    """Displacement harmonics (P, n_h, N) and tangent over ``until`` turns (P, 2 N, 2 N) of points.
+
+    The contacts of the series split the turn; within each piece the tangent is closed form.
+    """
+    plan = problem.plan
+    size = tangent.shape[0]
+    for p in range(omega.shape[0]):
+        set_series(problem, u[p])
+        prepare_receptance(problem, omega[p])
+        code[p] = record_contacts(problem, omega[p])
+        if code[p] != status.OK:
+            continue
+        contact_integrals(problem, omega[p])
+        contact_forces(problem, omega[p])
+        _displacements(problem, omega[p], series[p])
+        for k in range(size):
+            for c in range(size):
+                tangent[k, c] = 1.0 if k == c else 0.0
+        duration = until * 2.0 * math.pi / omega[p]
+        carry_tangent(plan, problem.flow, omega[p], duration, tangent, work)
+        for k in range(size):
+            for c in range(size):
+                monodromy[p, k, c] = tangent[k, c]
+
+
+@kernel
+def _displacements(problem: Balance, omega: float, series: Complex) -> None:
+    """X_h = delta_h1 X_linear - (K - h^2 omega^2 M + i h omega C)^-1 D^T Lambda_h by modes."""
+    plan = problem.plan
+    n = series.shape[1]
+    for a in range(problem.harmonics.shape[0]):
+        h = problem.harmonics[a]
+        for k in range(n):
+            series[a, k] = problem.flow.drive[0, k] if h == 1 else 0.0
+        for i in range(plan.count[0]):
+            push = 0j
+            push_conj = 0j
+            for j in range(problem.linear.shape[0]):
+                push += plan.gap_pick[i, j] * problem.force[a, j]
+                push_conj += plan.gap_pick[i, j].conjugate() * problem.force[a, j]
+            push /= 1j * h * omega - plan.rate[0, i]
+            push_conj /= 1j * h * omega - plan.rate[0, i].conjugate()
+            for k in range(n):
+                series[a, k] -= plan.right[0, k, i] * push
+                if plan.weight[0, i] == 2.0:
+                    series[a, k] -= plan.right[0, k, i].conjugate() * push_conj
+
+
+@kernel(entry=True)
+def orbit_error(
+    problem: Shooting,
+    states: Real,
+    omega: Real,
+    harmonics: Int,
+    series: Complex,
+    J: Real,
+    A: Real,
+    pivot: Int,
+    delta: Real,
+    error: Real,
+    code: Int,
+) -> None:
+    """Distance in m of each motion from the exact one, by one Newton step of the exact flow.
+
+    delta = (I - M)^-1 (flow(z) - z) corrects the state; the distance is the largest difference of
+    any displacement between the corrected exact flow and the series (P, n_h, N), or, without
+    harmonics, the flow from the uncorrected state. Infinite when a second step does not shrink.
+    """
+    plan, flow = problem.plan, problem.flow
+    size = flow.z.shape[0]
+    for p in range(omega.shape[0]):
+        z = states[p]
+        before = math.inf
+        error[p] = math.inf
+        for step in range(2):
+            code[p] = shooting_residual(problem, z, omega[p], delta, J)
+            length = 0.0
+            if code[p] == status.OK:
+                length = _newton_step(J, A, pivot, delta, omega[p])
+            if code[p] != status.OK or not length <= 0.5 * before:
+                break
+            if step == 0:
+                for k in range(size):
+                    z[k] += delta[k]
+                before = max(length, 1e-14)
+                continue
+            error[p] = _distance(problem, omega[p], harmonics, series[p], length)
+
+
+@kernel
+def _newton_step(J: Real, A: Real, pivot: Int, delta: Real, omega: float) -> float:
+    """delta = -J^-1 delta; returns its largest displacement, infinite when J is singular."""
+    size = A.shape[0]
+    for i in range(size):
+        delta[i] = -delta[i]
+        for j in range(size):
+            A[i, j] = J[i, j]
+    if not lu_factor(A, pivot):
+        return math.inf
+    lu_solve(A, pivot, delta)
+    length = 0.0
+    for k in range(size // 2):
+        length = max(length, abs(delta[k]), abs(delta[size // 2 + k]) / omega)
+    return length
+
+
+@kernel
+def _distance(
+    problem: Shooting, omega: float, harmonics: Int, series: Complex, rest: float
+) -> float:
+    """Largest |x_flow - x_series| over samples of the recorded flow, plus the last correction."""
+    plan, flow = problem.plan, problem.flow
+    n = flow.z.shape[0] // 2
+    turn = problem.fraction * 2.0 * math.pi / omega
+    largest = 0.0
+    for e in range(flow.segments[0]):
+        samples = 2 + int(128.0 * flow.length[e] / turn)
+        for s in range(samples):
+            elapsed = flow.length[e] * s / samples
+            segment_state(plan, flow, e, omega, elapsed, flow.z, problem.rate)
+            for k in range(n):
+                value = flow.z[k]
+                for a in range(harmonics.shape[0]):
+                    angle = 1j * (harmonics[a] * omega * (flow.start[e] + elapsed))
+                    value -= (series[a, k] * exponential(angle)).real
+                largest = max(largest, abs(value))
+    return largest + rest

@@ -1,0 +1,69 @@
+"""What every problem offers to the arc-length loop: residual, signature, scale.
+
+Dispatch is by problem type at compile time. A compiled function handed over as an argument would
+be compiled anew in every process.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.types import NamedTuple as NamedTupleType
+from numba.extending import overload
+
+from flipflow.kernels.balance import Balance, balance_residual, contact_count, series_scale
+from flipflow.kernels.plan import Real
+from flipflow.kernels.shooting import Shooting, crossings, shooting_residual, state_scale
+
+_RESIDUAL: dict[type, Any] = {Shooting: shooting_residual, Balance: balance_residual}
+_SIGNATURE: dict[type, Any] = {Shooting: crossings, Balance: contact_count}
+_SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale}
+
+
+def residual(problem: Any, u: Real, omega: float, r: Real, J: Real) -> int:
+    """Write the residual r(u, omega) and J = [dr/du, dr/d omega]; return a status."""
+    raise NotImplementedError
+
+
+def signature(problem: Any) -> int:
+    """A number that changes when the contacts of the last residual's motion change."""
+    raise NotImplementedError
+
+
+def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
+    """Write the size of each unknown."""
+    raise NotImplementedError
+
+
+def _kind(problem: Any) -> Any:
+    return problem.instance_class if isinstance(problem, NamedTupleType) else None
+
+
+@overload(residual, inline="always")
+def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
+    chosen = _RESIDUAL[_kind(problem)]
+
+    def run(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
+        return chosen(problem, u, omega, r, J)
+
+    return run
+
+
+@overload(signature, inline="always")
+def _signature(problem: Any) -> Any:
+    chosen = _SIGNATURE[_kind(problem)]
+
+    def run(problem: Any) -> Any:
+        return chosen(problem)
+
+    return run
+
+
+@overload(unknown_scale, inline="always")
+def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
+    chosen = _SCALE[_kind(problem)]
+
+    def run(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
+        return chosen(problem, u, omega, scale)
+
+    return run

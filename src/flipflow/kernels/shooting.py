@@ -1,0 +1,138 @@
+"""Periodic motion as a zero of the flow: z = sign * flow(z) over a fraction of the forcing period.
+
+``fraction`` 1 and ``sign`` +1 is one forcing period, ``fraction`` n is n of them; a motion that is
+its own mirror image after half a turn has ``fraction`` 1/2 and ``sign`` -1.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flipflow.kernels import status
+from flipflow.kernels.compile import kernel
+from flipflow.kernels.dense import lu_factor, lu_solve
+from flipflow.kernels.flow import Flow, carry_tangent, run_flow
+from flipflow.kernels.plan import Complex, Int, Plan, Real
+
+
+class Shooting(NamedTuple):
+    """The problem: a plan, the scratch of its flow, and the part of a turn to shoot over."""
+
+    plan: Plan
+    flow: Flow
+    tangent: Real  # (2 N, 2 N + 1)
+    work: Complex  # (R, 2 N + 1)
+    rate: Real  # (2 N,)
+    fraction: float
+    sign: float
+    length: float  # length in m below which displacements count as small
+
+
+@kernel
+def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real) -> int:
+    """r = sign flow(z) - z and J = [dr/dz, dr/d omega], shapes (2 N,) and (2 N, 2 N + 1)."""
+    flow = problem.flow
+    size = r.shape[0]
+    duration = problem.fraction * 2.0 * math.pi / omega
+    for k in range(size):
+        flow.z[k] = z[k]
+    code = run_flow(problem.plan, flow, omega, 0.0, duration, problem.rate)
+    if code != status.OK:
+        return code
+    U = problem.tangent
+    for k in range(size):
+        for c in range(size + 1):
+            U[k, c] = 1.0 if k == c else 0.0
+    carry_tangent(problem.plan, flow, omega, math.inf, U, problem.work)
+    for k in range(size):
+        r[k] = problem.sign * flow.z[k] - z[k]
+        for c in range(size):
+            J[k, c] = problem.sign * U[k, c]
+        J[k, k] -= 1.0
+        # The last column is taken at fixed time; the end of the flow moves with omega as well.
+        J[k, size] = problem.sign * (U[k, size] - problem.rate[k] * duration / omega)
+    for k in range(size):
+        if not math.isfinite(r[k]):
+            return status.NOT_FINITE
+    return status.OK
+
+
+@kernel(entry=True)
+def record_turn(problem: Shooting, z: Real, omega: float) -> int:
+    """Run the flow from z over the problem's turns; the record stays in problem.flow."""
+    for k in range(problem.rate.shape[0]):
+        problem.flow.z[k] = z[k]
+    duration = problem.fraction * 2.0 * math.pi / omega
+    return run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
+
+
+@kernel(entry=True)
+def settle(problem: Shooting, z: Real, omega: float, turns: int) -> int:
+    """Carry z in place over many whole turns."""
+    duration = problem.fraction * 2.0 * math.pi / omega
+    for k in range(problem.rate.shape[0]):
+        problem.flow.z[k] = z[k]
+    for _ in range(turns):
+        code = run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
+        if code != status.OK:
+            return code
+    for k in range(problem.rate.shape[0]):
+        z[k] = problem.flow.z[k]
+    return status.OK
+
+
+@kernel
+def crossings(problem: Shooting) -> int:
+    """A number that changes when the contacts met in a turn change: crossings, spring by spring."""
+    total = 0
+    for e in range(problem.flow.segments[0] - 1):
+        total += 1 + 1000 * problem.flow.spring[e]
+    return total
+
+
+@kernel
+def state_scale(problem: Shooting, z: Real, omega: float, scale: Real) -> None:
+    """Size of each unknown: the motion's amplitude (m), that times omega for velocities."""
+    n = problem.plan.direction.shape[1]
+    amplitude = problem.length
+    for k in range(n):
+        amplitude = max(amplitude, math.hypot(z[k], z[n + k] / omega))
+    for k in range(n):
+        scale[k] = amplitude
+        scale[n + k] = amplitude * omega
+
+
+@kernel
+def newton_orbit(
+    problem: Shooting, z: Real, omega: float, r: Real, J: Real, A: Real, pivot: Int, most: int
+) -> tuple[int, int]:
+    """Newton on the shooting residual at fixed omega, z in place; status and iterations.
+
+    A step that is longer than the motion itself is cut to its length.
+    """
+    size = z.shape[0]
+    scale = np.empty(size)
+    for iteration in range(most):
+        code = shooting_residual(problem, z, omega, r, J)
+        if code != status.OK:
+            return code, iteration
+        state_scale(problem, z, omega, scale)
+        for i in range(size):
+            for j in range(size):
+                A[i, j] = J[i, j] * scale[j] / scale[i]
+            r[i] = -r[i] / scale[i]
+        if not lu_factor(A, pivot):
+            return status.SINGULAR, iteration
+        lu_solve(A, pivot, r)
+        longest = 0.0
+        for k in range(size):
+            longest = max(longest, abs(r[k]))
+        cut = min(1.0, 1.0 / longest) if longest > 0.0 else 1.0
+        for k in range(size):
+            z[k] += cut * r[k] * scale[k]
+        if longest < 1e-9:
+            return status.OK, iteration + 1
+    return status.NO_CONVERGENCE, most

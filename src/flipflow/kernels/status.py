@@ -1,0 +1,16 @@
+"""What a kernel can report, as integers; the sentences stand in ``results.status``."""
+
+from __future__ import annotations
+
+OK = 0
+MISSING_CONFIGURATION = 1
+TOO_MANY_EVENTS = 2
+NOT_FINITE = 3
+SINGULAR = 4
+NO_CONVERGENCE = 5
+REACHED_UPPER = 6
+REACHED_LOWER = 7
+STEP_TOO_SMALL = 8
+POINT_LIMIT = 9
+CLOSED = 10
+INVALID = 11

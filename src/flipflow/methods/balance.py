@@ -1,0 +1,98 @@
+"""Periodic motions by harmonic balance, exact at the contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.kernels import status
+from flipflow.kernels.gapmotion import GapMotion
+from flipflow.kernels.observe import describe_balance, observe_series
+from flipflow.methods.motion import Motion, Pieces, SeriesMotion
+from flipflow.methods.scratch import new_balance
+from flipflow.methods.solver import Complex, Real, Solver
+from flipflow.model.system import MechanicalSystem
+
+
+class BalanceSolver(Solver):
+    """Unknowns: the Fourier coefficients of the motion at the gaps."""
+
+    def __init__(self, system: MechanicalSystem, harmonics: int, *, half_turn: bool) -> None:
+        self.order = harmonics
+        super().__init__(system, half_turn=half_turn)
+
+    def _prepare(self) -> None:
+        self.problem = new_balance(
+            self.builder.plan, self.order, half_turn=self.half_turn, length=self.length
+        )
+        self.harmonics = self.problem.harmonics
+        kept = int(2 * np.count_nonzero(self.harmonics) + np.count_nonzero(self.harmonics == 0))
+        self.unknowns = kept * len(self.builder.springs)
+        self._new_work()
+
+    def _describe(self, u: Real, omega: Real) -> tuple[Complex, Real]:
+        """Displacement harmonics (P, n_h, N) and return maps (P, 2 N, 2 N)."""
+        n = self.system.size
+        series = np.empty((omega.size, self.harmonics.size, n), np.complex128)
+        maps = np.empty((omega.size, 2 * n, 2 * n))
+        code = np.zeros(omega.size, np.int64)
+        describe_balance(
+            self.problem, 0.5 if self.half_turn else 1.0, np.ascontiguousarray(u), omega,
+            np.empty((2 * n, 2 * n)), np.empty((2 * n, 2 * n), np.complex128), series, maps, code,
+        )  # fmt: skip
+        bad = code != status.OK
+        series[bad], maps[bad] = np.nan, np.nan
+        return series, -maps if self.half_turn else maps
+
+    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
+        return self._describe(u, omega)[1]
+
+    def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
+        return self.harmonics, self._describe(u, omega)[0]
+
+    def states(self, u: Real, omega: Real) -> Real:
+        _, series = self.series(u, omega)
+        rate = 1j * omega[:, None] * self.harmonics
+        position, velocity = series.sum(axis=1), np.einsum("ph,phn->pn", rate, series)
+        return np.concatenate([position.real, velocity.real], axis=1)
+
+    def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
+        _, series = self.series(u, omega)
+        seen = np.einsum("gn,phn->pgh", coordinates, series)
+        moving = self.harmonics > 0
+        rate = 1j * self.harmonics[moving].astype(np.complex128)
+        scratch = GapMotion(
+            np.zeros(1), np.zeros((1, rate.size), np.complex128), rate, rate.copy(),
+            self.problem.motion.spacing,
+        )  # fmt: skip
+        offset = np.ascontiguousarray(seen[:, :, ~moving].real.sum(axis=2))
+        low, high = np.empty(offset.shape), np.empty(offset.shape)
+        observe_series(scratch, offset, np.ascontiguousarray(seen[:, :, moving]), low, high)
+        return low, high, seen[:, :, self.harmonics == 1][:, :, 0]
+
+    def motion(self, u: Real, omega: float) -> Motion:
+        series, _ = self._describe(u[None], np.array([omega]))
+        flow = self.problem.flow
+        e = int(flow.segments[0])
+        empty = np.zeros((e, 0), np.complex128)
+        pieces = Pieces(
+            *(array[:e].copy() for array in (flow.slot, flow.start, flow.length)),
+            empty,
+            flow.states[:e].copy(),
+        )
+        return SeriesMotion(
+            self.system, omega, 2.0 * np.pi / omega, pieces, self.harmonics, series[0]
+        )
+
+    def unknowns_from(self, motion: Motion) -> Real:
+        count = 16 * (self.order + 1)
+        t = motion.period * np.arange(count) / count
+        directions = np.array([spring.direction for spring in self.builder.springs])
+        spectrum = np.fft.rfft(motion.derivative(t, 0) @ directions.T, axis=0) / count
+        parts = []
+        for h in self.harmonics:
+            parts += [spectrum[h].real] if h == 0 else []
+            if h > 0:
+                pairs = 2.0 * np.stack([spectrum[h].real, spectrum[h].imag], axis=1)
+                parts += [pairs.ravel()]
+        return np.concatenate(parts)

@@ -1,0 +1,74 @@
+"""Exact periodic motions: shooting on the closed-form flow."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.errors import IncompleteError
+from flipflow.kernels import status
+from flipflow.kernels.gapmotion import GapMotion
+from flipflow.kernels.observe import observe_flow
+from flipflow.kernels.shooting import record_turn
+from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
+from flipflow.methods.scratch import new_shooting
+from flipflow.methods.solver import Complex, Real, Solver
+
+
+class ExactSolver(Solver):
+    """Unknown: the state (x, x') at t = 0, where the unbalance points along +x."""
+
+    def _prepare(self) -> None:
+        self.unknowns = 2 * self.system.size
+        plan = self.builder.plan
+        self.problem = new_shooting(plan, half_turn=self.half_turn, length=self.length)
+        self.turn = new_shooting(plan, half_turn=False, length=self.length)
+        self._new_work()
+
+    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
+        return np.asarray(jacobian + np.eye(self.unknowns))
+
+    def states(self, u: Real, omega: Real) -> Real:  # noqa: ARG002
+        return u
+
+    def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
+        return np.zeros(0, np.int64), np.zeros((omega.size, 0, u.shape[1] // 2), np.complex128)
+
+    def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
+        count, modes = coordinates.shape[0], self.builder.plan.rate.shape[1] + 1
+        scratch = GapMotion(
+            np.zeros(count), np.zeros((count, modes), np.complex128),
+            np.zeros(modes, np.complex128), np.zeros(modes, np.complex128), np.zeros(1, np.int64),
+        )  # fmt: skip
+        shape = (omega.size, count)
+        low, high, first = np.empty(shape), np.empty(shape), np.empty(shape, np.complex128)
+        code = np.zeros(omega.size, np.int64)
+        observe_flow(
+            self.turn, np.ascontiguousarray(u), omega, coordinates, scratch, low, high, first, code
+        )
+        bad = code != status.OK
+        low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan
+        return low, high, first
+
+    def motion(self, u: Real, omega: float) -> Motion:
+        while True:
+            flow = self.turn.flow
+            code = record_turn(self.turn, u, omega)
+            if code != status.MISSING_CONFIGURATION:
+                break
+            self.problem.flow.state[:] = flow.state
+            self.add_missing_configuration()
+        if code != status.OK:
+            raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
+        e = int(flow.segments[0])
+        pieces = Pieces(
+            *(array[:e].copy() for array in (flow.slot, flow.start, flow.length, flow.modes)),
+            flow.states[:e].copy(),
+        )
+        period = 2.0 * np.pi / omega * self.turn.fraction
+        return PiecewiseMotion(
+            self.system, omega, period, pieces, self.builder.plan, flow.drive.copy()
+        )
+
+    def unknowns_from(self, motion: Motion) -> Real:
+        return np.concatenate([motion.derivative(0.0, 0), motion.derivative(0.0, 1)])

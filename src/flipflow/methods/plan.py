@@ -1,0 +1,175 @@
+"""From a system to the arrays the kernels work on."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from flipflow.errors import InputError
+from flipflow.kernels.plan import Plan
+from flipflow.model.system import MechanicalSystem
+
+MAX_SPRINGS = 12
+PREPARED_AT_ONCE = 27
+NEARLY_DEFECTIVE = 1e8
+NUDGE = 1e-10
+
+
+class PlanBuilder:
+    """Prepares configurations of a system and adds those that a kernel finds missing.
+
+    Parameters
+    ----------
+    system
+        The machine; springs that always act are moved into C and K first.
+
+    Raises
+    ------
+    InputError
+        Without any damping (no steady state is reached), with a singular stiffness (nothing
+        holds the machine), or with more springs than configurations can be counted for.
+    """
+
+    def __init__(self, system: MechanicalSystem) -> None:
+        self.system = system.with_bonded()
+        self.springs = self.system.springs
+        if len(self.springs) > MAX_SPRINGS:
+            raise InputError(
+                "springs", len(self.springs), f"at most {MAX_SPRINGS} springs with a gap"
+            )
+        if not np.any(self.system.C):
+            raise InputError(
+                "damping",
+                0.0,
+                "without any damping a free vibration never dies out and no steady state exists; "
+                "give at least one damping above 0",
+            )
+        if np.linalg.matrix_rank(self.system.K) < self.system.size:
+            raise InputError(
+                "K",
+                "singular",
+                "with all stops open nothing holds the machine in place; give every free motion "
+                "a spring",
+            )
+        self._rows: dict[int, dict[str, NDArray[np.generic]]] = {}
+        everything = 3 ** len(self.springs) <= PREPARED_AT_ONCE
+        self.add(range(3 ** len(self.springs)) if everything else [0])
+
+    def add(self, codes: Iterable[int]) -> None:
+        """Prepare configurations and rebuild :attr:`plan`."""
+        for code in codes:
+            if self._reachable(code):
+                self._rows.setdefault(code, self._configuration(code))
+        self.plan = self._assemble()
+
+    def _digits(self, code: int) -> list[int]:
+        return [code // 3**j % 3 for j in range(len(self.springs))]
+
+    def _reachable(self, code: int) -> bool:
+        return all(
+            digit == 0 or np.isfinite(spring.gaps[digit - 1])
+            for digit, spring in zip(self._digits(code), self.springs, strict=True)
+        )
+
+    def _configuration(self, code: int) -> dict[str, NDArray[np.generic]]:
+        """Modes of one configuration."""
+        system, n = self.system, self.system.size
+        C, K = system.C.copy(), system.K.copy()
+        preload = np.zeros(n)
+        for digit, spring in zip(self._digits(code), self.springs, strict=True):
+            if digit:
+                outer = np.outer(spring.direction, spring.direction)
+                C, K = C + spring.damping * outer, K + spring.stiffness * outer
+                offset = spring.gaps[0] if digit == 1 else -spring.gaps[1]
+                preload += spring.stiffness * offset * spring.direction
+        rate, right = _eigen(system.M, C, K)
+        left = np.linalg.inv(right)
+        keep = rate.imag >= 0.0
+        rate, right, left = rate[keep], right[:, keep], left[keep]
+        push = np.concatenate([np.zeros(n), np.linalg.solve(system.M, system.excitation.vector)])
+        return {
+            "rate": rate,
+            "weight": np.where(rate.imag > 0.0, 2.0, 1.0),
+            "right": right,
+            "left": left,
+            "rest": np.concatenate([np.linalg.solve(K, preload), np.zeros(n)]),
+            "force": left @ push,
+            "force_conj": left.conj() @ push,
+            "gap_shape": self._directions() @ right[:n],
+        }
+
+    def _directions(self) -> NDArray[np.float64]:
+        return np.array([s.direction for s in self.springs]).reshape(-1, self.system.size)
+
+    def _assemble(self) -> Plan:
+        n, m, rows = self.system.size, len(self.springs), self._rows
+        slot = np.full(3**m, -1, dtype=np.int64)
+        for place, code in enumerate(rows):
+            slot[code] = place
+        size, modes = len(rows), 2 * n
+        count = np.array([row["rate"].size for row in rows.values()], dtype=np.int64)
+
+        def table(name: str, shape: tuple[int, ...], axis: int, kind: type) -> NDArray[np.generic]:
+            out = np.zeros((size, *shape), dtype=kind)
+            for place, row in enumerate(rows.values()):
+                index = [slice(None)] * len(shape)
+                index[axis] = slice(row["rate"].size)
+                out[(place, *index)] = row[name]
+            return out
+
+        D = self._directions()
+        spread = np.linalg.solve(self.system.M, D.T)
+        left = next(iter(rows.values()))["left"]
+        gap_pick = np.zeros((modes, m), dtype=np.complex128)
+        gap_pick[: left.shape[0]] = left[:, n:] @ spread
+        damping = np.array([s.damping for s in self.springs], dtype=float)
+        return Plan(
+            slot=slot,
+            count=count,
+            rate=table("rate", (modes,), 0, np.complex128),
+            weight=table("weight", (modes,), 0, np.float64),
+            right=table("right", (modes, modes), 1, np.complex128),
+            left=table("left", (modes, modes), 0, np.complex128),
+            rest=np.array([row["rest"] for row in rows.values()], dtype=float),
+            force=table("force", (modes,), 0, np.complex128),
+            force_conj=table("force_conj", (modes,), 0, np.complex128),
+            gap_shape=table("gap_shape", (m, modes), 1, np.complex128),
+            gap_pick=gap_pick,
+            direction=D,
+            kick=np.ascontiguousarray((damping[:, None] * spread.T).reshape(m, n)),
+            stiffness=np.array([s.stiffness for s in self.springs], dtype=float),
+            damping=damping,
+            gap_plus=np.array([s.gaps[0] for s in self.springs], dtype=float),
+            gap_minus=np.array([s.gaps[1] for s in self.springs], dtype=float),
+            clipped=np.array([s.law != "paper" for s in self.springs], dtype=np.int64),
+            power=self.system.excitation.power,
+        )
+
+
+def _eigen(
+    M: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64]
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Eigenvalues and right vectors of the state matrix; conjugate pairs exactly conjugate."""
+    n = M.shape[0]
+    for nudge in itertools.count():
+        A = np.block(
+            [
+                [np.zeros((n, n)), np.eye(n)],
+                [-np.linalg.solve(M, K), -np.linalg.solve(M, C) * (1.0 + nudge * NUDGE)],
+            ]
+        )
+        rate, right = scipy.linalg.eig(A)
+        # Exactly critical damping has no full set of eigenvectors; a damping changed in its
+        # tenth digit has one, and costs less than the digits a defective basis would.
+        if np.linalg.cond(right / _scale(right)) < NEARLY_DEFECTIVE or nudge == 3:
+            return rate, right
+    raise AssertionError
+
+
+def _scale(right: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Row scale that brings displacements and velocities to one size."""
+    return np.maximum(np.abs(right).max(axis=1, keepdims=True), np.finfo(float).tiny)

@@ -1,0 +1,134 @@
+"""Scratch and record arrays for the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flipflow.kernels.arclength import Branch, Corrector
+from flipflow.kernels.balance import Balance
+from flipflow.kernels.flow import Flow
+from flipflow.kernels.gapmotion import Contact, GapMotion
+from flipflow.kernels.plan import Plan
+from flipflow.kernels.shooting import Shooting
+
+MOST_SEGMENTS = 600
+
+
+def contact_of(plan: Plan) -> Contact:
+    """The contact law of a plan's springs."""
+    return Contact(plan.gap_plus, plan.gap_minus, plan.stiffness, plan.damping, plan.clipped)
+
+
+def new_flow(plan: Plan) -> Flow:
+    """Scratch for one lane of exact flow."""
+    configurations, modes = plan.rate.shape
+    m, n = plan.direction.shape
+    e = MOST_SEGMENTS
+    motion = GapMotion(
+        offset=np.zeros(m),
+        amplitude=np.zeros((m, modes + 1), np.complex128),
+        rate=np.zeros(modes + 1, np.complex128),
+        factor=np.zeros(modes + 1, np.complex128),
+        spacing=np.zeros(1, np.int64),
+    )
+    return Flow(
+        drive=np.zeros((configurations, 2 * n), np.complex128),
+        drive_slope=np.zeros((configurations, 2 * n), np.complex128),
+        driven_at=np.full(configurations, np.nan),
+        motion=motion,
+        contact=contact_of(plan),
+        state=np.zeros(m, np.int64),
+        z=np.zeros(2 * n),
+        segments=np.zeros(1, np.int64),
+        slot=np.zeros(e, np.int64),
+        start=np.zeros(e),
+        length=np.zeros(e),
+        modes=np.zeros((e, modes), np.complex128),
+        spring=np.zeros(e, np.int64),
+        kick=np.zeros(e),
+        states=np.zeros((e, m), np.int64),
+    )
+
+
+def new_shooting(plan: Plan, *, half_turn: bool, length: float, turns: int = 1) -> Shooting:
+    """The shooting problem over half a turn (mirror-symmetric motion) or over whole turns."""
+    size = 2 * plan.direction.shape[1]
+    return Shooting(
+        plan=plan,
+        flow=new_flow(plan),
+        tangent=np.zeros((size, size + 1)),
+        work=np.zeros((plan.rate.shape[1], size + 1), np.complex128),
+        rate=np.zeros(size),
+        fraction=0.5 if half_turn else float(turns),
+        sign=-1.0 if half_turn else 1.0,
+        length=length,
+    )
+
+
+def new_corrector(unknowns: int) -> Corrector:
+    """Scratch of the bordered Newton solves."""
+    n = unknowns
+    return Corrector(
+        w=np.zeros(n + 1),
+        guess=np.zeros(n + 1),
+        border=np.zeros(n + 1),
+        before=np.zeros(n + 1),
+        tangent=np.zeros(n + 1),
+        scale=np.ones(n + 1),
+        r=np.zeros(n),
+        J=np.zeros((n, n + 1)),
+        A=np.zeros((n + 1, n + 1)),
+        b=np.zeros(n + 1),
+        pivot=np.zeros(n + 1, np.int64),
+    )
+
+
+def new_branch(unknowns: int, points: int) -> Branch:
+    """Record of a branch of up to ``points`` points."""
+    n = unknowns
+    return Branch(
+        u=np.zeros((points, n)),
+        omega=np.zeros(points),
+        tangent=np.zeros((points, n + 1)),
+        jacobian=np.zeros((points, n, n)),
+        signature=np.zeros(points, np.int64),
+        iterations=np.zeros(points, np.int64),
+        rejected=np.zeros(points, np.int64),
+        reason=np.zeros(points, np.int64),
+    )
+
+
+def new_balance(plan: Plan, harmonics: int, *, half_turn: bool, length: float) -> Balance:
+    """The harmonic-balance problem; a mirror-symmetric motion has odd harmonics only."""
+    kept = np.arange(1, harmonics + 1, 2) if half_turn else np.arange(harmonics + 1)
+    m, most = plan.direction.shape[0], 2 * harmonics + 1
+    rates = 1j * kept[kept > 0].astype(np.complex128)
+
+    def series() -> GapMotion:
+        return GapMotion(
+            offset=np.zeros(m),
+            amplitude=np.zeros((m, rates.size), np.complex128),
+            rate=rates.copy(),
+            factor=np.zeros(rates.size, np.complex128),
+            spacing=np.array([2 if half_turn else 1]),
+        )
+
+    flow = new_flow(plan)
+    contact = flow.contact._replace(damping=np.zeros(m))
+    return Balance(
+        plan=plan,
+        flow=flow._replace(motion=series(), contact=contact),
+        motion=series(),
+        harmonics=kept.astype(np.int64),
+        receptance=np.zeros((kept.size, m, m), np.complex128),
+        receptance_slope=np.zeros((kept.size, m, m), np.complex128),
+        linear=np.zeros(m, np.complex128),
+        linear_slope=np.zeros(m, np.complex128),
+        integral=np.zeros((m, most), np.complex128),
+        integral_gap=np.zeros((m, most), np.complex128),
+        edge=np.zeros((m, 2 * most - 1), np.complex128),
+        edge_depth=np.zeros((m, most), np.complex128),
+        force=np.zeros((kept.size, m), np.complex128),
+        force_slope=np.zeros((kept.size, m), np.complex128),
+        length=length,
+    )

@@ -1,0 +1,196 @@
+"""What the two solvers of periodic motions share: the branch trace and what is read off points."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.errors import IncompleteError
+from flipflow.kernels import arclength, status
+from flipflow.kernels.flow import Flow
+from flipflow.kernels.observe import orbit_error
+from flipflow.methods.motion import Motion
+from flipflow.methods.plan import PlanBuilder
+from flipflow.methods.scratch import new_branch, new_corrector, new_shooting
+from flipflow.model.system import MechanicalSystem
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+STEP_SHARE = 0.1
+POINTS_MOST = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Traced:
+    """Points of a branch as the arc-length loop left them; arrays over the points first."""
+
+    u: Real
+    omega: Real
+    tangent: Real
+    jacobian: Real
+    iterations: NDArray[np.int64]
+    rejected: NDArray[np.int64]
+    reason: NDArray[np.int64]
+    code: int
+    course: arclength.Course
+    record: arclength.Branch
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One corrected point of a branch: unknowns, tangent's share in omega, return map."""
+
+    u: Real
+    omega: float
+    omega_tangent: float
+    return_map: Real
+
+
+class Solver(ABC):
+    """Finds periodic motions of one system at its forcing period.
+
+    Parameters
+    ----------
+    system
+        The machine.
+    half_turn
+        Look for motions that are their own mirror image after half a turn. Every solution then
+        has the return map of half a turn, with sign: its eigenvalue +1 is a fold, -1 the loss of
+        symmetry, and the multipliers of the full turn are its eigenvalues squared.
+    """
+
+    unknowns: int
+    problem: Any
+
+    def __init__(self, system: MechanicalSystem, *, half_turn: bool) -> None:
+        self.builder = PlanBuilder(system)
+        self.system = self.builder.system
+        self.half_turn = half_turn
+        self.length = characteristic_length(self.builder)
+        self._prepare()
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Build the problem and its scratch for the present plan."""
+
+    @abstractmethod
+    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:
+        """Return maps (P, 2 N, 2 N) over half a turn (with sign) or a whole one."""
+
+    @abstractmethod
+    def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
+        """Least and greatest value and first harmonic (P, G) of coordinates (G, N)."""
+
+    @abstractmethod
+    def states(self, u: Real, omega: Real) -> Real:
+        """State (x, x') at t = 0, shape (P, 2 N)."""
+
+    @abstractmethod
+    def motion(self, u: Real, omega: float) -> Motion:
+        """The motion over one turn."""
+
+    @abstractmethod
+    def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
+        """Harmonics (n_h,) and displacement amplitudes (P, n_h, N); empty for an exact motion."""
+
+    @abstractmethod
+    def unknowns_from(self, motion: Motion) -> Real:
+        """Unknowns of a known motion, as a guess."""
+
+    @property
+    def flow(self) -> Flow:
+        """Scratch whose contact state tells which configuration a kernel found missing."""
+        return self.problem.flow  # type: ignore[no-any-return]
+
+    def add_missing_configuration(self) -> None:
+        """Prepare the configuration a kernel stopped at, and the problem anew."""
+        digits = np.select([self.flow.state == 1, self.flow.state == -1], [1, 2], 0)
+        self.builder.add([int(digits @ 3 ** np.arange(digits.size))])
+        self._prepare()
+
+    def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
+        """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
+        while True:
+            record = new_branch(self.unknowns, POINTS_MOST)
+            code, points = arclength.trace(self.problem, self.work, record, u, omega, course)
+            if code != status.MISSING_CONFIGURATION:
+                break
+            self.add_missing_configuration()
+        return Traced(
+            *(array[:points] for array in (record.u, record.omega, record.tangent)),
+            record.jacobian[:points],
+            record.iterations[:points],
+            record.rejected[: points + 1],
+            record.reason[: points + 1],
+            code,
+            course,
+            record,
+        )
+
+    def between(self, traced: Traced, p: int, share: float) -> Point:
+        """The branch's point at ``share`` of the way from point p to point p + 1."""
+        code = arclength.correct_between(
+            self.problem, self.work, traced.record, p, share, traced.course
+        )
+        if code != status.OK:
+            omega = traced.omega[p]
+            raise IncompleteError(f"no point found between two of the branch near {omega:.6g} rad/s")
+        u, omega = self.work.w[:-1].copy(), float(self.work.w[-1])
+        maps = self.return_maps(u[None], np.array([omega]), self.work.J[None, :, :-1])
+        return Point(u, omega, float(self.work.tangent[-1]), maps[0])
+
+    def solve(self, u: Real, omega: float) -> Point | None:
+        """Newton at fixed omega from the guess u; None where it does not converge."""
+        course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0)
+        record = new_branch(self.unknowns, 1)
+        while True:
+            code, points = arclength.trace(self.problem, self.work, record, u, omega, course)
+            if code != status.MISSING_CONFIGURATION:
+                break
+            self.add_missing_configuration()
+        if points == 0:
+            return None
+        maps = self.return_maps(record.u, record.omega, record.jacobian)
+        return Point(record.u[0], omega, float(record.tangent[0, -1]), maps[0])
+
+    def errors(self, u: Real, omega: Real) -> Real:
+        """Distance in m of each motion from the exact one; infinite where it is not bounded.
+
+        One Newton step of the exact flow corrects the state by delta = (I - M)^-1 (flow(z) - z);
+        the largest difference of any displacement over the turn between the corrected flow and
+        the motion is the estimate. Where a second step does not shrink, as close to a fold,
+        nothing is promised.
+        """
+        states = self.states(u, omega).copy()
+        harmonics, series = self.series(u, omega)
+        size = states.shape[1]
+        while True:
+            problem = new_shooting(self.builder.plan, half_turn=False, length=self.length)
+            error, code = np.empty(omega.size), np.zeros(omega.size, np.int64)
+            scratch = np.empty((size, size + 1)), np.empty((size, size)), np.zeros(size, np.int64)
+            orbit_error(
+                problem, states.copy(), omega, harmonics, series, *scratch, np.empty(size), error, code
+            )
+            if not np.any(code == status.MISSING_CONFIGURATION):
+                return error
+            self.builder.add([code for code in range(self.builder.plan.slot.size)])
+            self._prepare()
+
+    def _new_work(self) -> None:
+        self.work = new_corrector(self.unknowns)
+
+
+def characteristic_length(builder: PlanBuilder) -> float:
+    """The smallest gap in m that is not zero, else the stroke that the force alone would give."""
+    gaps = [gap for spring in builder.springs for gap in spring.gaps if 0.0 < gap < np.inf]
+    if gaps:
+        return float(min(gaps))
+    system = builder.system
+    push = np.abs(np.linalg.solve(system.M, system.excitation.vector)).max()
+    if system.excitation.power == 0:
+        push = np.abs(np.linalg.solve(system.K, system.excitation.vector)).max()
+    return float(push) or 1.0

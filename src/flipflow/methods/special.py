@@ -1,0 +1,180 @@
+"""Special points of a finished branch: found from the signs of test functions, then refined.
+
+Every test function is a smooth number along the branch: the tangent's share in omega (fold),
+det(I + map) (loss of symmetry or period doubling), prod (1 - lambda_i lambda_j) (Neimark-Sacker),
+and the depth of each contact. A zero is refined on corrected points of the branch, never
+interpolated. Two zeros within one step leave a dip without a change of sign: every dip is followed
+to its bottom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from flipflow.errors import IncompleteError
+from flipflow.methods.solver import Point, Real, Solver, Traced
+from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker
+
+SHARE_TOLERANCE = 1e-13
+DIP = 0.5
+
+FOLD = "fold"
+CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
+SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Neimark-Sacker"
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A refined special point: after branch point ``index``, at ``share`` of the step."""
+
+    kind: str
+    index: int
+    share: float
+    point: Point
+    spring: int = -1
+    side: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """One test function: its values at the branch points and anywhere between."""
+
+    kind: str
+    values: Real
+    evaluate: Callable[[Point], float]
+    spring: int = -1
+    side: int = 0
+
+
+def find_special_points(
+    solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
+) -> tuple[list[Found], list[str]]:
+    """All special points in branch order, and a sentence for each that could not be refined."""
+    found: list[Found] = []
+    notes: list[str] = []
+    for test in [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]:
+        for p, low, high in _brackets(solver, traced, test, notes):
+            try:
+                found.append(_refine(solver, traced, test, p, low, high))
+            except IncompleteError as error:
+                notes.append(f"{test.kind}: {error}")
+    kept = [one for one in found if _is_real(one)]
+    return sorted(kept, key=lambda one: (one.index, one.share)), notes
+
+
+def _map_tests(
+    solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
+) -> list[_Test]:
+    fold = traced.tangent[:, -1] / traced.course.omega_step
+    kind = SYMMETRY if solver.half_turn else DOUBLING
+    return [
+        _Test(FOLD, fold, lambda point: point.omega_tangent),
+        _Test(kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))),
+        _Test(
+            NEIMARK_SACKER,
+            neimark_sacker(eigenvalues),
+            lambda point: float(neimark_sacker(np.linalg.eigvals(point.return_map))),
+        ),
+    ]
+
+
+def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
+    """Greatest depth beyond each gap over the turn; one side serves for a symmetric motion."""
+    springs = solver.builder.springs
+    if not springs:
+        return []
+    directions = np.array([spring.direction for spring in springs])
+    low, high, _ = solver.extremes(traced.u, traced.omega, directions)
+    tests = []
+    for j, spring in enumerate(springs):
+        for side, gap in zip((1, -1), spring.gaps, strict=True):
+            if np.isinf(gap) or (side < 0 and solver.half_turn):
+                continue
+            depth = (high[:, j] if side > 0 else -low[:, j]) - gap
+
+            def evaluate(point: Point, j: int = j, side: int = side, gap: float = gap) -> float:
+                least, most, _ = solver.extremes(
+                    point.u[None], np.array([point.omega]), directions[j : j + 1]
+                )
+                return float((most[0, 0] if side > 0 else -least[0, 0]) - gap)
+
+            tests.append(_Test(CONTACT_BEGIN, depth, evaluate, j, side))
+    return tests
+
+
+def _brackets(
+    solver: Solver, traced: Traced, test: _Test, notes: list[str]
+) -> list[tuple[int, float, float]]:
+    """Steps (p, low share, high share) within which the test changes sign."""
+    values = test.values
+    sign = np.sign(values)
+    brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
+    for p in _dips(values):
+        for start in (p - 1, p):
+            try:
+                bottom = _bottom(solver, traced, test, start, float(sign[p]))
+            except IncompleteError as error:
+                notes.append(f"{test.kind}: {error}")
+                continue
+            if bottom is not None:
+                brackets += [(start, 0.0, bottom), (start, bottom, 1.0)]
+                break
+    return brackets
+
+
+def _dips(values: Real) -> list[int]:
+    """Interior points where |test| is least and a parabola says that it may fall to nothing."""
+    inner = np.abs(values[1:-1])
+    before, after = np.abs(values[:-2]), np.abs(values[2:])
+    same = (np.sign(values[:-2]) == np.sign(values[1:-1])) & (
+        np.sign(values[2:]) == np.sign(values[1:-1])
+    )
+    least = same & (inner <= before) & (inner < after)
+    curvature = before - 2.0 * inner + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bottom = inner - (after - before) ** 2 / (8.0 * curvature)
+    deep = (bottom < DIP * inner) | (inner < 1e-3 * np.abs(values).max(initial=0.0))
+    return [int(p) + 1 for p in np.flatnonzero(least & deep)]
+
+
+def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) -> float | None:
+    """Share in step p where the test has the other sign, None when it never has."""
+
+    def height(share: float) -> float:
+        return sign * test.evaluate(solver.between(traced, p, share))
+
+    best = minimize_scalar(height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": 25})
+    return float(best.x) if best.fun < 0.0 else None
+
+
+def _refine(
+    solver: Solver, traced: Traced, test: _Test, p: int, low: float, high: float
+) -> Found:
+    """Root of the test on corrected points between two shares of step p."""
+    last: dict[float, Point] = {}
+
+    def value(share: float) -> float:
+        if share in (0.0, 1.0):
+            return float(test.values[p + int(share)])
+        last[share] = solver.between(traced, p, share)
+        return test.evaluate(last[share])
+
+    share = float(brentq(value, low, high, xtol=SHARE_TOLERANCE, rtol=1e-14))
+    point = last[share] if share in last else solver.between(traced, p, share)
+    kind = test.kind
+    if kind == CONTACT_BEGIN:
+        rises = (value(high) - value(low)) * point.omega_tangent > 0.0
+        kind = CONTACT_BEGIN if rises else CONTACT_END
+    return Found(kind, p, share, point, test.spring, test.side)
+
+
+def _is_real(found: Found) -> bool:
+    """A product of two real eigenvalues passing one also zeroes the Neimark-Sacker test."""
+    if found.kind != NEIMARK_SACKER:
+        return True
+    return has_unit_pair(np.linalg.eigvals(found.point.return_map))

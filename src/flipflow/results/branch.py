@@ -1,0 +1,206 @@
+"""A branch of periodic motions over frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from flipflow.errors import InputError
+from flipflow.methods.options import Method
+from flipflow.methods.solver import Solver, Traced
+from flipflow.methods.special import FOLD
+from flipflow.methods.stability import STABLE
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
+from flipflow.results.orbit import Orbit
+from flipflow.results.status import BranchStatus
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A point where the character of the motion changes.
+
+    Parameters
+    ----------
+    kind
+        "fold" (a saddle-node: the amplitude jumps here), "contact begin", "contact end",
+        "symmetry breaking", "period doubling" or "Neimark-Sacker".
+    orbit
+        The motion at the point.
+    position
+        Where it stands along the branch: point index plus share of the step.
+    spring, side
+        The stop and its side (+1, -1) for contact; -1 and 0 otherwise.
+    """
+
+    kind: str
+    orbit: Orbit
+    position: float
+    spring: int = -1
+    side: int = 0
+
+    @property
+    def omega(self) -> float:
+        """Frequency in rad/s."""
+        return self.orbit.omega
+
+    def amplitude(self, which: Coordinate) -> float:
+        """Half peak-to-peak of a coordinate in m."""
+        return self.orbit.amplitude(which)
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Periodic motions followed over frequency, in the order in which they hang together.
+
+    Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
+    points; it is what :func:`flipflow.frequency_response` returns.
+
+    Parameters
+    ----------
+    machine
+        What was analysed.
+    method
+        Options of the method used.
+    solver, traced
+        The solver and the points it left.
+    multipliers
+        Floquet multipliers of the full turn, (n, 2 N), largest modulus first.
+    stability
+        Words, (n,): "stable", "unstable" or "undetermined".
+    special_points
+        In branch order, each refined to rounding.
+    status
+        How the branch ended; ``status.complete`` is False when it could not be finished.
+    notes
+        A sentence for each thing that could not be settled.
+    version
+        Version of flipflow.
+    """
+
+    machine: Machine
+    method: Method
+    solver: Solver
+    traced: Traced
+    return_maps: Real
+    multipliers: NDArray[np.complex128]
+    stability: NDArray[np.str_]
+    special_points: tuple[SpecialPoint, ...]
+    status: BranchStatus
+    notes: tuple[str, ...]
+    version: str
+
+    @property
+    def system(self) -> MechanicalSystem:
+        """The machine as it was solved."""
+        return self.solver.system
+
+    @property
+    def omega(self) -> Real:
+        """Frequency in rad/s along the branch, (n,); both ends exactly as asked for."""
+        return self.traced.omega
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where ``stability`` is "stable", (n,)."""
+        return np.asarray(self.stability == STABLE)
+
+    @property
+    def folds(self) -> tuple[SpecialPoint, ...]:
+        """The saddle-nodes, in branch order."""
+        return self.points_of(FOLD)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the branch was followed to the end of the interval."""
+        return self.status.complete
+
+    @cached_property
+    def error(self) -> Real:
+        """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
+        return self.solver.errors(self.traced.u, self.omega)
+
+    def points_of(self, kind: str) -> tuple[SpecialPoint, ...]:
+        """Special points of one kind, in branch order."""
+        return tuple(point for point in self.special_points if point.kind == kind)
+
+    def amplitude(self, which: Coordinate) -> Real:
+        """Half peak-to-peak of a coordinate at every point in m, (n,)."""
+        low, high, _ = self._extremes(which)
+        return np.asarray((high - low) / 2.0)
+
+    def phase(self, which: Coordinate) -> Real:
+        """Phase of the first harmonic against the force in rad, (n,); positive: it leads."""
+        return np.asarray(np.angle(self._extremes(which)[2]))
+
+    def orbit(self, i: int) -> Orbit:
+        """The motion at point i of the branch."""
+        if not -self.omega.size <= i < self.omega.size:
+            raise InputError("i", i, f"the branch has points 0 to {self.omega.size - 1}")
+        return Orbit(
+            self.solver, self.traced.u[i], float(self.omega[i]), self.return_maps[i],
+            str(self.stability[i]),
+        )  # fmt: skip
+
+    def orbits_at(self, omega: float) -> tuple[Orbit, ...]:
+        """The motions of this branch at exactly ``omega``, in branch order, each solved for."""
+        ends = self.omega
+        hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
+        found: list[Orbit] = []
+        for p in hits:
+            span = ends[p + 1] - ends[p]
+            share = (omega - ends[p]) / span if span else 0.0
+            guess = (1.0 - share) * self.traced.u[p] + share * self.traced.u[p + 1]
+            point = self.solver.solve(guess, omega)
+            if point is None:
+                continue
+            same = any(np.allclose(point.u, one.unknowns, rtol=1e-7, atol=1e-12) for one in found)
+            if not same:
+                word = str(self.stability[p if share < 0.5 else p + 1])
+                found.append(Orbit(self.solver, point.u, omega, point.return_map, word))
+        return tuple(found)
+
+    def peak(self, which: Coordinate) -> SpecialPoint:
+        """The motion of largest amplitude on the branch, refined between its points."""
+        values = self.amplitude(which)
+        top = int(values.argmax())
+        best = SpecialPoint("peak", self.orbit(top), float(top))
+        for p in (top - 1, top):
+            if not 0 <= p < values.size - 1:
+                continue
+
+            def fall(share: float, p: int = p) -> float:
+                point = self.solver.between(self.traced, p, share)
+                low, high, _ = self.solver.extremes(
+                    point.u[None], np.array([point.omega]), self.system.coordinate(which)[None]
+                )
+                return float(low[0, 0] - high[0, 0])
+
+            share = float(
+                minimize_scalar(fall, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}).x
+            )
+            point = self.solver.between(self.traced, p, share)
+            orbit = Orbit(self.solver, point.u, point.omega, point.return_map)
+            if orbit.amplitude(which) > best.amplitude(which):
+                best = SpecialPoint("peak", orbit, p + share)
+        return best
+
+    def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
+        key = tuple(self.system.coordinate(which))
+        if key not in self._seen:
+            low, high, first = self.solver.extremes(
+                self.traced.u, self.omega, np.array([key])
+            )
+            self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
+        return self._seen[key]
+
+    @cached_property
+    def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real, NDArray[np.complex128]]]:
+        return {}
+
+

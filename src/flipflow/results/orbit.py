@@ -1,0 +1,239 @@
+"""One periodic motion and everything that can be read off it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.methods.motion import ContactInterval, Motion
+from flipflow.methods.solver import Solver
+from flipflow.methods.stability import STABLE, full_turn, stability_words
+from flipflow.model.system import Coordinate, MechanicalSystem
+
+Real = NDArray[np.float64]
+GAUSS_POINTS = 24
+POINTS_PER_TURN = 720
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic motion of a machine under forcing at ``omega``.
+
+    Time is counted from the moment the unbalance points along +x; SI units; arrays over time are
+    (n,). Coordinates are named ("main", "floating", "relative") or a degree of freedom's index.
+
+    Parameters
+    ----------
+    solver
+        The solver that found the motion.
+    unknowns
+        The solver's unknowns at the motion.
+    omega
+        Forcing frequency in rad/s.
+    return_map
+        Linearised return map of the state over a turn, or over half a turn with sign.
+    word
+        Stability where the branch knows it better than the multipliers do.
+    """
+
+    solver: Solver
+    unknowns: Real
+    omega: float
+    return_map: Real
+    word: str | None = None
+
+    @property
+    def system(self) -> MechanicalSystem:
+        """The machine."""
+        return self.solver.system
+
+    @property
+    def periods(self) -> int:
+        """Number of forcing periods after which the motion repeats."""
+        return 1
+
+    @property
+    def period(self) -> float:
+        """Duration in s after which the motion repeats."""
+        return 2.0 * np.pi * self.periods / self.omega
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion as a function of time, with its record of contacts."""
+        return self.solver.motion(self.unknowns, self.omega)
+
+    @cached_property
+    def t(self) -> Real:
+        """Times in s over the period, both ends included, (721,)."""
+        return np.linspace(0.0, self.period, POINTS_PER_TURN * self.periods + 1)
+
+    @cached_property
+    def state(self) -> Real:
+        """State (x, x') at t = 0, shape (2 N,)."""
+        return np.asarray(self.solver.states(self.unknowns[None], np.array([self.omega]))[0])
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers of the full period, largest modulus first, (2 N,)."""
+        eigenvalues = np.linalg.eigvals(self.return_map).astype(np.complex128)
+        return full_turn(eigenvalues, half_turn=self.solver.half_turn)
+
+    @cached_property
+    def monodromy(self) -> Real:
+        """Linearised flow over the full period, (2 N, 2 N), saltation included."""
+        M = self.return_map
+        return np.asarray(M @ M if self.solver.half_turn else M)
+
+    @cached_property
+    def stability(self) -> str:
+        """Whether it returns after a small disturbance: "stable", "unstable", "undetermined"."""
+        if self.word is not None:
+            return self.word
+        eigenvalues = np.linalg.eigvals(self.return_map).astype(np.complex128)
+        return str(stability_words(eigenvalues[None], None)[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether ``stability`` is "stable"."""
+        return self.stability == STABLE
+
+    @cached_property
+    def error(self) -> float:
+        """Estimated distance in m from the exact motion; infinite where nothing is promised."""
+        return float(self.solver.errors(self.unknowns[None], np.array([self.omega]))[0])
+
+    def displacement(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
+        """Displacement of a coordinate in m at times t (default: :attr:`t`)."""
+        return self._along(which, t, 0)
+
+    def velocity(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
+        """Velocity of a coordinate in m/s at times t (default: :attr:`t`)."""
+        return self._along(which, t, 1)
+
+    def acceleration(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
+        """Acceleration of a coordinate in m/s^2 at times t; it jumps where a damped stop acts."""
+        return self._along(which, t, 2)
+
+    def stop_force(self, spring: int = 0, t: ArrayLike | None = None) -> Real:
+        """Force H of a stop in N at times t (default: :attr:`t`), positive against +d."""
+        times = self.t if t is None else np.asarray(t, float)
+        return self._force(spring, times, self.motion.piece(times))
+
+    def amplitude(self, which: Coordinate) -> float:
+        """Half peak-to-peak of a coordinate over the period, in m; from the exact extremes."""
+        low, high, _ = self._extremes(which)
+        return (high - low) / 2.0
+
+    def mean(self, which: Coordinate) -> float:
+        """Middle between the greatest and the least value of a coordinate, in m."""
+        low, high, _ = self._extremes(which)
+        return (high + low) / 2.0
+
+    def phase(self, which: Coordinate) -> float:
+        """Phase of the first harmonic against the exciting force in rad; positive: it leads."""
+        _, _, first = self._extremes(which)
+        return float(np.angle(first))
+
+    @property
+    def contact_intervals(self) -> tuple[ContactInterval, ...]:
+        """Every touch of every stop within the period."""
+        return self.motion.contact_intervals()
+
+    def contact_share(self, spring: int = 0) -> float:
+        """Share of the period during which a stop is touched, 0 to 1."""
+        touches = (c for c in self.contact_intervals if c.spring == spring)
+        return sum(c.end - c.start for c in touches) / self.period
+
+    def peak(self, quantity: Callable[[Real, Real, Real, Real], Real]) -> float:
+        """Greatest |quantity| over the period.
+
+        ``quantity(t, x, v, a)`` gets times (K,) and displacement, velocity, acceleration (K, N) on
+        a grid with both sides of every change of contact, and returns (K,); the summit between
+        grid points is that of a parabola through the three highest, within one piece.
+        """
+        t, piece = self.motion.samples()
+        values = np.abs(quantity(t, *self._states(t, piece)))
+        return _summit(t, values, piece)
+
+    def stop_force_peak(self, spring: int = 0) -> float:
+        """Greatest |H| of a stop over the period in N."""
+        t, piece = self.motion.samples()
+        return _summit(t, np.abs(self._force(spring, t, piece)), piece)
+
+    def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
+        """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
+
+        With ``spring``, only the time is counted during which that stop is engaged: damping times
+        this is the power that the stop takes.
+        """
+        vector = self.system.coordinate(which)
+
+        def square(t: Real, piece: NDArray[np.intp]) -> Real:
+            rate = self.motion.piece_derivative(t, piece, 1) @ vector
+            if spring is None:
+                return np.asarray(rate**2)
+            return np.asarray(rate**2 * (np.abs(self.motion.pieces.states[piece, spring]) == 1))
+
+        return self._mean(square)
+
+    def input_power(self) -> float:
+        """Mean power that the excitation feeds in, W."""
+        force = self.system.excitation
+        F = force.vector * self.omega**force.power
+
+        def power(t: Real, piece: NDArray[np.intp]) -> Real:
+            push = (F * np.exp(1j * self.omega * t)[:, None]).real
+            return np.asarray((push * self.motion.piece_derivative(t, piece, 1)).sum(axis=1))
+
+        return self._mean(power)
+
+    def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+        total = 0.0
+        pieces = self.motion.pieces
+        for e, (start, length) in enumerate(zip(pieces.start, pieces.length, strict=True)):
+            # A free piece may last the whole turn and hold many harmonics: cut it up.
+            parts = 1 + int(16.0 * length / self.period)
+            for part in range(parts):
+                t = start + length * (part + (nodes + 1.0) / 2.0) / parts
+                values = function(t, np.full(t.size, e))
+                total += float(weights @ values) * length / (2.0 * parts)
+        return total / self.period
+
+    def _along(self, which: Coordinate, t: ArrayLike | None, order: int) -> Real:
+        times = self.t if t is None else np.asarray(t, float)
+        return np.asarray(self.motion.derivative(times, order) @ self.system.coordinate(which))
+
+    def _states(self, t: Real, piece: NDArray[np.intp]) -> tuple[Real, Real, Real]:
+        derivative = self.motion.piece_derivative
+        return derivative(t, piece, 0), derivative(t, piece, 1), derivative(t, piece, 2)
+
+    def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
+        stop = self.solver.builder.springs[spring]
+        plus, minus = stop.gaps
+        y = self.motion.piece_derivative(t, piece, 0) @ stop.direction
+        v = self.motion.piece_derivative(t, piece, 1) @ stop.direction
+        state = self.motion.pieces.states[piece, spring]
+        gap = np.where(state == 1, plus, np.where(state == -1, -minus, 0.0))
+        return np.where(np.abs(state) == 1, stop.stiffness * (y - gap) + stop.damping * v, 0.0)
+
+    def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
+        vector = self.system.coordinate(which)[None]
+        low, high, first = self.solver.extremes(
+            self.unknowns[None], np.array([self.omega]), vector
+        )
+        return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
+
+
+def _summit(t: Real, values: Real, piece: NDArray[np.intp]) -> float:
+    """Top of the parabola through the highest sample and its neighbours in the same piece."""
+    k = int(values.argmax())
+    if k in (0, values.size - 1) or not piece[k - 1] == piece[k] == piece[k + 1]:
+        return float(values[k])
+    a, b, c = values[k - 1], values[k], values[k + 1]
+    curvature = a - 2.0 * b + c
+    return float(b - (c - a) ** 2 / (8.0 * curvature)) if curvature < 0.0 else float(b)

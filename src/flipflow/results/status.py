@@ -1,0 +1,60 @@
+"""How a calculation ended: an enumeration whose values are sentences that say what to try."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Self
+
+from flipflow.kernels import status
+from flipflow.kernels.arclength import REASON_BOUND, REASON_CONTACT, REASON_NEWTON, REASON_TURN
+
+
+class BranchStatus(Enum):
+    """How a branch ended."""
+
+    COMPLETE = "The branch reached the end of the interval."
+    TURNED_BACK = (
+        "The branch turned back and left the interval at its lower end; widen the interval to "
+        "follow it."
+    )
+    STEP_TOO_SMALL = (
+        "The branch could not be followed: the step became too small. Try more points, or start "
+        "from another frequency."
+    )
+    POINT_LIMIT = "The branch has more points than are kept; shorten the interval."
+    TOO_MANY_CONTACTS = (
+        "A turn had too many contacts to record; the stops may chatter. Look at it in time."
+    )
+    NO_START = (
+        "No periodic motion was found at the start of the interval. Start from another frequency."
+    )
+    NOT_FINITE = "A motion grew beyond all bounds; check damping and stiffness."
+
+    @property
+    def complete(self) -> bool:
+        """Whether the whole interval was covered."""
+        return self is BranchStatus.COMPLETE
+
+    @classmethod
+    def from_code(cls, code: int) -> Self:
+        """The status of a kernel's code."""
+        return cls(_SENTENCE.get(code, cls.STEP_TOO_SMALL.value))
+
+
+_SENTENCE = {
+    status.REACHED_UPPER: BranchStatus.COMPLETE.value,
+    status.REACHED_LOWER: BranchStatus.TURNED_BACK.value,
+    status.STEP_TOO_SMALL: BranchStatus.STEP_TOO_SMALL.value,
+    status.POINT_LIMIT: BranchStatus.POINT_LIMIT.value,
+    status.TOO_MANY_EVENTS: BranchStatus.TOO_MANY_CONTACTS.value,
+    status.NO_CONVERGENCE: BranchStatus.NO_START.value,
+    status.SINGULAR: BranchStatus.NO_START.value,
+    status.NOT_FINITE: BranchStatus.NOT_FINITE.value,
+}
+
+STEP_REASON = {
+    REASON_NEWTON: "Newton did not converge",
+    REASON_TURN: "the branch turned too far",
+    REASON_CONTACT: "a contact changed",
+    REASON_BOUND: "the step left the interval",
+}
