@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from flipflow import __version__
 from flipflow.errors import InputError
 from flipflow.kernels import arclength, status
-from flipflow.kernels.shooting import settle
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
@@ -74,7 +73,9 @@ def followed(machine: Machine, method: Method, solver: Solver, course: arclength
     return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
 
 
-def solver_for(system: MechanicalSystem, method: Method, *, half_turn: bool | None = None) -> Solver:
+def solver_for(
+    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None
+) -> Solver:
     """The solver of a method. Without stops both are the closed form, which shooting meets."""
     symmetric = system.symmetric if half_turn is None else half_turn
     if isinstance(method, HarmonicBalance) and system.with_bonded().springs:
@@ -121,9 +122,7 @@ def contact_free(solver: Solver, omega: float) -> bool:
     """Whether the linear motion at ``omega`` stays within all gaps."""
     system = solver.system
     X = linear_amplitudes(system, np.array([omega]))[0]
-    return all(
-        abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs
-    )
+    return all(abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs)
 
 
 def linear_amplitudes(system: MechanicalSystem, omega: Real) -> NDArray[np.complex128]:
@@ -151,12 +150,10 @@ def contact_free_unknowns(solver: Solver, omega: float) -> Real:
 
 def settled_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
-    exact = solver if isinstance(solver, ExactSolver) else ExactSolver(solver.system, half_turn=False)
-    z = np.zeros(exact.unknowns)
-    while settle(exact.turn, z, omega, SETTLING_TURNS) == status.MISSING_CONFIGURATION:
-        exact.problem.flow.state[:] = exact.turn.flow.state
-        exact.add_missing_configuration()
-        z[:] = 0.0
+    exact = (
+        solver if isinstance(solver, ExactSolver) else ExactSolver(solver.system, half_turn=False)
+    )
+    z = exact.settled(np.zeros(exact.unknowns), omega, SETTLING_TURNS)
     if exact is solver:
         return z
     point = exact.solve(z, omega)

@@ -65,9 +65,7 @@ class Corrector(NamedTuple):
 
 
 @kernel
-def set_scale(
-    problem: Any, work: Corrector, u: Real, omega: float, course: Course
-) -> None:
+def set_scale(problem: Any, work: Corrector, u: Real, omega: float, course: Course) -> None:
     """Length of one step in each unknown."""
     n = work.r.shape[0]
     unknown_scale(problem, u, omega, work.scale)
@@ -88,7 +86,7 @@ def bordered(work: Corrector) -> bool:
     return lu_factor(work.A, work.pivot)
 
 
-@kernel
+@kernel(inline=True)
 def correct(problem: Any, work: Corrector) -> tuple[int, int]:
     """Newton from work.guess within the plane through it normal to work.border (scaled).
 
@@ -144,7 +142,7 @@ def new_tangent(work: Corrector) -> float:
     return cosine
 
 
-@kernel
+@kernel(inline=True)
 def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     """Write point p of the branch from the corrector's scratch."""
     n = work.r.shape[0]
@@ -158,7 +156,7 @@ def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     branch.signature[p] = signature(problem)
 
 
-@kernel
+@kernel(inline=True)
 def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course) -> None:
     """Scale of point p, and its unit tangent in scaled unknowns into work.before."""
     n = work.r.shape[0]
@@ -173,7 +171,7 @@ def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course
         work.before[k] /= math.sqrt(norm)
 
 
-@kernel
+@kernel(inline=True)
 def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course) -> bool:
     """Guess a step along the tangent of point p; True when it ends on a bound of omega.
 
@@ -195,7 +193,7 @@ def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course
     return ends
 
 
-@kernel
+@kernel(inline=True)
 def judge(
     problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, course: Course
 ) -> int:
@@ -216,7 +214,7 @@ def judge(
     return REASON_NONE
 
 
-@kernel(entry=True)
+@kernel
 def trace(
     problem: Any, work: Corrector, branch: Branch, u: Real, omega: float, course: Course
 ) -> tuple[int, int]:
@@ -267,7 +265,7 @@ def trace(
     return status.POINT_LIMIT, p
 
 
-@kernel(entry=True)
+@kernel
 def correct_between(
     problem: Any, work: Corrector, branch: Branch, p: int, share: float, course: Course
 ) -> int:
@@ -293,3 +291,26 @@ def correct_between(
         return code
     new_tangent(work)
     return residual(problem, work.w, work.w[n], work.r, work.J)
+
+
+TRACE_ALL = -1
+
+
+@kernel(entry=True)
+def follow(
+    problem: Any,
+    work: Corrector,
+    branch: Branch,
+    u: Real,
+    omega: float,
+    course: Course,
+    p: int,
+    share: float,
+) -> tuple[int, int]:
+    """Trace the branch from (u, omega), or find its point at ``share`` of step p >= 0.
+
+    One entry for both: each entry is optimised anew with all that it calls.
+    """
+    if p == TRACE_ALL:
+        return trace(problem, work, branch, u, omega, course)
+    return correct_between(problem, work, branch, p, share, course), p

@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar, cast, overload
+from typing import Any, ParamSpec, TypeVar, cast, overload
 
 import numba
 from numba import config
@@ -34,11 +34,13 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]: ...
 
 
 @overload
-def kernel(*, entry: bool) -> Callable[[Callable[P, R]], Callable[P, R]]: ...
+def kernel(
+    *, entry: bool = False, inline: bool = False
+) -> Callable[[Callable[P, R]], Callable[P, R]]: ...
 
 
 def kernel(
-    function: Callable[P, R] | None = None, *, entry: bool = False
+    function: Callable[P, R] | None = None, *, entry: bool = False, inline: bool = False
 ) -> Callable[P, R] | Callable[[Callable[P, R]], Callable[P, R]]:
     """Compile a scalar function: cached on disk, without the interpreter lock, IEEE arithmetic.
 
@@ -47,12 +49,14 @@ def kernel(
     wrappers that unpack its arguments cost more time to compile than most kernels do.
     """
     if function is None:
-        return functools.partial(_compile, entry=entry)
-    return _compile(function, entry=entry)
+        return functools.partial(_compile, entry=entry, inline=inline)
+    return _compile(function, entry=entry, inline=inline)
 
 
-def _compile(function: Callable[P, R], *, entry: bool) -> Callable[P, R]:
-    options = {} if entry else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+def _compile(function: Callable[P, R], *, entry: bool, inline: bool) -> Callable[P, R]:
+    options: dict[str, Any] = {"inline": "always"} if inline else {}
+    if not entry:
+        options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     with _CacheFolder():
         compiled = numba.njit(
             cache=entry, nogil=True, error_model="numpy", fastmath={"contract"}, **options

@@ -15,11 +15,15 @@ from flipflow.kernels.plan import Complex, Int, Real
 from flipflow.kernels.shooting import Shooting, shooting_residual
 
 
+ROUNDING = 1e-12
+
+
 @kernel(entry=True)
 def observe_flow(
     problem: Shooting,
     states: Real,
     omega: Real,
+    waiting: int,
     coordinate: Real,
     motion: GapMotion,
     low: Real,
@@ -27,16 +31,24 @@ def observe_flow(
     first: Complex,
     code: Int,
 ) -> None:
-    """Extremes and first harmonic of coordinates (G, N) over the turns from each state (P, 2 N).
+    """Extremes and first harmonic of coordinates (G, N) over the turn from each state (P, 2 N).
 
-    ``motion`` is scratch for G coordinates; low, high, first are (P, G), code (P,).
+    ``waiting`` turns pass first; the state after them replaces the one given. ``motion`` is
+    scratch for G coordinates; low, high, first are (P, G), code (P,). The record of the last
+    turn stays in the problem's flow.
     """
     plan, flow = problem.plan, problem.flow
     for p in range(omega.shape[0]):
+        turn = problem.fraction * 2.0 * math.pi / omega[p]
         for k in range(flow.z.shape[0]):
             flow.z[k] = states[p, k]
-        turn = problem.fraction * 2.0 * math.pi / omega[p]
-        code[p] = run_flow(plan, flow, omega[p], 0.0, turn, problem.rate)
+        code[p] = status.OK
+        for wait in range(waiting + 1):
+            if wait == waiting:
+                for k in range(flow.z.shape[0]):
+                    states[p, k] = flow.z[k]
+            if code[p] == status.OK:
+                code[p] = run_flow(plan, flow, omega[p], 0.0, turn, problem.rate)
         if code[p] != status.OK:
             continue
         for g in range(coordinate.shape[0]):
@@ -103,7 +115,9 @@ def _mean_of_exponential(rate: complex, length: float) -> complex:
 
 
 @kernel(entry=True)
-def observe_series(motion: GapMotion, offset: Real, amplitude: Complex, low: Real, high: Real) -> None:
+def observe_series(
+    motion: GapMotion, offset: Real, amplitude: Complex, low: Real, high: Real
+) -> None:
     """Extremes over a turn of series with means (P, G) and amplitudes (P, G, n_h)."""
     count = motion.rate.shape[0]
     for p in range(offset.shape[0]):
@@ -191,8 +205,8 @@ def orbit_error(
     """Distance in m of each motion from the exact one, by one Newton step of the exact flow.
 
     delta = (I - M)^-1 (flow(z) - z) corrects the state; the distance is the largest difference of
-    any displacement between the corrected exact flow and the series (P, n_h, N), or, without
-    harmonics, the flow from the uncorrected state. Infinite when a second step does not shrink.
+    any displacement between the corrected exact flow and the series (P, n_h, N); without
+    harmonics the motion is the flow itself and the distance is that of the states. Infinite when a second step does not shrink.
     """
     plan, flow = problem.plan, problem.flow
     size = flow.z.shape[0]
@@ -205,14 +219,16 @@ def orbit_error(
             length = 0.0
             if code[p] == status.OK:
                 length = _newton_step(J, A, pivot, delta, omega[p])
-            if code[p] != status.OK or not length <= 0.5 * before:
+            if code[p] != status.OK or not length <= max(0.5 * before, ROUNDING):
                 break
             if step == 0:
                 for k in range(size):
                     z[k] += delta[k]
-                before = max(length, 1e-14)
-                continue
-            error[p] = _distance(problem, omega[p], harmonics, series[p], length)
+                before = length
+            elif harmonics.shape[0] == 0:
+                error[p] = before + length
+            else:
+                error[p] = _distance(problem, omega[p], harmonics, series[p], length)
 
 
 @kernel

@@ -39,7 +39,7 @@ def _kind(problem: Any) -> Any:
     return problem.instance_class if isinstance(problem, NamedTupleType) else None
 
 
-@overload(residual, inline="always")
+@overload(residual)
 def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
     chosen = _RESIDUAL[_kind(problem)]
 
@@ -49,7 +49,7 @@ def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
     return run
 
 
-@overload(signature, inline="always")
+@overload(signature)
 def _signature(problem: Any) -> Any:
     chosen = _SIGNATURE[_kind(problem)]
 
@@ -59,7 +59,7 @@ def _signature(problem: Any) -> Any:
     return run
 
 
-@overload(unknown_scale, inline="always")
+@overload(unknown_scale)
 def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
     chosen = _SCALE[_kind(problem)]
 

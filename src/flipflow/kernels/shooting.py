@@ -60,30 +60,6 @@ def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real
     return status.OK
 
 
-@kernel(entry=True)
-def record_turn(problem: Shooting, z: Real, omega: float) -> int:
-    """Run the flow from z over the problem's turns; the record stays in problem.flow."""
-    for k in range(problem.rate.shape[0]):
-        problem.flow.z[k] = z[k]
-    duration = problem.fraction * 2.0 * math.pi / omega
-    return run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
-
-
-@kernel(entry=True)
-def settle(problem: Shooting, z: Real, omega: float, turns: int) -> int:
-    """Carry z in place over many whole turns."""
-    duration = problem.fraction * 2.0 * math.pi / omega
-    for k in range(problem.rate.shape[0]):
-        problem.flow.z[k] = z[k]
-    for _ in range(turns):
-        code = run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
-        if code != status.OK:
-            return code
-    for k in range(problem.rate.shape[0]):
-        z[k] = problem.flow.z[k]
-    return status.OK
-
-
 @kernel
 def crossings(problem: Shooting) -> int:
     """A number that changes when the contacts met in a turn change: crossings, spring by spring."""

@@ -9,7 +9,6 @@ from flipflow.errors import IncompleteError
 from flipflow.kernels import status
 from flipflow.kernels.gapmotion import GapMotion
 from flipflow.kernels.observe import observe_flow
-from flipflow.kernels.shooting import record_turn
 from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
 from flipflow.methods.scratch import new_shooting
 from flipflow.methods.solver import Complex, Real, Solver
@@ -35,31 +34,20 @@ class ExactSolver(Solver):
         return np.zeros(0, np.int64), np.zeros((omega.size, 0, u.shape[1] // 2), np.complex128)
 
     def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
-        count, modes = coordinates.shape[0], self.builder.plan.rate.shape[1] + 1
-        scratch = GapMotion(
-            np.zeros(count), np.zeros((count, modes), np.complex128),
-            np.zeros(modes, np.complex128), np.zeros(modes, np.complex128), np.zeros(1, np.int64),
-        )  # fmt: skip
-        shape = (omega.size, count)
-        low, high, first = np.empty(shape), np.empty(shape), np.empty(shape, np.complex128)
-        code = np.zeros(omega.size, np.int64)
-        observe_flow(
-            self.turn, np.ascontiguousarray(u), omega, coordinates, scratch, low, high, first, code
-        )
-        bad = code != status.OK
-        low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan
-        return low, high, first
+        return self._observe(np.array(u), omega, coordinates, 0)
+
+    def settled(self, z: Real, omega: float, turns: int) -> Real:
+        """State in which the machine is after a number of turns from the state z."""
+        states = np.array(z)[None]
+        self._observe(states, np.array([omega]), np.zeros((0, self.system.size)), turns)
+        return np.asarray(states[0])
 
     def motion(self, u: Real, omega: float) -> Motion:
-        while True:
-            flow = self.turn.flow
-            code = record_turn(self.turn, u, omega)
-            if code != status.MISSING_CONFIGURATION:
-                break
-            self.problem.flow.state[:] = flow.state
-            self.add_missing_configuration()
-        if code != status.OK:
+        states = np.array(u)[None]
+        low, _, _ = self._observe(states, np.array([omega]), np.eye(self.system.size), 0)
+        if np.isnan(low).any():
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
+        flow = self.turn.flow
         e = int(flow.segments[0])
         pieces = Pieces(
             *(array[:e].copy() for array in (flow.slot, flow.start, flow.length, flow.modes)),
@@ -69,6 +57,34 @@ class ExactSolver(Solver):
         return PiecewiseMotion(
             self.system, omega, period, pieces, self.builder.plan, flow.drive.copy()
         )
+
+    def _observe(
+        self, states: Real, omega: Real, coordinates: Real, waiting: int
+    ) -> tuple[Real, Real, Complex]:
+        """Flow over a turn from each state, which becomes the one after ``waiting`` turns."""
+        count = coordinates.shape[0]
+        shape = (omega.size, count)
+        low, high, first = np.empty(shape), np.empty(shape), np.empty(shape, np.complex128)
+        code = np.zeros(omega.size, np.int64)
+        begin = states.copy()
+        while True:
+            modes = self.builder.plan.rate.shape[1] + 1
+            scratch = GapMotion(
+                np.zeros(count), np.zeros((count, modes), np.complex128),
+                np.zeros(modes, np.complex128), np.zeros(modes, np.complex128),
+                np.zeros(1, np.int64),
+            )  # fmt: skip
+            observe_flow(
+                self.turn, states, omega, waiting, coordinates, scratch, low, high, first, code
+            )
+            if not np.any(code == status.MISSING_CONFIGURATION):
+                break
+            self.problem.flow.state[:] = self.turn.flow.state
+            self.add_missing_configuration()
+            states[:] = begin
+        bad = code != status.OK
+        low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan
+        return low, high, first
 
     def unknowns_from(self, motion: Motion) -> Real:
         return np.concatenate([motion.derivative(0.0, 0), motion.derivative(0.0, 1)])

@@ -116,7 +116,9 @@ class Solver(ABC):
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
         while True:
             record = new_branch(self.unknowns, POINTS_MOST)
-            code, points = arclength.trace(self.problem, self.work, record, u, omega, course)
+            code, points = arclength.follow(
+                self.problem, self.work, record, u, omega, course, arclength.TRACE_ALL, 0.0
+            )
             if code != status.MISSING_CONFIGURATION:
                 break
             self.add_missing_configuration()
@@ -133,12 +135,14 @@ class Solver(ABC):
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
-        code = arclength.correct_between(
-            self.problem, self.work, traced.record, p, share, traced.course
+        code, _ = arclength.follow(
+            self.problem, self.work, traced.record, traced.u[p], 0.0, traced.course, p, share
         )
         if code != status.OK:
             omega = traced.omega[p]
-            raise IncompleteError(f"no point found between two of the branch near {omega:.6g} rad/s")
+            raise IncompleteError(
+                f"no point found between two of the branch near {omega:.6g} rad/s"
+            )
         u, omega = self.work.w[:-1].copy(), float(self.work.w[-1])
         maps = self.return_maps(u[None], np.array([omega]), self.work.J[None, :, :-1])
         return Point(u, omega, float(self.work.tangent[-1]), maps[0])
@@ -148,7 +152,9 @@ class Solver(ABC):
         course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0)
         record = new_branch(self.unknowns, 1)
         while True:
-            code, points = arclength.trace(self.problem, self.work, record, u, omega, course)
+            code, points = arclength.follow(
+                self.problem, self.work, record, u, omega, course, arclength.TRACE_ALL, 0.0
+            )
             if code != status.MISSING_CONFIGURATION:
                 break
             self.add_missing_configuration()
@@ -173,7 +179,15 @@ class Solver(ABC):
             error, code = np.empty(omega.size), np.zeros(omega.size, np.int64)
             scratch = np.empty((size, size + 1)), np.empty((size, size)), np.zeros(size, np.int64)
             orbit_error(
-                problem, states.copy(), omega, harmonics, series, *scratch, np.empty(size), error, code
+                problem,
+                states.copy(),
+                omega,
+                harmonics,
+                series,
+                *scratch,
+                np.empty(size),
+                error,
+                code,
             )
             if not np.any(code == status.MISSING_CONFIGURATION):
                 return error

@@ -74,7 +74,9 @@ def _map_tests(
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
         _Test(FOLD, fold, lambda point: point.omega_tangent),
-        _Test(kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))),
+        _Test(
+            kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))
+        ),
         _Test(
             NEIMARK_SACKER,
             neimark_sacker(eigenvalues),
@@ -152,9 +154,7 @@ def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) ->
     return float(best.x) if best.fun < 0.0 else None
 
 
-def _refine(
-    solver: Solver, traced: Traced, test: _Test, p: int, low: float, high: float
-) -> Found:
+def _refine(solver: Solver, traced: Traced, test: _Test, p: int, low: float, high: float) -> Found:
     """Root of the test on corrected points between two shares of step p."""
     last: dict[float, Point] = {}
 

@@ -182,7 +182,9 @@ class Branch:
                 return float(low[0, 0] - high[0, 0])
 
             share = float(
-                minimize_scalar(fall, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}).x
+                minimize_scalar(
+                    fall, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
+                ).x
             )
             point = self.solver.between(self.traced, p, share)
             orbit = Orbit(self.solver, point.u, point.omega, point.return_map)
@@ -193,14 +195,10 @@ class Branch:
     def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
-            low, high, first = self.solver.extremes(
-                self.traced.u, self.omega, np.array([key])
-            )
+            low, high, first = self.solver.extremes(self.traced.u, self.omega, np.array([key]))
             self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
         return self._seen[key]
 
     @cached_property
     def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real, NDArray[np.complex128]]]:
         return {}
-
-

@@ -223,9 +223,7 @@ class Orbit:
 
     def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
         vector = self.system.coordinate(which)[None]
-        low, high, first = self.solver.extremes(
-            self.unknowns[None], np.array([self.omega]), vector
-        )
+        low, high, first = self.solver.extremes(self.unknowns[None], np.array([self.omega]), vector)
         return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
 
 
