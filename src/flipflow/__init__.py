@@ -30,11 +30,20 @@ _HOME = {
 __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
-    from flipflow.io.project import Project, load, load_project
-    from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
-    from flipflow.model.limits import Limits
-    from flipflow.model.screen import FlipFlowScreen, Load
-    from flipflow.model.system import MechanicalSystem
+    # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
+    from flipflow.analyses.frequency_response import frequency_response as frequency_response
+    from flipflow.io.project import Project as Project
+    from flipflow.io.project import load as load
+    from flipflow.io.project import load_project as load_project
+    from flipflow.methods.options import HarmonicBalance as HarmonicBalance
+    from flipflow.methods.options import PiecewiseExact as PiecewiseExact
+    from flipflow.model.elements import ClearanceSpring as ClearanceSpring
+    from flipflow.model.elements import HarmonicForce as HarmonicForce
+    from flipflow.model.elements import Unbalance as Unbalance
+    from flipflow.model.limits import Limits as Limits
+    from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
+    from flipflow.model.screen import Load as Load
+    from flipflow.model.system import MechanicalSystem as MechanicalSystem
 
 
 def __getattr__(name: str) -> object:
