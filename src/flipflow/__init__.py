@@ -15,6 +15,10 @@ _HOME = {
     "HarmonicBalance": "flipflow.methods.options",
     "PiecewiseExact": "flipflow.methods.options",
     "frequency_response": "flipflow.analyses.frequency_response",
+    "linear_response": "flipflow.analyses.linear",
+    "operating_region": "flipflow.analyses.operating_region",
+    "periodic_orbits": "flipflow.analyses.periodic_orbits",
+    "assess": "flipflow.analyses.assessment",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
     "Unbalance": "flipflow.model.elements",
@@ -22,7 +26,7 @@ _HOME = {
     "FlipFlowScreen": "flipflow.model.screen",
     "Load": "flipflow.model.screen",
     "Limits": "flipflow.model.limits",
-    "Project": "flipflow.io.project",
+    "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
 }
@@ -32,7 +36,6 @@ __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 if TYPE_CHECKING:
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
-    from flipflow.io.project import Project as Project
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
     from flipflow.model.elements import HarmonicForce as HarmonicForce
     from flipflow.model.elements import Unbalance as Unbalance
     from flipflow.model.limits import Limits as Limits
+    from flipflow.model.project import Project as Project
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load
     from flipflow.model.system import MechanicalSystem as MechanicalSystem

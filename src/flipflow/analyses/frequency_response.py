@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.analyses.linear import complex_amplitudes
 from flipflow.errors import InputError
 from flipflow.kernels import arclength, status
 from flipflow.methods.balance import BalanceSolver
@@ -121,21 +122,13 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def contact_free(solver: Solver, omega: float) -> bool:
     """Whether the linear motion at ``omega`` stays within all gaps."""
     system = solver.system
-    X = linear_amplitudes(system, np.array([omega]))[0]
+    X = complex_amplitudes(system, np.array([omega]))[0]
     return all(abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs)
-
-
-def linear_amplitudes(system: MechanicalSystem, omega: Real) -> NDArray[np.complex128]:
-    """X in x = Re(X exp(i omega t)) without contact, (n, N): (K - w^2 M + i w C) X = F."""
-    w = omega[:, None, None]
-    Z = system.K - w**2 * system.M + 1j * w * system.C
-    F = system.excitation.vector * omega[:, None] ** system.excitation.power
-    return np.asarray(np.linalg.solve(Z, F[:, :, None])[:, :, 0])
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = linear_amplitudes(solver.system, np.array([omega]))[0]
+    X = complex_amplitudes(solver.system, np.array([omega]))[0]
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])

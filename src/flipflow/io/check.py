@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 from flipflow.io.derived import Derived, derive
 from flipflow.io.layout import SECTIONS, SPEED, Entry
-from flipflow.io.project import Project
+from flipflow.model.project import Project
 from flipflow.io.units import in_unit
 from flipflow.io.values import read_interval, read_number
 from flipflow.model.fields import FIELD, FIELDS

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import replace
 
 from flipflow.errors import InputError
 from flipflow.io.layout import FORMAT, SECTIONS, SPEED, refuse_unknown
@@ -15,64 +14,8 @@ from flipflow.io.plausibility import implausible
 from flipflow.io.source import read_source
 from flipflow.io.values import Notes, Table, read_interval, read_number, read_text
 from flipflow.model.limits import LIMIT_FIELDS, Limits
-from flipflow.model.screen import FlipFlowScreen, Load
-
-
-@dataclass(frozen=True, kw_only=True)
-class Document:
-    """Title block of a report."""
-
-    name: str = ""
-    project: str = ""
-    customer: str = ""
-    drawing: str = ""
-    revision: str = ""
-    prepared_by: str = ""
-    checked_by: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Project:
-    """A machine file: the machine, what it must bear, what it may do, and where that is known from.
-
-    Parameters
-    ----------
-    screen
-        The machine, empty.
-    limits
-        What it may do; a limit at None is not checked.
-    load_cases
-        At least one; the empty machine where the file names none.
-    speed
-        Operating speed in rad/s, None where the file gives none.
-    document
-        Title block.
-    sources
-        Where values come from, by ``section.key``, by section, or by ``load_cases.<name>``.
-    name, path
-        Bundled name or the file's stem, and the path; None for a bundled machine.
-    written
-        Values as the file has them, by ``section.key``.
-    sums
-        Totals that were given in pieces, as sentences, by ``section.key``.
-    assumed
-        What was taken because the file leaves it out.
-    warnings
-        What looked implausible and was let through by ``force``.
-    """
-
-    screen: FlipFlowScreen
-    limits: Limits
-    load_cases: tuple[Load, ...]
-    speed: float | None
-    document: Document
-    sources: Mapping[str, str]
-    name: str
-    path: Path | None
-    written: Mapping[str, object] = field(repr=False)
-    sums: Mapping[str, str]
-    assumed: tuple[str, ...]
-    warnings: tuple[str, ...] = ()
+from flipflow.model.project import Document, Project
+from flipflow.model.screen import FlipFlowScreen
 
 
 def load(name_or_path: str | os.PathLike[str], *, force: bool = False) -> FlipFlowScreen:

@@ -165,6 +165,45 @@ class Branch:
                 found.append(Orbit(self.solver, point.u, omega, point.return_map, word))
         return tuple(found)
 
+    @cached_property
+    def rising_path(self) -> tuple[slice, ...]:
+        """Runs of points that a machine passes when its speed is raised slowly from below.
+
+        Each run rises in omega. At a fold the machine jumps to the next stable part of the branch
+        that leads on to higher speed.
+        """
+        runs: list[slice] = []
+        begin, size = 0, self.omega.size
+        while begin < size:
+            falls = np.flatnonzero(np.diff(self.omega[begin:]) <= 0.0)
+            end = begin + int(falls[0]) + 1 if falls.size else size
+            runs.append(slice(begin, end))
+            ahead = np.arange(end, size)
+            beyond = ahead[(self.omega[end:] > self.omega[end - 1]) & self.stable[end:]]
+            begin = int(beyond[0]) if falls.size and beyond.size else size
+        return tuple(runs)
+
+    def orbit_from_below(self, omega: float) -> Orbit | None:
+        """The motion met at ``omega`` when the speed is raised slowly from below."""
+        for k, run in enumerate(self.rising_path):
+            low = self.omega[run.start] if k == 0 else self.omega[self.rising_path[k - 1].stop - 1]
+            if low <= omega <= self.omega[run.stop - 1]:
+                return self.solve_in(run, omega)
+        return None
+
+    def solve_in(self, run: slice, omega: float) -> Orbit | None:
+        """The motion at exactly ``omega`` near a run of rising points."""
+        at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, self.omega.size - 1)
+        before, after = int(at) - 1, int(at)
+        span = self.omega[after] - self.omega[before]
+        share = (omega - self.omega[before]) / span if span else 0.0
+        guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
+        point = self.solver.solve(guess, omega)
+        if point is None:
+            return None
+        word = str(self.stability[before if share < 0.5 else after])
+        return Orbit(self.solver, point.u, omega, point.return_map, word)
+
     def peak(self, which: Coordinate) -> SpecialPoint:
         """The motion of largest amplitude on the branch, refined between its points."""
         values = self.amplitude(which)

@@ -155,14 +155,13 @@ class Orbit:
         a grid with both sides of every change of contact, and returns (K,); the summit between
         grid points is that of a parabola through the three highest, within one piece.
         """
-        t, piece = self.motion.samples()
-        values = np.abs(quantity(t, *self._states(t, piece)))
-        return _summit(t, values, piece)
+        t, piece, *states = self._grid
+        return _summit(np.abs(quantity(t, *states)), piece)
 
     def stop_force_peak(self, spring: int = 0) -> float:
         """Greatest |H| of a stop over the period in N."""
-        t, piece = self.motion.samples()
-        return _summit(t, np.abs(self._force(spring, t, piece)), piece)
+        t, piece, *_ = self._grid
+        return _summit(np.abs(self._force(spring, t, piece)), piece)
 
     def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
         """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
@@ -202,15 +201,18 @@ class Orbit:
                 t = start + length * (part + (nodes + 1.0) / 2.0) / parts
                 values = function(t, np.full(t.size, e))
                 total += float(weights @ values) * length / (2.0 * parts)
-        return total / self.period
+        return float(total / self.period)
 
     def _along(self, which: Coordinate, t: ArrayLike | None, order: int) -> Real:
         times = self.t if t is None else np.asarray(t, float)
         return np.asarray(self.motion.derivative(times, order) @ self.system.coordinate(which))
 
-    def _states(self, t: Real, piece: NDArray[np.intp]) -> tuple[Real, Real, Real]:
-        derivative = self.motion.piece_derivative
-        return derivative(t, piece, 0), derivative(t, piece, 1), derivative(t, piece, 2)
+    @cached_property
+    def _grid(self) -> tuple[Real, NDArray[np.intp], Real, Real, Real]:
+        """Times, pieces, displacement, velocity, acceleration on the motion's own grid."""
+        t, piece = self.motion.samples()
+        x, v, a = (self.motion.piece_derivative(t, piece, order) for order in range(3))
+        return t, piece, x, v, a
 
     def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
         stop = self.solver.builder.springs[spring]
@@ -227,7 +229,7 @@ class Orbit:
         return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
 
 
-def _summit(t: Real, values: Real, piece: NDArray[np.intp]) -> float:
+def _summit(values: Real, piece: NDArray[np.intp]) -> float:
     """Top of the parabola through the highest sample and its neighbours in the same piece."""
     k = int(values.argmax())
     if k in (0, values.size - 1) or not piece[k - 1] == piece[k] == piece[k + 1]:

@@ -1,0 +1,293 @@
+"""From a machine file to a verdict: every load case at working speed against every limit."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flipflow import __version__
+from flipflow.analyses.feasible import limit_bounds, missing_for, working_motion
+from flipflow.analyses.normal import NormalMotion
+from flipflow.analyses.operating_region import Monitor, OperatingRegion, operating_region
+from flipflow.analyses.quantities import QUANTITIES, Working
+from flipflow.methods.options import PiecewiseExact
+from flipflow.model.limits import LIMIT_FIELD
+from flipflow.model.project import Project
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.results.branch import Branch
+from flipflow.results.orbit import Orbit
+
+PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
+CLOSE = 0.05
+
+
+@dataclass(frozen=True)
+class LimitRow:
+    """One limit over all load cases.
+
+    Parameters
+    ----------
+    name, label, unit, shown_unit
+        Limit, its words, SI unit and unit to show.
+    limit
+        (least, most) in SI; infinite where there is no such end.
+    worst
+        The value nearest to or farthest beyond the limit, SI; None when not checked.
+    case
+        The load case in which it occurs.
+    margin
+        Distance from the limit as a share of the limit; negative when it is broken.
+    state
+        "pass", "attention" (met, but within 5 %), "fail" or "not checked".
+    reason
+        Why it was not checked.
+    """
+
+    name: str
+    label: str
+    unit: str
+    shown_unit: str
+    limit: tuple[float, float]
+    worst: float | None = None
+    case: str = ""
+    margin: float | None = None
+    state: str = NOT_CHECKED
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CaseAssessment:
+    """One load case at working speed.
+
+    Parameters
+    ----------
+    name, load, screen
+        The case and the screen under it.
+    branch
+        Its motions over the analysed range.
+    working
+        The motion reached from below at working speed, None without a speed.
+    orbits
+        All motions of the branch at working speed.
+    values
+        Quantities by name, SI; None where data are missing.
+    energy
+        Mean powers in W: "input" and what isolation, shear springs, stop and the normal
+        direction's isolation take.
+    """
+
+    name: str
+    load: Load
+    screen: FlipFlowScreen
+    branch: Branch
+    working: Working | None
+    orbits: tuple[Orbit, ...]
+    values: Mapping[str, float | None]
+    energy: Mapping[str, float]
+
+    @property
+    def orbit(self) -> Orbit | None:
+        """The motion at working speed."""
+        return None if self.working is None else self.working.orbit
+
+    @property
+    def normal(self) -> NormalMotion | None:
+        """The motion normal to the surface at working speed."""
+        return None if self.working is None else self.working.normal
+
+    @property
+    def stop_reached(self) -> bool:
+        """Whether a stop is touched at working speed."""
+        return self.orbit is not None and bool(self.orbit.contact_intervals)
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """A project judged: what ``flipflow analyze`` shows.
+
+    Parameters
+    ----------
+    project
+        The machine file.
+    region
+        Operating region and feasible window.
+    cases
+        Every load case at working speed.
+    omega
+        Working speed in rad/s, None where the file gives none.
+    limits_table
+        Every limit with its worst case.
+    verdict
+        One sentence.
+    notes
+        What was not checked or not finished.
+    method, version, input_hash
+        How, by which version, from which input.
+    """
+
+    project: Project
+    region: OperatingRegion
+    cases: tuple[CaseAssessment, ...]
+    omega: float | None
+    limits_table: tuple[LimitRow, ...]
+    verdict: str
+    notes: tuple[str, ...]
+    method: PiecewiseExact
+    version: str
+    input_hash: str
+
+
+def assess(project: Project, monitor: Monitor | None = None) -> Assessment:
+    """Judge a project: operating region, feasible window, every case against every limit.
+
+    Parameters
+    ----------
+    project
+        What :func:`flipflow.load_project` returns.
+    monitor
+        Called with a sentence and the share done, 0 to 1.
+    """
+    region = operating_region(project.screen, project.limits, project.load_cases, monitor)
+    cases = tuple(
+        assess_case(project.screen.loaded(load), load, branch, project.speed)
+        for load, branch in zip(project.load_cases, region.branches, strict=True)
+    )
+    rows = tuple(limit_row(project, cases, name) for name in LIMIT_FIELD)
+    return Assessment(
+        project=project,
+        region=region,
+        cases=cases,
+        omega=project.speed,
+        limits_table=rows,
+        verdict=verdict(project.speed, rows, cases),
+        notes=(*project.warnings, *region.notes),
+        method=PiecewiseExact(),
+        version=__version__,
+        input_hash=input_hash(project),
+    )
+
+
+def assess_case(
+    screen: FlipFlowScreen, load: Load, branch: Branch, omega: float | None
+) -> CaseAssessment:
+    """One load case at working speed."""
+    working = None if omega is None else working_motion(screen, branch, omega)
+    values: dict[str, float | None] = {}
+    if working is not None:
+        values = {name: quantity.evaluate(working) for name, quantity in QUANTITIES.items()}
+    return CaseAssessment(
+        name=load.name or "empty",
+        load=load,
+        screen=screen,
+        branch=branch,
+        working=working,
+        orbits=() if omega is None else branch.orbits_at(omega),
+        values=values,
+        energy={} if working is None else energy_balance(working),
+    )
+
+
+def energy_balance(working: Working) -> dict[str, float]:
+    """Mean powers in W; "input" along the surface equals isolation + shear + stop."""
+    screen, orbit = working.screen, working.orbit
+    powers = {
+        "input": orbit.input_power(),
+        "isolation": screen.isolation_damping * orbit.mean_square_velocity("main"),
+        "shear": screen.shear_damping * orbit.mean_square_velocity("relative"),
+        "stop": 0.0,
+    }
+    if screen.has_stop:
+        contact = None if screen.stop().bonded else 0
+        powers["stop"] = screen.stop_damping * orbit.mean_square_velocity("relative", contact)
+    if working.normal is not None:
+        powers["normal"] = working.normal.power
+    return powers
+
+
+def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) -> LimitRow:
+    """The worst case of one limit."""
+    quantity = QUANTITIES.get(name)
+    label = "speed" if quantity is None else quantity.label
+    unit = LIMIT_FIELD[name].unit
+    shown = LIMIT_FIELD[name].file_unit
+    if getattr(project.limits, name) is None:
+        no_limit = (-math.inf, math.inf)
+        return LimitRow(name, label, unit, shown, no_limit, reason="no limit in the machine file")
+    low, high = limit_bounds(project.limits, name)
+    row = LimitRow(name, label, unit, shown, (low, high))
+    missing = missing_for(project.screen, name)
+    if missing:
+        return dataclasses.replace(row, reason="missing: " + ", ".join(missing))
+    if project.speed is None:
+        return dataclasses.replace(row, reason="no operating speed in the machine file")
+    judged = [
+        (relative_margin(value, low, high), value, case.name)
+        for case in cases
+        if (value := project.speed if quantity is None else case.values.get(name)) is not None
+    ]
+    if not judged:
+        return dataclasses.replace(row, reason="no motion found at working speed")
+    margin, worst, case_name = min(judged, key=lambda one: one[0])
+    state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
+    return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
+
+
+def relative_margin(value: float, low: float, high: float) -> float:
+    """Distance from the nearer end as a share of that end; negative beyond it."""
+    to_low = (value - low) / abs(low) if math.isfinite(low) and low != 0.0 else math.inf
+    to_high = (high - value) / abs(high) if math.isfinite(high) and high != 0.0 else math.inf
+    return min(to_low, to_high)
+
+
+def verdict(
+    omega: float | None, rows: tuple[LimitRow, ...], cases: tuple[CaseAssessment, ...]
+) -> str:
+    """One sentence for the top of the report."""
+    if omega is None:
+        return "No operating speed is given: the allowed speed range stands below."
+    speed = f"{omega * 30.0 / math.pi:.4g} rpm"
+    lost = [case.name for case in cases if case.orbit is None or case.orbit.stability == "unstable"]
+    if lost:
+        return f"{speed}: no motion that returns after a small disturbance in {', '.join(lost)}."
+    judged = [row for row in rows if row.margin is not None]
+    unchecked = [row for row in rows if row.state == NOT_CHECKED and math.isfinite(sum(row.limit))]
+    if not judged:
+        return f"{speed}: no limit could be checked."
+    tightest = min(judged, key=lambda row: row.margin if row.margin is not None else math.inf)
+    broken = [row for row in judged if row.state == FAIL]
+    where = "in all cases" if len(cases) > 1 else "for the machine"
+    head = f"all limits met {where}; tightest"
+    if broken:
+        head = f"{len(broken)} of {len(judged)} limits broken; worst"
+    elif unchecked:
+        head = f"all limits that could be checked are met {where}; tightest"
+    return f"{speed}: {head}: {_against(tightest)}."
+
+
+def _against(row: LimitRow) -> str:
+    """"relative amplitude, full, 5.12 mm of 5 mm least"."""
+    scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / 9.80665}
+    factor = scale.get(row.shown_unit, 30.0 / math.pi if row.shown_unit == "rpm" else 1.0)
+    low, high = row.limit
+    worst = row.worst if row.worst is not None else math.nan
+    at_low = relative_margin(worst, low, math.inf) <= relative_margin(worst, -math.inf, high)
+    end, word = (low, "least") if at_low else (high, "most")
+    case = f", {row.case}" if row.name != "speed" else ""
+    unit = row.shown_unit
+    return f"{row.label}{case}, {worst * factor:.3g} {unit} of {end * factor:.3g} {unit} {word}"
+
+
+def input_hash(project: Project) -> str:
+    """Digest of all values that decide the result."""
+    inputs = {
+        "screen": dataclasses.asdict(project.screen),
+        "limits": dataclasses.asdict(project.limits),
+        "cases": [dataclasses.asdict(load) for load in project.load_cases],
+        "speed": project.speed,
+        "version": __version__,
+    }
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]

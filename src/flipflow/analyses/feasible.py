@@ -1,0 +1,216 @@
+"""Where each limit is met: speed intervals of every load case, and what binds their ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import brentq
+
+from flipflow.analyses.quantities import QUANTITIES, Working
+from flipflow.errors import IncompleteError
+from flipflow.model.limits import LIMIT_FIELD, Limits
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.results.branch import Branch
+from flipflow.results.orbit import Orbit
+
+Interval = tuple[float, float]
+Intervals = tuple[Interval, ...]
+AT_LEAST = ("jump_margin",)
+STABILITY = "stability"
+
+
+@dataclass(frozen=True)
+class CaseWindow:
+    """Speed intervals in rad/s in which each limit is met, for one load case.
+
+    Parameters
+    ----------
+    name
+        The load case.
+    intervals
+        By limit; "stability" says where the motion returns after a small disturbance.
+    unchecked
+        Limits that cannot be checked, and why.
+    """
+
+    name: str
+    intervals: Mapping[str, Intervals]
+    unchecked: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What ends an allowed interval: a limit and the load case that reaches it."""
+
+    limit: str
+    case: str
+
+
+def limit_bounds(limits: Limits, name: str) -> Interval:
+    """(least, most) of a limit in SI."""
+    value = getattr(limits, name)
+    if LIMIT_FIELD[name].interval:
+        return float(value[0]), float(value[1])
+    if name in AT_LEAST:
+        return float(value), math.inf
+    return -math.inf, float(value)
+
+
+def missing_for(screen: FlipFlowScreen, name: str) -> tuple[str, ...]:
+    """Fields a limit needs and the screen does not have."""
+    needs = {*LIMIT_FIELD[name].needs, *(QUANTITIES[name].needs if name in QUANTITIES else ())}
+    return tuple(sorted(need for need in needs if getattr(screen, need) is None))
+
+
+def case_window(
+    screen: FlipFlowScreen, load: Load, branch: Branch, limits: Limits, span: Interval
+) -> CaseWindow:
+    """Intervals of every limit over ``span`` (rad/s) on the motion reached from below."""
+    unchecked = {
+        name: "missing: " + ", ".join(missing)
+        for name in limits.given
+        if (missing := missing_for(screen, name))
+    }
+    runs = _runs(branch, screen, span)
+    intervals: dict[str, Intervals] = {
+        STABILITY: _joined([_stable_parts(run) for run in runs], span)
+    }
+    for name in limits.given:
+        if name in unchecked:
+            continue
+        low, high = limit_bounds(limits, name)
+        if name == "speed":
+            intervals[name] = intersect(((low, high),), (span,))
+            continue
+        evaluate = QUANTITIES[name].evaluate
+        parts = [_met(run, evaluate, low, high) for run in runs]
+        intervals[name] = _joined(parts, span)
+    return CaseWindow(load.name or "empty", intervals, unchecked)
+
+
+def intersect(first: Intervals, second: Intervals) -> Intervals:
+    """Common part of two lists of intervals, rising."""
+    common = [
+        (max(a, c), min(b, d)) for a, b in first for c, d in second if max(a, c) < min(b, d)
+    ]
+    return tuple(sorted(common))
+
+
+def common_window(
+    region: Interval, cases: tuple[CaseWindow, ...]
+) -> tuple[Intervals, tuple[tuple[Bound, Bound], ...]]:
+    """Intervals in which every limit is met in every case, and what binds their two ends."""
+    window: Intervals = (region,)
+    ends: dict[float, Bound] = {
+        region[0]: Bound("operating region", cases[0].name if cases else ""),
+        region[1]: Bound("operating region", cases[0].name if cases else ""),
+    }
+    for case in cases:
+        for name, intervals in case.intervals.items():
+            window = intersect(window, intervals)
+            for low, high in intervals:
+                ends.setdefault(low, Bound(name, case.name))
+                ends.setdefault(high, Bound(name, case.name))
+    return window, tuple((ends[low], ends[high]) for low, high in window)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """Rising motions of a branch, each ready to be measured."""
+
+    branch: Branch
+    screen: FlipFlowScreen
+    run: slice
+    jumps: tuple[float, ...]
+    nodes: tuple[Working, ...]
+
+    def at(self, omega: float) -> Working:
+        orbit = self.branch.solve_in(self.run, omega)
+        if orbit is None:
+            raise IncompleteError(f"no motion found at {omega:.6g} rad/s on a finished branch")
+        return Working(self.screen, orbit, self.jumps)
+
+
+def _runs(branch: Branch, screen: FlipFlowScreen, span: Interval) -> list[_Run]:
+    """The rising runs of a branch within ``span``, with motions at both ends of each."""
+    jumps = tuple(fold.omega for fold in branch.folds)
+    runs = []
+    last = -math.inf
+    for k, run in enumerate(branch.rising_path):
+        omega = branch.omega[run]
+        low, high = max(span[0], last if k else omega[0]), min(span[1], float(omega[-1]))
+        last = float(omega[-1])
+        if low >= high:
+            continue
+        inside = [i + run.start for i in np.flatnonzero((omega > low) & (omega < high))]
+        ends = [branch.solve_in(run, low), branch.solve_in(run, high)]
+        orbits = [ends[0], *(branch.orbit(i) for i in inside), ends[1]]
+        nodes = tuple(Working(screen, orbit, jumps) for orbit in orbits if orbit is not None)
+        runs.append(_Run(branch, screen, run, jumps, nodes))
+    return runs
+
+
+def _met(
+    run: _Run, evaluate: Callable[[Working], float | None], low: float, high: float
+) -> list[Interval]:
+    """Parts of a run in which low <= quantity <= high, their ends solved for."""
+
+    def clearance(value: float | None) -> float:
+        number = math.nan if value is None else min(value, 1e30)
+        return min(number - low, high - number)
+
+    values = [clearance(evaluate(node)) for node in run.nodes]
+    parts: list[Interval] = []
+    begin = run.nodes[0].omega if values[0] >= 0.0 else None
+    for k in range(1, len(values)):
+        if (values[k] >= 0.0) == (values[k - 1] >= 0.0):
+            continue
+        a, b = run.nodes[k - 1].omega, run.nodes[k].omega
+        ends = {a: values[k - 1], b: values[k]}
+
+        def height(omega: float, ends: dict[float, float] = ends) -> float:
+            return ends[omega] if omega in ends else clearance(evaluate(run.at(omega)))
+
+        root = float(brentq(height, a, b, xtol=1e-9 * b, rtol=1e-12))
+        if begin is None:
+            begin = root
+        else:
+            parts.append((begin, root))
+            begin = None
+    if begin is not None:
+        parts.append((begin, run.nodes[-1].omega))
+    return parts
+
+
+def _stable_parts(run: _Run) -> list[Interval]:
+    """Parts of a run in which the motion is not unstable."""
+    parts: list[Interval] = []
+    for one, two in zip(run.nodes, run.nodes[1:], strict=False):
+        if "unstable" in (one.orbit.stability, two.orbit.stability):
+            continue
+        if parts and parts[-1][1] == one.omega:
+            parts[-1] = (parts[-1][0], two.omega)
+        else:
+            parts.append((one.omega, two.omega))
+    return parts
+
+
+def _joined(parts: list[list[Interval]], span: Interval) -> Intervals:
+    """Intervals of all runs within ``span``, those that touch joined."""
+    joined: list[Interval] = []
+    for low, high in sorted(part for run in parts for part in run):
+        if joined and low <= joined[-1][1] * (1.0 + 1e-12):
+            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
+        else:
+            joined.append((low, high))
+    return intersect(tuple(joined), (span,))
+
+
+def working_motion(screen: FlipFlowScreen, branch: Branch, omega: float) -> Working | None:
+    """The motion reached from below at ``omega``, None where the branch does not cover it."""
+    orbit: Orbit | None = branch.orbit_from_below(omega)
+    jumps = tuple(fold.omega for fold in branch.folds)
+    return None if orbit is None else Working(screen, orbit, jumps)

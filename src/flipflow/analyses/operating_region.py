@@ -1,0 +1,171 @@
+"""Where a screen may run: the paper's region, and the window in which all limits are met."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from flipflow.analyses.feasible import Bound, CaseWindow, Intervals, case_window, common_window
+from flipflow.analyses.frequency_response import frequency_response
+from flipflow.analyses.linear import (
+    antiresonance_frequency,
+    bonded_natural_frequencies,
+    equal_amplitude_frequency,
+    linear_response,
+)
+from flipflow.errors import InputError
+from flipflow.methods.special import CONTACT_BEGIN
+from flipflow.model.limits import Limits
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.results.branch import Branch
+
+Monitor = Callable[[str, float], None]
+LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
+
+
+@dataclass(frozen=True, eq=False)
+class OperatingRegion:
+    """Characteristic frequencies of a screen and where it may run; all in rad/s.
+
+    Parameters
+    ----------
+    screen
+        The empty machine.
+    branch
+        Its motions over :func:`analysed_range`.
+    omega_ea, omega_ar
+        w_ea and w_ar: equal amplitudes, antiresonance of the main frame.
+    omega_cs
+        w_cs: contact begins, the last rising one before the main peak; None if it never does.
+    omega_lb, omega_ub
+        The two saddle-nodes of the main resonance; None without folds.
+    lower, upper
+        The paper's operating region: [w_cs, w_lb] with a stop that is reached (without folds up
+        to the peak of the relative amplitude), else [w_ea, w_ar].
+    feasible
+        Intervals of that region in which every limit is met in every load case.
+    binding
+        What ends each of them below and above.
+    cases
+        Per load case, the intervals of each limit by itself.
+    branches
+        Per load case, the motions.
+    notes
+        What was not checked, and why.
+    """
+
+    screen: FlipFlowScreen
+    branch: Branch
+    omega_ea: float | None
+    omega_ar: float | None
+    omega_cs: float | None
+    omega_lb: float | None
+    omega_ub: float | None
+    lower: float
+    upper: float
+    feasible: Intervals
+    binding: tuple[tuple[Bound, Bound], ...]
+    cases: tuple[CaseWindow, ...]
+    branches: tuple[Branch, ...]
+    notes: tuple[str, ...]
+
+
+def operating_region(
+    screen: FlipFlowScreen,
+    limits: Limits | None = None,
+    load_cases: Sequence[Load] = (),
+    monitor: Monitor | None = None,
+) -> OperatingRegion:
+    """The operating region of a screen and its feasible window over all load cases.
+
+    Parameters
+    ----------
+    screen
+        The empty machine.
+    limits
+        What it may do; None or a limit at None does not narrow the window.
+    load_cases
+        Loads under which the limits must hold; the empty machine where none is given.
+    monitor
+        Called with a sentence and the share done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        For anything but a screen, whose frames the region speaks of.
+    """
+    if not isinstance(screen, FlipFlowScreen):
+        raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
+    say = monitor or (lambda _sentence, _share: None)
+    loads = tuple(load_cases) or (Load(name="empty"),)
+    span = analysed_range(screen)
+    say("empty machine", 0.0)
+    branch = frequency_response(screen, span)
+    wanted = limits or Limits()
+    window = wanted.speed if wanted.speed is not None else span
+    within = (max(window[0], span[0]), min(window[1], span[1]))
+    cases, branches = [], []
+    for k, load in enumerate(loads):
+        say(load.name or f"load case {k + 1}", (k + 1) / (len(loads) + 1))
+        loaded = screen.loaded(load)
+        own = branch if loaded == screen else frequency_response(loaded, span)
+        branches.append(own)
+        cases.append(case_window(loaded, load, own, wanted, within))
+    marks = _landmarks(screen, branch)
+    feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
+    notes = {f"{name}: {why}" for case in cases for name, why in case.unchecked.items()}
+    incomplete = [f"{b.status.value}" for b in branches if not b.complete]
+    return OperatingRegion(
+        screen, branch, *marks.frequencies, marks.lower, marks.upper, feasible, binding,
+        tuple(cases), tuple(branches), (*sorted(notes), *incomplete, *marks.notes),
+    )  # fmt: skip
+
+
+def analysed_range(screen: FlipFlowScreen) -> tuple[float, float]:
+    """From well below the first natural frequency to well above the last with stops engaged."""
+    first = float(linear_response(screen, 1.0).natural_frequencies[0])
+    return LOWEST_SHARE * first, HIGHEST_SHARE * float(bonded_natural_frequencies(screen)[-1])
+
+
+@dataclass(frozen=True)
+class _Landmarks:
+    frequencies: tuple[float | None, float | None, float | None, float | None, float | None]
+    lower: float
+    upper: float
+    notes: tuple[str, ...] = ()
+
+
+def _landmarks(screen: FlipFlowScreen, branch: Branch) -> _Landmarks:
+    """w_ea, w_ar, w_cs, w_lb, w_ub and the region between them."""
+    effective = _bonded(screen)
+    ea, ar = equal_amplitude_frequency(effective), antiresonance_frequency(effective)
+    peak = branch.peak("relative")
+    begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.omega < peak.omega]
+    cs = begins[-1] if begins else None
+    lb, ub = _main_folds(branch)
+    span = (float(branch.omega.min()), float(branch.omega.max()))
+    if cs is None:
+        notes = ("The stop is not reached at any speed analysed.",) if screen.has_stop else ()
+        notes = () if effective is not screen else notes
+        return _Landmarks((ea, ar, cs, lb, ub), ea or span[0], ar or span[1], notes)
+    return _Landmarks((ea, ar, cs, lb, ub), cs, peak.omega if lb is None else lb)
+
+
+def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
+    """A screen without gap on either side has one stiffer shear spring."""
+    if not (screen.has_stop and screen.stop().bonded):
+        return screen
+    return screen.replace(
+        shear_stiffness=screen.shear_stiffness + screen.stop_stiffness,
+        shear_damping=screen.shear_damping + screen.stop_damping,
+    )
+
+
+def _main_folds(branch: Branch) -> tuple[float | None, float | None]:
+    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next."""
+    folds = branch.folds
+    if len(folds) < 2:
+        return None, None
+    first = max(range(len(folds) - 1), key=lambda k: folds[k].amplitude("relative"))
+    pair = (folds[first].omega, folds[first + 1].omega)
+    return min(pair), max(pair)
