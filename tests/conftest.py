@@ -1,0 +1,40 @@
+"""What many tests share: the bundled machine, and branches followed once a session."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import pytest
+
+import flipflow as ff
+from flipflow.results.branch import Branch
+
+LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
+
+
+@pytest.fixture(scope="session")
+def screen() -> ff.FlipFlowScreen:
+    """FFS0827 with stop, as bundled."""
+    return ff.load("ffs0827")
+
+
+@pytest.fixture(scope="session")
+def response(screen: ff.FlipFlowScreen) -> Callable[..., Branch]:
+    """``response(method, omega, **changes)``: the branch of FFS0827 with fields changed."""
+
+    @functools.cache
+    def followed(
+        method: ff.PiecewiseExact | ff.HarmonicBalance | None = None,
+        omega: tuple[float, float] = (5.0, 250.0),
+        **changes: float,
+    ) -> Branch:
+        return ff.frequency_response(screen.replace(**changes), omega, method)
+
+    return followed
+
+
+@pytest.fixture(scope="session")
+def exact(response: Callable[..., Branch]) -> Branch:
+    """The exact branch of FFS0827, 5 to 250 rad/s."""
+    return response()
