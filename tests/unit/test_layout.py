@@ -86,6 +86,11 @@ def test_public_name_can_be_loaded(name):
     assert getattr(flipflow, name).__doc__
 
 
+def test_every_public_name_stands_in_the_documentation():
+    listed = (ROOT / "docs/api/index.md").read_text(encoding="utf-8").split()
+    assert set(flipflow._HOME) <= set(listed)
+
+
 def test_unknown_name_is_refused():
     with pytest.raises(AttributeError, match="frequency_respons"):
         flipflow.frequency_respons  # noqa: B018

@@ -1,0 +1,78 @@
+"""Configuration of the documentation: everything is made at build time, nothing fetched later."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+import flipflow
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+# Cells that run a command find it beside the interpreter that builds these pages.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+
+project = "flipflow"
+author = "The flipflow developers"
+copyright = "The flipflow developers"
+version = release = flipflow.__version__
+
+extensions = [
+    "svgmath",
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+]
+exclude_patterns = ["_build", "jupyter_execute"]
+templates_path = ["_templates"]
+
+# Mathematics: pictures drawn at build time.
+html_math_renderer = "svg"
+myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_heading_anchors = 3
+
+# Notebooks: run anew at every build; a cell that fails ends it.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_in_temp = True
+nb_merge_streams = True
+nb_execution_timeout = 150
+nb_ipywidgets_js = {}
+
+# The public face.
+autosummary_generate = True
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_attr_annotations = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = "flipflow"
+html_static_path = ["_static"]
+html_sidebars = {page: [] for page in ("index", "conventions", "why-exact", "tutorials/*")}
+html_css_files = ["flipflow.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "show_prev_next": False,
+    "navbar_end": ["theme-switcher"],
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+
+
+def bars_are_moduli(
+    _app: Sphinx, _what: str, _name: str, _obj: object, _options: object, lines: list[str]
+) -> None:
+    """Keep |x| in a docstring from being read as a reference to a substitution."""
+    lines[:] = [re.sub(r"(?<!\\)\|", r"\\|", line) for line in lines]
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what this configuration adds to Sphinx."""
+    app.connect("autodoc-process-docstring", bars_are_moduli)
