@@ -35,7 +35,11 @@ __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
+    from flipflow.analyses.assessment import assess as assess
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
+    from flipflow.analyses.linear import linear_response as linear_response
+    from flipflow.analyses.operating_region import operating_region as operating_region
+    from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
