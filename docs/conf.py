@@ -66,13 +66,26 @@ html_theme_options = {
 }
 
 
-def bars_are_moduli(
-    _app: Sphinx, _what: str, _name: str, _obj: object, _options: object, lines: list[str]
+properties: dict[str, list[str]] = {}
+
+
+def keep_property(
+    _app: Sphinx, what: str, name: str, _obj: object, _options: object, lines: list[str]
 ) -> None:
-    """Keep |x| in a docstring from being read as a reference to a substitution."""
+    """Set a property's docstring aside: napoleon would read what precedes a colon as a type."""
+    if what == "property":
+        properties[name] = list(lines)
+
+
+def restore_and_escape(
+    _app: Sphinx, _what: str, name: str, _obj: object, _options: object, lines: list[str]
+) -> None:
+    """Put it back, and keep |x| from being read as a reference to a substitution."""
+    lines[:] = properties.pop(name, lines)
     lines[:] = [re.sub(r"(?<!\\)\|", r"\\|", line) for line in lines]
 
 
 def setup(app: Sphinx) -> None:
-    """Connect what this configuration adds to Sphinx."""
-    app.connect("autodoc-process-docstring", bars_are_moduli)
+    """Connect what this configuration adds to Sphinx, around napoleon's priority of 500."""
+    app.connect("autodoc-process-docstring", keep_property, priority=400)
+    app.connect("autodoc-process-docstring", restore_and_escape, priority=600)
