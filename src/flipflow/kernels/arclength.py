@@ -17,7 +17,7 @@ from flipflow.kernels.problem import residual, signature, unknown_scale
 
 NEWTON_MOST = 8
 NEWTON_FEW, NEWTON_MANY = 3, 5
-CONVERGED = 1e-8
+QUICK, SHARP = 1e-6, 1e-10
 GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
 LONGEST, SHORTEST = 1.0, 1e-7
 TURN_MOST = 0.90
@@ -46,6 +46,7 @@ class Course(NamedTuple):
     omega_step: float  # longest step in omega, rad/s
     u_step: float  # longest step in the unknowns, as a share of their size
     direction: float  # +1 or -1: sign of d omega at the start
+    tolerance: float  # last Newton step, in steps; the error left is about its square
 
 
 class Corrector(NamedTuple):
@@ -87,7 +88,7 @@ def bordered(work: Corrector) -> bool:
 
 
 @kernel(inline=True)
-def correct(problem: Any, work: Corrector) -> tuple[int, int]:
+def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     """Newton from work.guess within the plane through it normal to work.border (scaled).
 
     The plane omega = constant has the border (0, ..., 0, 1). Returns status and iterations; the
@@ -118,7 +119,7 @@ def correct(problem: Any, work: Corrector) -> tuple[int, int]:
         length = math.sqrt(length)
         if not length < 1e3:
             return status.NO_CONVERGENCE, iteration
-        if length < CONVERGED:
+        if length < tolerance:
             return status.OK, iteration
     return status.NO_CONVERGENCE, NEWTON_MOST
 
@@ -240,7 +241,7 @@ def trace(
         if p > 0:
             step = min(length, 0.999 / max(abs(work.before[n]), 1e-3))
             ends = predict(work, branch, p - 1, step, course)
-        code, iterations = correct(problem, work)
+        code, iterations = correct(problem, work, course.tolerance)
         if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
             return code, p
         reason = judge(problem, work, branch, max(p - 1, 0), step, code, course)
@@ -286,7 +287,7 @@ def correct_between(
     for k in range(n + 1):
         work.border[k] /= math.sqrt(norm)
         work.before[k] = work.border[k]
-    code, _ = correct(problem, work)
+    code, _ = correct(problem, work, SHARP)
     if code != status.OK:
         return code
     new_tangent(work)

@@ -30,7 +30,7 @@ from flipflow.kernels.gapmotion import (
     exponentials,
     gap_state,
     next_change,
-    push_state,
+    reciprocal,
 )
 from flipflow.kernels.plan import Complex, Int, Plan, Real
 
@@ -107,11 +107,11 @@ def prepare_receptance(problem: Balance, omega: float) -> None:
                 slope = 0j
                 for i in range(plan.count[0]):
                     share = plan.gap_shape[0, j, i] * plan.gap_pick[i, c]
-                    gap = 1.0 / (1j * h * omega - plan.rate[0, i])
+                    gap = reciprocal(1j * (h * omega) - plan.rate[0, i])
                     total += share * gap
                     slope -= 1j * h * share * gap * gap
                     if plan.weight[0, i] == 2.0:
-                        gap = 1.0 / (1j * h * omega - plan.rate[0, i].conjugate())
+                        gap = reciprocal(1j * (h * omega) - plan.rate[0, i].conjugate())
                         total += share.conjugate() * gap
                         slope -= 1j * h * share.conjugate() * gap * gap
                 problem.receptance[a, j, c] = total
@@ -125,7 +125,7 @@ def series_contact_state(problem: Balance) -> None:
     count = problem.motion.rate.shape[0]
     exponentials(problem.motion, count, 0.0)
     for j in range(problem.linear.shape[0]):
-        y, v, _ = gap_state(problem.motion, count, j)
+        y, v = gap_state(problem.motion, count, j)
         side = 0
         if y > contact.gap_plus[j]:
             side = 1
@@ -239,7 +239,7 @@ def _add_edge(problem: Balance, j: int, theta: float, sign: float, side: int) ->
     most = problem.integral.shape[1]
     count = problem.motion.rate.shape[0]
     exponentials(problem.motion, count, theta)
-    y, _, _ = gap_state(problem.motion, count, j)
+    y, _ = gap_state(problem.motion, count, j)
     contact = problem.flow.contact
     depth = y - contact.gap_plus[j] if side > 0 else y + contact.gap_minus[j]
     for k in range(-(most - 1), most):

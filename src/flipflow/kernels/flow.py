@@ -26,6 +26,7 @@ from flipflow.kernels.gapmotion import (
     GapMotion,
     exponential,
     next_change,
+    reciprocal,
 )
 from flipflow.kernels.plan import Complex, Int, Plan, Real
 
@@ -85,30 +86,39 @@ def set_contact_state(plan: Plan, z: Real, state: NDArray[np.int64]) -> None:
 
 @kernel
 def prepare_drive(plan: Plan, flow: Flow, slot: int, omega: float) -> None:
-    """drive = (i omega - A)^-1 (0, M^-1 F(omega)) by modes, and its derivative in omega."""
+    """drive = (i omega - A)^-1 (0, M^-1 F(omega)) by modes, and its derivative in omega.
+
+    Only displacements are summed; the velocities are i omega times them.
+    """
     if flow.driven_at[slot] == omega:
         return
-    size = flow.z.shape[0]
+    n = plan.direction.shape[1]
     scale = omega**plan.power
     scale_slope = plan.power * omega ** (plan.power - 1) if plan.power > 0 else 0.0
-    for k in range(size):
+    for k in range(n):
         flow.drive[slot, k] = 0.0
         flow.drive_slope[slot, k] = 0.0
     for i in range(plan.count[slot]):
-        gap = 1.0 / (1j * omega - plan.rate[slot, i])
+        gap = reciprocal(1j * omega - plan.rate[slot, i])
         plain = plan.force[slot, i] * gap
         plain_slope = plain * (scale_slope - 1j * scale * gap)
-        gap_conj = 1.0 / (1j * omega - plan.rate[slot, i].conjugate())
-        conj = plan.force_conj[slot, i] * gap_conj
-        conj_slope = conj * (scale_slope - 1j * scale * gap_conj)
+        plain *= scale
+        gap = reciprocal(1j * omega - plan.rate[slot, i].conjugate())
+        conj = plan.force_conj[slot, i] * gap
+        conj_slope = conj * (scale_slope - 1j * scale * gap)
+        conj *= scale
         pair = plan.weight[slot, i] == 2.0
-        for k in range(size):
+        for k in range(n):
             v = plan.right[slot, k, i]
-            flow.drive[slot, k] += v * plain * scale
+            flow.drive[slot, k] += v * plain
             flow.drive_slope[slot, k] += v * plain_slope
             if pair:
-                flow.drive[slot, k] += v.conjugate() * conj * scale
+                flow.drive[slot, k] += v.conjugate() * conj
                 flow.drive_slope[slot, k] += v.conjugate() * conj_slope
+    for k in range(n):
+        x, slope = flow.drive[slot, k], flow.drive_slope[slot, k]
+        flow.drive[slot, n + k] = 1j * omega * x
+        flow.drive_slope[slot, n + k] = 1j * (x + omega * slope)
     flow.driven_at[slot] = omega
 
 
@@ -118,41 +128,31 @@ def begin_segment(plan: Plan, flow: Flow, e: int, slot: int, omega: float, t: fl
     size = flow.z.shape[0]
     n = size // 2
     count = plan.count[slot]
-    turn = exponential(1j * omega * t)
+    turn = exponential(1j * (omega * t))
     flow.slot[e] = slot
     flow.start[e] = t
-    for j in range(flow.state.shape[0]):
-        flow.states[e, j] = flow.state[j]
     for i in range(count):
-        q = 0j
-        for k in range(size):
-            steady = plan.rest[slot, k] + (flow.drive[slot, k] * turn).real
-            q += plan.left[slot, i, k] * (flow.z[k] - steady)
-        flow.modes[e, i] = q
-    gap_segment(plan, flow, e, omega)
-    flow.motion.rate[count] = 1j * omega
+        flow.modes[e, i] = 0.0
+    for k in range(size):
+        drive = flow.drive[slot, k]
+        steady = plan.rest[slot, k] + drive.real * turn.real - drive.imag * turn.imag
+        free = flow.z[k] - steady
+        for i in range(count):
+            flow.modes[e, i] += plan.left[slot, i, k] * free
     for i in range(count):
         flow.motion.rate[i] = plan.rate[slot, i]
+    flow.motion.rate[count] = 1j * omega
     for j in range(flow.state.shape[0]):
-        flow.motion.offset[j] = 0.0
-        for k in range(n):
-            flow.motion.offset[j] += plan.direction[j, k] * plan.rest[slot, k]
-
-
-@kernel
-def gap_segment(plan: Plan, flow: Flow, e: int, omega: float) -> None:
-    """Amplitudes of the recorded segment e at the gaps, the drive as the last term."""
-    slot = flow.slot[e]
-    count = plan.count[slot]
-    turn = exponential(1j * omega * flow.start[e])
-    n = plan.direction.shape[1]
-    for j in range(plan.direction.shape[0]):
+        flow.states[e, j] = flow.state[j]
         for i in range(count):
-            shape = plan.gap_shape[slot, j, i]
-            flow.motion.amplitude[j, i] = plan.weight[slot, i] * shape * flow.modes[e, i]
+            seen = plan.weight[slot, i] * plan.gap_shape[slot, j, i]
+            flow.motion.amplitude[j, i] = seen * flow.modes[e, i]
+        offset = 0.0
         driven = 0j
         for k in range(n):
+            offset += plan.direction[j, k] * plan.rest[slot, k]
             driven += plan.direction[j, k] * flow.drive[slot, k]
+        flow.motion.offset[j] = offset
         flow.motion.amplitude[j, count] = driven * turn
 
 
@@ -162,7 +162,7 @@ def segment_state(
 ) -> None:
     """State z and its time derivative, ``elapsed`` after the start of segment e."""
     slot = flow.slot[e]
-    turn = exponential(1j * omega * (flow.start[e] + elapsed))
+    turn = exponential(1j * (omega * (flow.start[e] + elapsed)))
     for k in range(z.shape[0]):
         steady = flow.drive[slot, k] * turn
         z[k] = plan.rest[slot, k] + steady.real
@@ -250,7 +250,7 @@ def carry_tangent(
 
 @kernel
 def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, sign: float, U: Real) -> None:
-    turn = exponential(1j * omega * t)
+    turn = exponential(1j * (omega * t))
     last = U.shape[1] - 1
     for k in range(U.shape[0]):
         slope = (flow.drive_slope[slot, k] + 1j * t * flow.drive[slot, k]) * turn

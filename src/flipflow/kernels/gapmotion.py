@@ -4,10 +4,12 @@ Both a free flight of the exact flow and a truncated Fourier series are, at gap 
 
     y_j(t) = offset_j + Re sum_i amplitude_ji exp(rate_i t),
 
-so one search serves both. With a bound |y''| <= B on all that is still to come, a switching
+so one search serves both. With a bound |h''| <= B on all that is still to come, a switching
 function of value h > 0 and slope h' cannot vanish before the positive root of
 h + h' s - B s^2 / 2. Stepping to that root again and again converges to the first zero and can
-never jump over one, nor over two close together.
+never jump over one, nor over two close together. With a bound B3 on the third derivative besides,
+the curvature over the next S seconds is known to stay above h'' - B3 S, which close to a zero is
+a far smaller B: the search then converges like the third power.
 """
 
 from __future__ import annotations
@@ -35,6 +37,10 @@ class GapMotion(NamedTuple):
     amplitude: Complex  # (m, r)
     rate: Complex  # (r,)
     factor: Complex  # (r,) exp(rate t), filled by ``exponentials``
+    decay: Real  # (r,) its size
+    curve: Complex  # (m, r) amplitude rate^2, filled by ``prepare_search``
+    bound: Real  # (m, r) its size
+    size: Real  # (r,) |rate|
     spacing: Int  # (1,) 0: any rates; s > 0: rates are i (r_0, r_0 + s, r_0 + 2 s, ...)
 
 
@@ -56,60 +62,119 @@ def exponential(x: complex) -> complex:
 
 
 @kernel
-def exponentials(motion: GapMotion, count: int, t: float) -> None:
-    """factor_i = exp(rate_i t), by powers where the rates are equally spaced."""
-    if motion.spacing[0] > 0:
-        motion.factor[0] = exponential(motion.rate[0] * t)
-        ratio = exponential(1j * motion.spacing[0] * t)
-        for i in range(1, count):
-            motion.factor[i] = motion.factor[i - 1] * ratio
-    else:
-        for i in range(count):
-            motion.factor[i] = exponential(motion.rate[i] * t)
+def modulus(x: complex) -> float:
+    """|x| without the care for overflow that makes abs() slow."""
+    return math.sqrt(x.real * x.real + x.imag * x.imag)
 
 
 @kernel
-def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float, float]:
-    """y, y' and a bound on |y''| from now on, at the time of the last ``exponentials``."""
+def reciprocal(x: complex) -> complex:
+    """1 / x without the care for overflow that makes complex division slow."""
+    square = x.real * x.real + x.imag * x.imag
+    return complex(x.real / square, -x.imag / square)
+
+
+@kernel
+def prepare_search(motion: GapMotion, count: int) -> None:
+    """Fill what the search needs beside the amplitudes."""
+    for i in range(count):
+        motion.size[i] = modulus(motion.rate[i])
+    for j in range(motion.offset.shape[0]):
+        for i in range(count):
+            motion.curve[j, i] = motion.amplitude[j, i] * motion.rate[i] * motion.rate[i]
+            motion.bound[j, i] = modulus(motion.amplitude[j, i]) * motion.size[i] * motion.size[i]
+
+
+@kernel
+def exponentials(motion: GapMotion, count: int, t: float) -> None:
+    """factor_i = exp(rate_i t) and its size, by powers where the rates are equally spaced."""
+    if motion.spacing[0] > 0:
+        motion.factor[0] = exponential(motion.rate[0] * t)
+        motion.decay[0] = 1.0
+        ratio = exponential(1j * (motion.spacing[0] * t))
+        for i in range(1, count):
+            motion.factor[i] = motion.factor[i - 1] * ratio
+            motion.decay[i] = 1.0
+    else:
+        for i in range(count):
+            size = math.exp(motion.rate[i].real * t) if motion.rate[i].real != 0.0 else 1.0
+            angle = motion.rate[i].imag * t
+            motion.factor[i] = complex(size * math.cos(angle), size * math.sin(angle))
+            motion.decay[i] = size
+
+
+@kernel
+def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float]:
+    """y and y' at the time of the last ``exponentials``."""
     y = motion.offset[j]
-    rate_of_y = 0.0
-    bound = 0.0
+    v = 0.0
     for i in range(count):
         term = motion.amplitude[j, i] * motion.factor[i]
-        slope = term * motion.rate[i]
         y += term.real
-        rate_of_y += slope.real
-        bound += abs(slope) * abs(motion.rate[i])
-    return y, rate_of_y, bound
+        v += term.real * motion.rate[i].real - term.imag * motion.rate[i].imag
+    return y, v
+
+
+@kernel
+def gap_bounds(motion: GapMotion, count: int, j: int) -> tuple[float, float, float]:
+    """y'', and bounds on the second and third derivative from now on."""
+    curvature = 0.0
+    second = 0.0
+    third = 0.0
+    for i in range(count):
+        term = motion.curve[j, i] * motion.factor[i]
+        curvature += term.real
+        share = motion.bound[j, i] * motion.decay[i]
+        second += share
+        third += share * motion.size[i]
+    return curvature, second, third
 
 
 @kernel
 def push_state(
     motion: GapMotion, contact: Contact, count: int, j: int, gap: float
-) -> tuple[float, float, float]:
-    """The unclipped force k (y - gap) + c y', its rate, and a bound on its second derivative."""
+) -> tuple[float, float, float, float, float]:
+    """The unclipped force k (y - gap) + c y': value, rate, curvature, bounds on what comes."""
     k, c = contact.stiffness[j], contact.damping[j]
     force = k * (motion.offset[j] - gap)
     slope = 0.0
-    bound = 0.0
+    curvature = 0.0
+    second = 0.0
+    third = 0.0
     for i in range(count):
         term = motion.amplitude[j, i] * motion.factor[i] * (k + c * motion.rate[i])
         force += term.real
         term *= motion.rate[i]
         slope += term.real
-        bound += abs(term) * abs(motion.rate[i])
-    return force, slope, bound
+        term *= motion.rate[i]
+        curvature += term.real
+        size = modulus(term)
+        second += size
+        third += size * motion.size[i]
+    return force, slope, curvature, second, third
 
 
 @kernel
-def first_root_bound(h: float, slope: float, bound: float) -> float:
-    """No zero of h comes before this time: the positive root of h + slope s - bound s^2 / 2."""
-    if bound <= 0.0:
-        return -h / slope if slope < 0.0 else math.inf
-    root = math.sqrt(slope * slope + 2.0 * bound * max(h, 0.0))
-    if slope >= 0.0:
-        return (slope + root) / bound
-    return 2.0 * max(h, 0.0) / (root - slope)
+def root_of_bound(h: float, slope: float, bound: float) -> float:
+    """Least s > 0 with h + slope s - bound s^2 / 2 = 0, infinite where there is none."""
+    inside = slope * slope + 2.0 * bound * h
+    if inside < 0.0:
+        return math.inf
+    root = math.sqrt(inside)
+    if slope < 0.0:
+        return 2.0 * h / (root - slope)
+    return (slope + root) / bound if bound > 0.0 else math.inf
+
+
+@kernel
+def safe_step(h: float, slope: float, curvature: float, second: float, third: float) -> float:
+    """No zero of h comes before this time; second and third bound its derivatives from now on."""
+    h = max(h, 0.0)
+    certain = root_of_bound(h, slope, second)
+    reach = root_of_bound(h, slope, -curvature)
+    if reach > 8.0 * certain:
+        reach = 4.0 * certain
+    return max(certain, min(reach, root_of_bound(h, slope, third * reach - curvature)))
 
 
 @kernel
@@ -129,32 +194,40 @@ def next_change(
     """
     t = 0.0
     m = state.shape[0]
+    prepare_search(motion, count)
     for _ in range(MAX_SEARCH):
         exponentials(motion, count, t)
         step = math.inf
         for j in range(m):
-            y, v, bound = gap_state(motion, count, j)
+            y, v = gap_state(motion, count, j)
+            a, second, third = gap_bounds(motion, count, j)
             scale = abs(y) + abs(motion.offset[j])
             low, new = math.inf, NOTHING
             if state[j] == OPEN:
                 if contact.gap_plus[j] < math.inf:
-                    low, new = _approach(contact.gap_plus[j] - y, -v, bound, scale, PLUS)
+                    low, new = _approach(
+                        contact.gap_plus[j] - y, -v, -a, second, third, scale, PLUS
+                    )
                 if contact.gap_minus[j] < math.inf:
-                    other, side = _approach(y + contact.gap_minus[j], v, bound, scale, MINUS)
+                    other, side = _approach(
+                        y + contact.gap_minus[j], v, a, second, third, scale, MINUS
+                    )
                     if side != NOTHING or (new == NOTHING and other < low):
                         low, new = other, side
             else:
                 side = 1.0 if state[j] > 0 else -1.0
                 gap = contact.gap_plus[j] if side > 0 else -contact.gap_minus[j]
                 if abs(state[j]) == 2 or contact.clipped[j] == 0:
-                    low, new = _approach(side * (y - gap), side * v, bound, scale, OPEN)
+                    low, new = _approach(
+                        side * (y - gap), side * v, side * a, second, third, scale, OPEN
+                    )
                 if contact.clipped[j] == 1:
-                    force, slope, push_bound = push_state(motion, contact, count, j, gap)
+                    force, slope, bend, low2, low3 = push_state(motion, contact, count, j, gap)
                     sign = side if abs(state[j]) == 1 else -side
                     target = 2 * state[j] if abs(state[j]) == 1 else state[j] // 2
                     push_scale = contact.stiffness[j] * scale + contact.damping[j] * abs(v)
                     other, change = _approach(
-                        sign * force, sign * slope, push_bound, push_scale, target
+                        sign * force, sign * slope, sign * bend, low2, low3, push_scale, target
                     )
                     if change != NOTHING or (new == NOTHING and other < low):
                         low, new = other, change
@@ -168,30 +241,35 @@ def next_change(
 
 
 @kernel
-def _approach(h: float, slope: float, bound: float, scale: float, target: int) -> tuple[float, int]:
+def _approach(
+    h: float, slope: float, curvature: float, second: float, third: float, scale: float, target: int
+) -> tuple[float, int]:
     """Safe step towards the zero of h, and ``target`` once it is there and h still falls."""
     if h <= AT_GAP * scale and slope < 0.0:
         return 0.0, target
-    return first_root_bound(h, slope, bound), NOTHING
+    return safe_step(h, slope, curvature, second, third), NOTHING
 
 
 @kernel
 def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[float, float]:
     """Smallest and largest y_j over [0, duration]: its ends and every zero of y' between samples.
 
-    The samples stand half a radian of the fastest mode apart; between two of them a pair of zeros
-    could hide only an extreme that differs from a sample by less than the search resolves.
+    The samples stand a third of a radian apart at the mean frequency of the motion; a pair of
+    zeros between two of them could hide only a ripple smaller than what the samples resolve.
     """
-    fastest = 0.0
+    weight = 0.0
     for i in range(count):
-        fastest = max(fastest, abs(motion.rate[i]))
-    samples = min(4 + int(2.0 * fastest * duration), 4000)
+        weight += modulus(motion.amplitude[j, i])
+    exponentials(motion, count, 0.0)
+    _, second, _ = gap_bounds(motion, count, j)
+    frequency = math.sqrt(second / weight) if weight > 0.0 else 0.0
+    samples = min(4 + int(3.0 * frequency * duration), 4000)
     low, high = math.inf, -math.inf
     t_before, v_before = 0.0, 0.0
     for k in range(samples + 1):
         t = duration * k / samples
         exponentials(motion, count, t)
-        y, v, _ = gap_state(motion, count, j)
+        y, v = gap_state(motion, count, j)
         low, high = min(low, y), max(high, y)
         if k > 0 and v * v_before < 0.0:
             y = _stationary_value(motion, count, j, t_before, t, v_before)
@@ -209,11 +287,8 @@ def _stationary_value(
     y = 0.0
     for _ in range(60):
         exponentials(motion, count, t)
-        y, v, _ = gap_state(motion, count, j)
-        curvature = 0.0
-        for i in range(count):
-            term = motion.amplitude[j, i] * motion.factor[i]
-            curvature += (term * motion.rate[i] * motion.rate[i]).real
+        y, v = gap_state(motion, count, j)
+        curvature, _, _ = gap_bounds(motion, count, j)
         if v * v_a > 0.0:
             a = t
         else:
@@ -221,7 +296,7 @@ def _stationary_value(
         new = t - v / curvature if curvature != 0.0 else 0.5 * (a + b)
         if not a < new < b:
             new = 0.5 * (a + b)
-        if abs(new - t) < 1e-9 * (abs(t) + b - a):
+        if abs(new - t) < 1e-8 * (abs(t) + b - a):
             break
         t = new
     return y

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 
 from flipflow.kernels import status
-from flipflow.kernels.balance import Balance, contact_forces, contact_integrals, prepare_receptance
-from flipflow.kernels.balance import record_contacts, set_series
+from flipflow.kernels.balance import (
+    Balance,
+    contact_forces,
+    contact_integrals,
+    prepare_receptance,
+    record_contacts,
+    set_series,
+)
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_solve
 from flipflow.kernels.flow import carry_tangent, run_flow, segment_state
-from flipflow.kernels.gapmotion import GapMotion, exponential, extremes
+from flipflow.kernels.gapmotion import GapMotion, exponential, extremes, prepare_search
 from flipflow.kernels.plan import Complex, Int, Real
 from flipflow.kernels.shooting import Shooting, shooting_residual
-
 
 ROUNDING = 1e-12
 
@@ -56,6 +61,7 @@ def observe_flow(
         for e in range(flow.segments[0]):
             _coordinate_segment(problem, e, omega[p], coordinate, motion)
             count = plan.count[flow.slot[e]] + 1
+            prepare_search(motion, count)
             for g in range(coordinate.shape[0]):
                 smallest, largest = extremes(motion, count, g, flow.length[e])
                 low[p, g] = min(low[p, g], smallest)
@@ -125,6 +131,7 @@ def observe_series(
             motion.offset[0] = offset[p, g]
             for i in range(count):
                 motion.amplitude[0, i] = amplitude[p, g, i]
+            prepare_search(motion, count)
             low[p, g], high[p, g] = extremes(motion, count, 0, 2.0 * math.pi)
 
 

@@ -1,7 +1,7 @@
 """What every problem offers to the arc-length loop: residual, signature, scale.
 
 Dispatch is by problem type at compile time. A compiled function handed over as an argument would
-be compiled anew in every process.
+be compiled anew in every process. The plain functions serve where compiling is switched off.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ _SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale}
 
 def residual(problem: Any, u: Real, omega: float, r: Real, J: Real) -> int:
     """Write the residual r(u, omega) and J = [dr/du, dr/d omega]; return a status."""
-    raise NotImplementedError
+    return int(_RESIDUAL[type(problem)](problem, u, omega, r, J))
 
 
 def signature(problem: Any) -> int:
     """A number that changes when the contacts of the last residual's motion change."""
-    raise NotImplementedError
+    return int(_SIGNATURE[type(problem)](problem))
 
 
 def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
     """Write the size of each unknown."""
-    raise NotImplementedError
+    _SCALE[type(problem)](problem, u, omega, scale)
 
 
 def _kind(problem: Any) -> Any:

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.kernels import status
-from flipflow.kernels.gapmotion import GapMotion
 from flipflow.kernels.observe import describe_balance, observe_series
 from flipflow.methods.motion import Motion, Pieces, SeriesMotion
-from flipflow.methods.scratch import new_balance
+from flipflow.methods.scratch import new_balance, new_gap_motion
 from flipflow.methods.solver import Complex, Real, Solver
 from flipflow.model.system import MechanicalSystem
 
@@ -61,10 +60,7 @@ class BalanceSolver(Solver):
         seen = np.einsum("gn,phn->pgh", coordinates, series)
         moving = self.harmonics > 0
         rate = 1j * self.harmonics[moving].astype(np.complex128)
-        scratch = GapMotion(
-            np.zeros(1), np.zeros((1, rate.size), np.complex128), rate, rate.copy(),
-            self.problem.motion.spacing,
-        )  # fmt: skip
+        scratch = new_gap_motion(1, rate, spacing=int(self.problem.motion.spacing[0]))
         offset = np.ascontiguousarray(seen[:, :, ~moving].real.sum(axis=2))
         low, high = np.empty(offset.shape), np.empty(offset.shape)
         observe_series(scratch, offset, np.ascontiguousarray(seen[:, :, moving]), low, high)

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from flipflow.errors import IncompleteError
 from flipflow.kernels import status
-from flipflow.kernels.gapmotion import GapMotion
 from flipflow.kernels.observe import observe_flow
 from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
-from flipflow.methods.scratch import new_shooting
+from flipflow.methods.scratch import new_gap_motion, new_shooting
 from flipflow.methods.solver import Complex, Real, Solver
 
 
@@ -69,11 +68,7 @@ class ExactSolver(Solver):
         begin = states.copy()
         while True:
             modes = self.builder.plan.rate.shape[1] + 1
-            scratch = GapMotion(
-                np.zeros(count), np.zeros((count, modes), np.complex128),
-                np.zeros(modes, np.complex128), np.zeros(modes, np.complex128),
-                np.zeros(1, np.int64),
-            )  # fmt: skip
+            scratch = new_gap_motion(count, np.zeros(modes, np.complex128))
             observe_flow(
                 self.turn, states, omega, waiting, coordinates, scratch, low, high, first, code
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.kernels.arclength import Branch, Corrector
 from flipflow.kernels.balance import Balance
@@ -19,18 +20,28 @@ def contact_of(plan: Plan) -> Contact:
     return Contact(plan.gap_plus, plan.gap_minus, plan.stiffness, plan.damping, plan.clipped)
 
 
+def new_gap_motion(gaps: int, rates: NDArray[np.complex128], spacing: int = 0) -> GapMotion:
+    """Scratch for a sum of exponentials at some gaps or coordinates."""
+    shape = (gaps, rates.size)
+    return GapMotion(
+        offset=np.zeros(gaps),
+        amplitude=np.zeros(shape, np.complex128),
+        rate=rates.copy(),
+        factor=np.zeros(rates.size, np.complex128),
+        decay=np.zeros(rates.size),
+        curve=np.zeros(shape, np.complex128),
+        bound=np.zeros(shape),
+        size=np.zeros(rates.size),
+        spacing=np.array([spacing], np.int64),
+    )
+
+
 def new_flow(plan: Plan) -> Flow:
     """Scratch for one lane of exact flow."""
     configurations, modes = plan.rate.shape
     m, n = plan.direction.shape
     e = MOST_SEGMENTS
-    motion = GapMotion(
-        offset=np.zeros(m),
-        amplitude=np.zeros((m, modes + 1), np.complex128),
-        rate=np.zeros(modes + 1, np.complex128),
-        factor=np.zeros(modes + 1, np.complex128),
-        spacing=np.zeros(1, np.int64),
-    )
+    motion = new_gap_motion(m, np.zeros(modes + 1, np.complex128))
     return Flow(
         drive=np.zeros((configurations, 2 * n), np.complex128),
         drive_slope=np.zeros((configurations, 2 * n), np.complex128),
@@ -105,13 +116,7 @@ def new_balance(plan: Plan, harmonics: int, *, half_turn: bool, length: float) -
     rates = 1j * kept[kept > 0].astype(np.complex128)
 
     def series() -> GapMotion:
-        return GapMotion(
-            offset=np.zeros(m),
-            amplitude=np.zeros((m, rates.size), np.complex128),
-            rate=rates.copy(),
-            factor=np.zeros(rates.size, np.complex128),
-            spacing=np.array([2 if half_turn else 1]),
-        )
+        return new_gap_motion(m, rates, spacing=2 if half_turn else 1)
 
     flow = new_flow(plan)
     contact = flow.contact._replace(damping=np.zeros(m))

@@ -149,7 +149,7 @@ class Solver(ABC):
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
-        course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0)
+        course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, arclength.SHARP)
         record = new_branch(self.unknowns, 1)
         while True:
             code, points = arclength.follow(

@@ -20,8 +20,8 @@ from flipflow.errors import IncompleteError
 from flipflow.methods.solver import Point, Real, Solver, Traced
 from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker
 
-SHARE_TOLERANCE = 1e-13
-DIP = 0.5
+SHARE_TOLERANCE = 1e-10
+DIP = 0.25
 
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
@@ -164,7 +164,7 @@ def _refine(solver: Solver, traced: Traced, test: _Test, p: int, low: float, hig
         last[share] = solver.between(traced, p, share)
         return test.evaluate(last[share])
 
-    share = float(brentq(value, low, high, xtol=SHARE_TOLERANCE, rtol=1e-14))
+    share = float(brentq(value, low, high, xtol=SHARE_TOLERANCE, rtol=1e-12))
     point = last[share] if share in last else solver.between(traced, p, share)
     kind = test.kind
     if kind == CONTACT_BEGIN:

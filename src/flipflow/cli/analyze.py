@@ -1,0 +1,87 @@
+"""``flipflow analyze``: from a machine file to a verdict, a report and the numbers behind it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from flipflow.analyses.assessment import Assessment
+    from flipflow.model.project import Project
+
+
+def analyze(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder for report and data."),
+    ] = None,
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
+    ] = False,
+) -> None:
+    """Analyze a machine: verdict, allowed speed range, report."""
+    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.project import load_project  # noqa: PLC0415
+
+    project = load_project(file, force=force)
+    folder = output or Path(f"{project.name}-flipflow")
+    from flipflow.io.results import prepare_folder  # noqa: PLC0415
+
+    prepare_folder(folder)
+    assessment = _assessed(project)
+
+    from flipflow.io.results import assessment_document, write_response  # noqa: PLC0415
+    from flipflow.report.html import write_html  # noqa: PLC0415
+    from flipflow.report.terminal import summary  # noqa: PLC0415
+
+    document = assessment_document(assessment)
+    write_html(assessment, folder / "report.html")
+    write_json(document, str(folder / "results.json"))
+    written = write_response(assessment, folder)
+    if json is not None:
+        write_json(document, json)
+    if json != "-":
+        out = console()
+        summary(assessment, out)
+        names = ", ".join(["report.html", "results.json", *written])
+        out.print(f"Written to {folder}: {names}", soft_wrap=True)
+
+
+def _assessed(project: Project) -> Assessment:
+    """Analyse with progress on stderr."""
+    from rich.console import Console  # noqa: PLC0415  keeps --help quick
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
+
+    progress = Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
+        console=Console(stderr=True), transient=True,
+    )  # fmt: skip
+    with progress:
+        task = progress.add_task("starting", total=1.0)
+        return _run(project, progress, task)
+
+
+def _run(project: Project, progress: Progress, task: TaskID) -> Assessment:
+    from flipflow.analyses.assessment import assess  # noqa: PLC0415  keeps --help quick
+    from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
+
+    compile_ahead(
+        lambda seconds: progress.update(
+            task, description=f"compiling, once per version: {seconds:.0f} s"
+        )
+    )
+    return assess(
+        project,
+        lambda sentence, share: progress.update(task, description=sentence, completed=share),
+    )

@@ -1,0 +1,82 @@
+"""Compile the kernels of the exact solver ahead, in processes side by side.
+
+numba compiles under one lock in a process, and the first analysis needs several large kernels.
+Each part is compiled by a process of its own into the shared cache, once per version.
+"""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from flipflow.kernels import arclength
+from flipflow.kernels.compile import cache_folder
+from flipflow.methods.exact import ExactSolver
+from flipflow.methods.solver import STEP_SHARE
+from flipflow.model.elements import ClearanceSpring, Unbalance
+from flipflow.model.system import MechanicalSystem
+
+logger = logging.getLogger("flipflow")
+MARK = "exact-compiled"
+POLL_SECONDS = 0.2
+
+
+def compile_ahead(tell: Callable[[float], None]) -> None:
+    """Compile what an exact analysis needs, unless it is in the cache already.
+
+    Parameters
+    ----------
+    tell
+        Called every fraction of a second with the seconds passed.
+    """
+    mark = cache_folder() / MARK
+    if mark.exists():
+        return
+    command = [sys.executable, "-m", "flipflow.methods.warm"]
+    workers = [
+        subprocess.Popen([*command, part], stdout=subprocess.DEVNULL)  # noqa: S603  our own module
+        for part in PARTS
+    ]
+    begin = time.monotonic()
+    try:
+        while any(worker.poll() is None for worker in workers):
+            tell(time.monotonic() - begin)
+            time.sleep(POLL_SECONDS)
+    finally:
+        for worker in workers:
+            worker.kill()
+    if all(worker.returncode == 0 for worker in workers):
+        mark.touch()
+    else:
+        logger.warning("compiling ahead failed; kernels are compiled as they are needed")
+
+
+def _trace_part() -> None:
+    solver = _small_solver()
+    course = arclength.Course(0.5, 0.6, 0.01, STEP_SHARE, 1.0, arclength.QUICK)
+    solver.trace(np.zeros(2), 0.5, course)
+
+
+def _observe_part() -> None:
+    solver = _small_solver()
+    state, omega = np.zeros((1, 2)), np.ones(1)
+    solver.extremes(state, omega, np.eye(1))
+    solver.errors(state, omega)
+
+
+def _small_solver() -> ExactSolver:
+    """One mass and one stop: kernels do not depend on the machine, only on the types."""
+    stop = ClearanceSpring([1.0], 1.0, 0.1, 10.0)
+    system = MechanicalSystem([[1.0]], [[0.1]], [[1.0]], [stop], Unbalance([1.0]))
+    return ExactSolver(system, half_turn=True)
+
+
+PARTS = {"trace": _trace_part, "observe": _observe_part}
+
+if __name__ == "__main__":
+    PARTS[sys.argv[1]]()
