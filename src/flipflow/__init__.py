@@ -19,6 +19,7 @@ _HOME = {
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "assess": "flipflow.analyses.assessment",
+    "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
     "Unbalance": "flipflow.model.elements",
@@ -29,6 +30,8 @@ _HOME = {
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
+    "save": "flipflow.io.results",
+    "open_result": "flipflow.io.results",
 }
 
 __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
@@ -40,8 +43,11 @@ if TYPE_CHECKING:
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
+    from flipflow.io.results import open_result as open_result
+    from flipflow.io.results import save as save
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
     from flipflow.methods.options import PiecewiseExact as PiecewiseExact
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring

@@ -1,1 +1,1 @@
-"""flipflow.figures"""
+"""Figures: neutral descriptions made from results, and two renderers, page and print."""

@@ -1,1 +1,7 @@
-"""flipflow.report"""
+"""Reports: blocks made from results, section by section, and their renderers."""
+
+from flipflow.report import appendix, details, first_page  # noqa: F401  they register sections
+from flipflow.report.html import write_html
+from flipflow.report.terminal import summary
+
+__all__ = ["summary", "write_html"]

@@ -1,0 +1,11 @@
+"""From SI to the units engineers read, for axes."""
+
+from __future__ import annotations
+
+import math
+
+RPM = 30.0 / math.pi
+HZ = 0.5 / math.pi
+MM = 1e3
+KN = 1e-3
+DEGREES = 180.0 / math.pi

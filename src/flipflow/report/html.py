@@ -1,0 +1,74 @@
+"""The report as one HTML file that opens without network and prints on A4."""
+
+from __future__ import annotations
+
+import os
+from importlib import resources
+from pathlib import Path
+
+from flipflow.analyses.assessment import Assessment
+from flipflow.errors import MissingExtra, StoreError
+from flipflow.figures.plotly import START, element, library
+from flipflow.report.registry import blocks_of
+
+TEMPLATES = "templates"
+
+
+def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
+    """Write the report of an assessment as one self-contained HTML file.
+
+    Parameters
+    ----------
+    assessment
+        What :func:`flipflow.assess` returns.
+    path
+        The file.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    MissingExtra
+        When jinja2 is not installed.
+    StoreError
+        When the file cannot be written.
+    """
+    target = Path(path)
+    page = html(assessment)
+    try:
+        target.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
+    return target
+
+
+def html(assessment: Assessment) -> str:
+    """The report as text."""
+    try:
+        import jinja2  # noqa: PLC0415  an extra
+    except ImportError as error:
+        raise MissingExtra("Reports need jinja2: pip install 'flipflow[report]'.") from error
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(_template),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    return environment.get_template("report.html").render(
+        blocks=blocks_of(assessment),
+        title=assessment.project.document.name or assessment.project.name,
+        version=assessment.version,
+        input_hash=assessment.input_hash,
+        style=_template("report.css"),
+        library=library(),
+        start=START,
+        element=element,
+    )
+
+
+def _template(name: str) -> str:
+    return (resources.files("flipflow.report") / TEMPLATES / name).read_text(encoding="utf-8")

@@ -1,0 +1,82 @@
+"""Numbers as a report shows them: three to four significant digits, with their unit."""
+
+from __future__ import annotations
+
+import math
+
+from flipflow.analyses.quantities import QUANTITIES
+from flipflow.io.units import in_unit
+
+NOTHING = "-"
+
+
+def number(value: float) -> str:
+    """Three significant digits; from 1000 on whole numbers."""
+    if not math.isfinite(value):
+        return "infinite" if value > 0.0 else NOTHING
+    if value == 0.0 or abs(value) >= 99.95:
+        return f"{value:.0f}"
+    text = f"{value:#.3g}"
+    return text if "e" in text else text.rstrip(".")
+
+
+def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool = True) -> str:
+    """An SI value in the unit to show."""
+    if value is None:
+        return NOTHING
+    text = number(in_unit(value, shown_unit, unit)) if math.isfinite(value) else number(value)
+    return f"{text} {shown_unit}".strip() if with_unit else text
+
+
+def named(name: str, value: float | None, *, with_unit: bool = True) -> str:
+    """The value of a registered quantity; a margin to a jump that does not exist says so."""
+    if name == "jump_margin" and value is not None and math.isinf(value):
+        return "no jump"
+    one = QUANTITIES[name]
+    return quantity(value, one.shown_unit, one.unit, with_unit=with_unit)
+
+
+def rpm(omega: float) -> str:
+    """A speed in rpm, four significant digits."""
+    return f"{in_unit(omega, 'rpm', 'rad/s'):.4g}"
+
+
+def speed(omega: float) -> str:
+    """A speed in rpm, Hz and rad/s."""
+    return f"{rpm(omega)} rpm ({in_unit(omega, 'Hz', 'rad/s'):.4g} Hz, {omega:.4g} rad/s)"
+
+
+def span(low: float, high: float) -> str:
+    """A range of speeds in rpm, Hz and rad/s."""
+    hertz = [f"{in_unit(w, 'Hz', 'rad/s'):.4g}" for w in (low, high)]
+    return (
+        f"{rpm(low)} to {rpm(high)} rpm ({hertz[0]} to {hertz[1]} Hz, "
+        f"{low:.4g} to {high:.4g} rad/s)"
+    )
+
+
+def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:
+    """A limit in words: "5 to 8 mm", "at most 3 g", "at least 20 %"."""
+
+    def end(value: float) -> str:
+        return f"{in_unit(value, shown_unit, unit):.4g}"
+
+    if math.isfinite(low) and math.isfinite(high):
+        return f"{end(low)} to {end(high)} {shown_unit}".strip()
+    if math.isfinite(high):
+        return f"at most {end(high)} {shown_unit}".strip()
+    return f"at least {end(low)} {shown_unit}".strip() if math.isfinite(low) else NOTHING
+
+
+def percent(share: float | None) -> str:
+    """A margin with its sign."""
+    if share is None:
+        return NOTHING
+    return f"{100.0 * share:+.3g} %" if math.isfinite(share) else "no end"
+
+
+def multiplier(value: complex) -> str:
+    """A Floquet multiplier; of a conjugate pair the upper one stands for both."""
+    if abs(value.imag) < 1e-9 * max(abs(value), 1e-9):
+        return f"{value.real:.4g}"
+    return f"{value.real:.4g} ± {abs(value.imag):.4g}i"

@@ -1,0 +1,99 @@
+"""The summary in the terminal: the brief blocks of the report within 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import singledispatch
+from typing import TYPE_CHECKING
+
+from flipflow.analyses.assessment import Assessment
+from flipflow.report.blocks import Block, Cell, Column, Note, Table, Text, Values, Verdict
+from flipflow.report.registry import blocks_of
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+STYLES = {
+    "pass": "green",
+    "attention": "bold yellow",
+    "fail": "bold red",
+    "not checked": "dim",
+}
+
+
+def summary(
+    assessment: Assessment, console: Console, files: Mapping[str, str] | None = None
+) -> None:
+    """Print the verdict, the tables of limits and cases, the allowed speeds, where files are.
+
+    Parameters
+    ----------
+    assessment
+        What :func:`flipflow.assess` returns.
+    console
+        Where to print.
+    files
+        Paths that were written, by what they are.
+    """
+    for block in blocks_of(assessment, brief=True):
+        _show(block, console)
+    if files:
+        console.print()
+        _show(Values(tuple(files.items())), console)
+
+
+@singledispatch
+def _show(block: Block, console: Console) -> None:
+    """Blocks that a terminal cannot show are left out."""
+
+
+@_show.register(Verdict)
+def _(block: Verdict, console: Console) -> None:
+    console.print(block.text, style=STYLES[block.state] if block.state != "not checked" else "bold")
+
+
+@_show.register(Text)
+def _(block: Text, console: Console) -> None:
+    console.print(f"{block.lead} {block.text}".strip())
+
+
+@_show.register(Note)
+def _(block: Note, console: Console) -> None:
+    console.print(f"Note: {block.text}", style="yellow")
+
+
+@_show.register(Values)
+def _(block: Values, console: Console) -> None:
+    from rich.table import Table as Grid  # noqa: PLC0415  slow to import
+
+    grid = Grid.grid(padding=(0, 2))
+    grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    for label, text in block.rows:
+        grid.add_row(label, text)
+    console.print(grid)
+
+
+@_show.register(Table)
+def _(block: Table, console: Console) -> None:
+    from rich.table import Table as Grid  # noqa: PLC0415  slow to import
+    from rich.text import Text as Words  # noqa: PLC0415
+
+    shown = [k for k, column in enumerate(block.columns) if column.brief]
+    grid = Grid(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
+    for k in shown:
+        grid.add_column(
+            _title(block.columns[k]), justify="right" if block.columns[k].numeric else "left"
+        )
+    for row in block.rows:
+        grid.add_row(*(Words(_text(row[k]), STYLES.get(row[k].state, "")) for k in shown))
+    console.print()
+    console.print(grid)
+
+
+def _title(column: Column) -> str:
+    return f"{column.title}\n{column.unit}" if column.unit else column.title
+
+
+def _text(cell: Cell) -> str:
+    return f"{cell.text}\n({cell.small})" if cell.small else cell.text
