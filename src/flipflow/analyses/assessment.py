@@ -269,7 +269,7 @@ def verdict(
 
 
 def _against(row: LimitRow) -> str:
-    """"relative amplitude, full, 5.12 mm of 5 mm least"."""
+    """Words such as: relative amplitude, full, 5.12 mm of 5 mm least."""
     scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / 9.80665}
     factor = scale.get(row.shown_unit, 30.0 / math.pi if row.shown_unit == "rpm" else 1.0)
     low, high = row.limit

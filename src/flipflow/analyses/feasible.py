@@ -93,9 +93,7 @@ def case_window(
 
 def intersect(first: Intervals, second: Intervals) -> Intervals:
     """Common part of two lists of intervals, rising."""
-    common = [
-        (max(a, c), min(b, d)) for a, b in first for c, d in second if max(a, c) < min(b, d)
-    ]
+    common = [(max(a, c), min(b, d)) for a, b in first for c, d in second if max(a, c) < min(b, d)]
     return tuple(sorted(common))
 
 

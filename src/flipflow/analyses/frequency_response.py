@@ -59,7 +59,9 @@ def frequency_response(
     low, high = check_interval(omega)
     method = method or PiecewiseExact()
     solver = solver_for(machine.system(), method)
-    course = arclength.Course(low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK)
+    course = arclength.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK
+    )
     return followed(machine, method, solver, course)
 
 
@@ -111,7 +113,9 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     while lower > 1e-3 * omega:
         lower *= 0.96
         if contact_free(solver, lower):
-            course = arclength.Course(lower, omega, (omega - lower) / 50, STEP_SHARE, 1.0, arclength.QUICK)
+            course = arclength.Course(
+                lower, omega, (omega - lower) / 50, STEP_SHARE, 1.0, arclength.QUICK
+            )
             traced = solver.trace(contact_free_unknowns(solver, lower), lower, course)
             if traced.code == status.REACHED_UPPER:
                 return np.asarray(traced.u[-1])

@@ -152,7 +152,7 @@ def bonded_natural_frequencies(machine: Machine) -> Real:
         if spring.acts:
             K += spring.stiffness * np.outer(spring.direction, spring.direction)
     squares = scipy.linalg.eigh(K, system.M, eigvals_only=True)
-    return np.sqrt(np.maximum(squares, 0.0))
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
 def _modes(system: MechanicalSystem) -> tuple[Real, Real]:

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from flipflow.analyses.frequency_response import first_unknowns
 from flipflow.analyses.linear import complex_amplitudes
 from flipflow.errors import InputError
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.solver import Point, Real
+from flipflow.methods.two_event import TwoEventProblem
 from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.results.orbit import Orbit
 
@@ -26,9 +26,10 @@ def periodic_orbits(
 ) -> tuple[Orbit, ...]:
     """Periodic motions of one forcing period at ``omega``, stable and unstable.
 
-    Starts: rest, the motion reached from below, and a low-discrepancy cloud of states as large as
-    the linear motion or the gaps; each is tried as it is (unstable motions are found so) and after
-    some turns of settling. Newton on the exact flow over a whole turn, so that motions need not be
+    Starts: the motion reached from below; for one symmetric stop, every zero of the scalar problem
+    of two-touch motions; rest, and a low-discrepancy cloud of states as large as the linear motion
+    or the gaps. Each is tried as it is (unstable motions are found so) and after some turns of
+    settling. Newton on the exact flow over a whole turn, so that motions need not be
     symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
 
     Parameters
@@ -70,19 +71,28 @@ def periodic_orbits(
 
 
 def _starts(solver: ExactSolver, omega: float, rng: np.random.Generator) -> list[Real]:
-    """Rest, the motion from below, and a cloud of states."""
+    """Rest, the motion from below, two-touch motions, and a cloud of states."""
+    from scipy.stats import qmc  # noqa: PLC0415  slow to import, and few ask for all motions
+
     n = solver.system.size
     X = np.abs(complex_amplitudes(solver.system, np.array([omega]))[0])
     gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
     size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
     box = np.concatenate([size, omega * size])
-    cloud = qmc.Sobol(2 * n, rng=rng).random(STARTS) if solver.builder.springs else np.zeros((0, 2 * n))
-    return [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
+    cloud = (
+        qmc.Sobol(2 * n, rng=rng).random(STARTS) if solver.builder.springs else np.zeros((0, 2 * n))
+    )
+    starts = [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
+    if TwoEventProblem.applies(solver.builder):
+        starts += list(TwoEventProblem(solver.builder).states(omega)[0])
+    return starts
 
 
 def _keep(found: list[Point], point: Point, solver: ExactSolver) -> None:
     """Add a point unless it is known."""
-    scale = np.concatenate([np.full(solver.system.size, 1.0), np.full(solver.system.size, point.omega)])
+    scale = np.concatenate(
+        [np.full(solver.system.size, 1.0), np.full(solver.system.size, point.omega)]
+    )
     for known in found:
         size = np.abs(known.u / scale).max() + solver.length
         if np.abs((known.u - point.u) / scale).max() < SAME * size:
@@ -108,5 +118,7 @@ def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:
 def _reach(orbit: Orbit, which: Real) -> float:
     """Half peak-to-peak at the first gap, in m, in steps that hide rounding between mirrors."""
     vector = which[: orbit.system.size]
-    low, high, _ = orbit.solver.extremes(orbit.unknowns[None], np.array([orbit.omega]), vector[None])
+    low, high, _ = orbit.solver.extremes(
+        orbit.unknowns[None], np.array([orbit.omega]), vector[None]
+    )
     return round(float(high[0, 0] - low[0, 0]) / 2.0, 9)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,14 @@ from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
 GRAVITY = 9.80665
+
+
+class _States(NamedTuple):
+    """Displacement, velocity and acceleration, (K, N) each."""
+
+    x: Real
+    v: Real
+    a: Real
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +61,16 @@ class Working:
 
     def peak_with_normal(
         self,
-        along: Callable[[Real, Real, Real], Real],
+        along: Callable[[_States], Real],
         across: Callable[[NormalMotion, Real], Real],
     ) -> float | None:
         """Peak over the turn of the vector (along the surface, normal to it)."""
         normal = self.normal
         if normal is None:
             return None
-        return self.orbit.peak(lambda t, x, v, a: np.hypot(along(x, v, a), across(normal, t)))
+        return self.orbit.peak(
+            lambda t, x, v, a: np.hypot(along(_States(x, v, a)), across(normal, t))
+        )
 
 
 @dataclass(frozen=True)
@@ -91,17 +102,17 @@ class Quantity:
 
 
 def _main_acceleration(w: Working) -> float | None:
-    return w.peak_with_normal(lambda x, v, a: a[:, 0], lambda n, t: n.acceleration(t))
+    return w.peak_with_normal(lambda s: s.a[:, 0], NormalMotion.acceleration)
 
 
 def _floating_acceleration(w: Working) -> float | None:
-    return w.peak_with_normal(lambda x, v, a: a[:, 1], lambda n, t: n.acceleration(t))
+    return w.peak_with_normal(lambda s: s.a[:, 1], NormalMotion.acceleration)
 
 
 def _foundation_force(w: Working) -> float | None:
     k, c = w.screen.isolation_stiffness, w.screen.isolation_damping
     return w.peak_with_normal(
-        lambda x, v, a: k * x[:, 0] + c * v[:, 0], lambda n, t: n.foundation_force(t)
+        lambda s: k * s.x[:, 0] + c * s.v[:, 0], NormalMotion.foundation_force
     )
 
 
@@ -229,7 +240,7 @@ _ALL = (
     ),
     Quantity(
         "throw_number", "throw number", "Kv", "", "",
-        "Greatest acceleration normal to the deck over gravity's share; above 1 material is thrown.",
+        "Greatest acceleration normal to the deck over gravity's share; beyond 1 material flies.",
         _throw_number, (*_NORMAL, "deck_angle"),
     ),
 )  # fmt: skip

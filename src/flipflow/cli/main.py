@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from flipflow import __version__
+from flipflow.cli.analyze import analyze
 from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.schema import schema
@@ -22,7 +23,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (check, new, schema):
+for command in (analyze, check, new, schema):
     app.command()(command)
 
 

@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass
 
 from flipflow.io.derived import Derived, derive
 from flipflow.io.layout import SECTIONS, SPEED, Entry
-from flipflow.model.project import Project
 from flipflow.io.units import in_unit
 from flipflow.io.values import read_interval, read_number
 from flipflow.model.fields import FIELD, FIELDS
 from flipflow.model.limits import LIMIT_FIELDS
+from flipflow.model.project import Project
 
 
 @dataclass(frozen=True)

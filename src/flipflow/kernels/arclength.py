@@ -87,6 +87,24 @@ def bordered(work: Corrector) -> bool:
     return lu_factor(work.A, work.pivot)
 
 
+@kernel
+def newton_update(work: Corrector) -> float:
+    """Add the bordered Newton step to work.w; its length, in steps."""
+    n = work.r.shape[0]
+    plane = 0.0
+    for k in range(n):
+        work.b[k] = -work.r[k] / work.scale[k]
+    for k in range(n + 1):
+        plane += work.border[k] * (work.w[k] - work.guess[k]) / work.scale[k]
+    work.b[n] = -plane
+    lu_solve(work.A, work.pivot, work.b)
+    length = 0.0
+    for k in range(n + 1):
+        length += work.b[k] ** 2
+        work.w[k] += work.b[k] * work.scale[k]
+    return math.sqrt(length)
+
+
 @kernel(inline=True)
 def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     """Newton from work.guess within the plane through it normal to work.border (scaled).
@@ -100,23 +118,12 @@ def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     for iteration in range(1, NEWTON_MOST + 1):
         if not work.w[n] > 0.0:
             return status.NO_CONVERGENCE, iteration
-        code = residual(problem, work.w, work.w[n], work.r, work.J)
+        code = residual(problem, work.w, float(work.w[n]), work.r, work.J)
         if code != status.OK:
             return code, iteration
         if not bordered(work):
             return status.SINGULAR, iteration
-        plane = 0.0
-        for k in range(n):
-            work.b[k] = -work.r[k] / work.scale[k]
-        for k in range(n + 1):
-            plane += work.border[k] * (work.w[k] - work.guess[k]) / work.scale[k]
-        work.b[n] = -plane
-        lu_solve(work.A, work.pivot, work.b)
-        length = 0.0
-        for k in range(n + 1):
-            length += work.b[k] ** 2
-            work.w[k] += work.b[k] * work.scale[k]
-        length = math.sqrt(length)
+        length = newton_update(work)
         if not length < 1e3:
             return status.NO_CONVERGENCE, iteration
         if length < tolerance:
@@ -239,7 +246,7 @@ def trace(
     ends = False
     while p < branch.omega.shape[0]:
         if p > 0:
-            step = min(length, 0.999 / max(abs(work.before[n]), 1e-3))
+            step = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
             ends = predict(work, branch, p - 1, step, course)
         code, iterations = correct(problem, work, course.tolerance)
         if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
@@ -291,7 +298,7 @@ def correct_between(
     if code != status.OK:
         return code
     new_tangent(work)
-    return residual(problem, work.w, work.w[n], work.r, work.J)
+    return residual(problem, work.w, float(work.w[n]), work.r, work.J)
 
 
 TRACE_ALL = -1

@@ -105,7 +105,7 @@ def prepare_receptance(problem: Balance, omega: float) -> None:
             for c in range(m):
                 total = 0j
                 slope = 0j
-                for i in range(plan.count[0]):
+                for i in range(plan.mode_count[0]):
                     share = plan.gap_shape[0, j, i] * plan.gap_pick[i, c]
                     gap = reciprocal(1j * (h * omega) - plan.rate[0, i])
                     total += share * gap
@@ -210,13 +210,20 @@ def contact_integrals(problem: Balance, omega: float) -> None:
                 if flow.states[e, j] < 0:
                     gap = -flow.contact.gap_minus[j]
                 _add_interval(problem, j, first, last, gap)
-        spring = flow.spring[e]
-        if spring >= 0 and flow.kick[e] == 0.0:
-            before, after = flow.states[e, spring], flow.states[e + 1, spring]
-            if abs(before) == 1 and abs(after) == 2:
-                _add_edge(problem, spring, last, 1.0, before)
-            elif abs(before) == 2 and abs(after) == 1:
-                _add_edge(problem, spring, last, -1.0, after)
+        if flow.spring[e] >= 0 and flow.kick[e] == 0.0:
+            _add_clipped_limit(problem, e, last)
+
+
+@kernel
+def _add_clipped_limit(problem: Balance, e: int, theta: float) -> None:
+    """The end of piece e, where a clipped spring lets go or takes hold beyond its gap."""
+    flow = problem.flow
+    spring = flow.spring[e]
+    before, after = flow.states[e, spring], flow.states[e + 1, spring]
+    if abs(before) == 1 and abs(after) == 2:
+        _add_edge(problem, spring, theta, 1.0, before)
+    elif abs(before) == 2 and abs(after) == 1:
+        _add_edge(problem, spring, theta, -1.0, after)
 
 
 @kernel

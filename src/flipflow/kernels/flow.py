@@ -98,7 +98,7 @@ def prepare_drive(plan: Plan, flow: Flow, slot: int, omega: float) -> None:
     for k in range(n):
         flow.drive[slot, k] = 0.0
         flow.drive_slope[slot, k] = 0.0
-    for i in range(plan.count[slot]):
+    for i in range(plan.mode_count[slot]):
         gap = reciprocal(1j * omega - plan.rate[slot, i])
         plain = plan.force[slot, i] * gap
         plain_slope = plain * (scale_slope - 1j * scale * gap)
@@ -127,7 +127,7 @@ def begin_segment(plan: Plan, flow: Flow, e: int, slot: int, omega: float, t: fl
     """Write the segment that starts at time t from flow.z: its modes and the motion at the gaps."""
     size = flow.z.shape[0]
     n = size // 2
-    count = plan.count[slot]
+    count = plan.mode_count[slot]
     turn = exponential(1j * (omega * t))
     flow.slot[e] = slot
     flow.start[e] = t
@@ -167,7 +167,7 @@ def segment_state(
         steady = flow.drive[slot, k] * turn
         z[k] = plan.rest[slot, k] + steady.real
         rate[k] = (1j * omega * steady).real
-    for i in range(plan.count[slot]):
+    for i in range(plan.mode_count[slot]):
         term = plan.weight[slot, i] * flow.modes[e, i] * exponential(plan.rate[slot, i] * elapsed)
         slope = term * plan.rate[slot, i]
         for k in range(z.shape[0]):
@@ -205,7 +205,7 @@ def run_flow(plan: Plan, flow: Flow, omega: float, t: float, duration: float, ra
         prepare_drive(plan, flow, slot, omega)
         begin_segment(plan, flow, e, slot, omega, t)
         length, spring, new = next_change(
-            flow.motion, flow.contact, flow.state, plan.count[slot] + 1, end - t, fired
+            flow.motion, flow.contact, flow.state, plan.mode_count[slot] + 1, end - t, fired
         )
         if math.isnan(length):
             return status.NOT_FINITE
@@ -261,7 +261,7 @@ def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, sign: float
 def _carry_free(plan: Plan, slot: int, length: float, U: Real, work: Complex) -> None:
     """U = exp(A length) U by the modes of the configuration."""
     size, columns = U.shape
-    count = plan.count[slot]
+    count = plan.mode_count[slot]
     for i in range(count):
         factor = plan.weight[slot, i] * exponential(plan.rate[slot, i] * length)
         for c in range(columns):

@@ -193,44 +193,12 @@ def next_change(
     (horizon, -1, 0) when nothing happens before, and a time of NaN when the search does not end.
     """
     t = 0.0
-    m = state.shape[0]
     prepare_search(motion, count)
     for _ in range(MAX_SEARCH):
         exponentials(motion, count, t)
         step = math.inf
-        for j in range(m):
-            y, v = gap_state(motion, count, j)
-            a, second, third = gap_bounds(motion, count, j)
-            scale = abs(y) + abs(motion.offset[j])
-            low, new = math.inf, NOTHING
-            if state[j] == OPEN:
-                if contact.gap_plus[j] < math.inf:
-                    low, new = _approach(
-                        contact.gap_plus[j] - y, -v, -a, second, third, scale, PLUS
-                    )
-                if contact.gap_minus[j] < math.inf:
-                    other, side = _approach(
-                        y + contact.gap_minus[j], v, a, second, third, scale, MINUS
-                    )
-                    if side != NOTHING or (new == NOTHING and other < low):
-                        low, new = other, side
-            else:
-                side = 1.0 if state[j] > 0 else -1.0
-                gap = contact.gap_plus[j] if side > 0 else -contact.gap_minus[j]
-                if abs(state[j]) == 2 or contact.clipped[j] == 0:
-                    low, new = _approach(
-                        side * (y - gap), side * v, side * a, second, third, scale, OPEN
-                    )
-                if contact.clipped[j] == 1:
-                    force, slope, bend, low2, low3 = push_state(motion, contact, count, j, gap)
-                    sign = side if abs(state[j]) == 1 else -side
-                    target = 2 * state[j] if abs(state[j]) == 1 else state[j] // 2
-                    push_scale = contact.stiffness[j] * scale + contact.damping[j] * abs(v)
-                    other, change = _approach(
-                        sign * force, sign * slope, sign * bend, low2, low3, push_scale, target
-                    )
-                    if change != NOTHING or (new == NOTHING and other < low):
-                        low, new = other, change
+        for j in range(state.shape[0]):
+            low, new = spring_change(motion, contact, state[j], count, j)
             if new != NOTHING and not (t == 0.0 and j == fired):
                 return t, j, new
             step = min(step, max(low, SMALLEST_STEP * horizon))
@@ -241,10 +209,51 @@ def next_change(
 
 
 @kernel
+def spring_change(
+    motion: GapMotion, contact: Contact, state: int, count: int, j: int
+) -> tuple[float, int]:
+    """Time before which spring j cannot change, and its new state where it changes now."""
+    y, v = gap_state(motion, count, j)
+    a, second, third = gap_bounds(motion, count, j)
+    scale = abs(y) + abs(motion.offset[j])
+    if state == OPEN:
+        up = contact.gap_plus[j] - y
+        down = y + contact.gap_minus[j]
+        return _sooner(
+            _approach(up, -v, -a, second, third, scale, PLUS),
+            _approach(down, v, a, second, third, scale, MINUS),
+        )
+    side = 1.0 if state > 0 else -1.0
+    gap = contact.gap_plus[j] if state > 0 else -contact.gap_minus[j]
+    leave = _approach(side * (y - gap), side * v, side * a, second, third, scale, OPEN)
+    if contact.clipped[j] == 0:
+        return leave
+    force, slope, bend, low2, low3 = push_state(motion, contact, count, j, gap)
+    push_scale = contact.stiffness[j] * scale + contact.damping[j] * abs(v)
+    if abs(state) == 1:
+        # A clipped spring leaves by losing its force, which always comes before the gap.
+        return _approach(side * force, side * slope, side * bend, low2, low3, push_scale, 2 * state)
+    again = _approach(
+        -side * force, -side * slope, -side * bend, low2, low3, push_scale, state // 2
+    )
+    return _sooner(leave, again)
+
+
+@kernel
+def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]:
+    """Whichever changes now, else whichever cannot change for the shorter time."""
+    if one[1] != NOTHING or (two[1] == NOTHING and one[0] <= two[0]):
+        return one
+    return two
+
+
+@kernel
 def _approach(
     h: float, slope: float, curvature: float, second: float, third: float, scale: float, target: int
 ) -> tuple[float, int]:
     """Safe step towards the zero of h, and ``target`` once it is there and h still falls."""
+    if h == math.inf:
+        return math.inf, NOTHING
     if h <= AT_GAP * scale and slope < 0.0:
         return 0.0, target
     return safe_step(h, slope, curvature, second, third), NOTHING

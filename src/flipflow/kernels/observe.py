@@ -45,22 +45,14 @@ def observe_flow(
     plan, flow = problem.plan, problem.flow
     for p in range(omega.shape[0]):
         turn = problem.fraction * 2.0 * math.pi / omega[p]
-        for k in range(flow.z.shape[0]):
-            flow.z[k] = states[p, k]
-        code[p] = status.OK
-        for wait in range(waiting + 1):
-            if wait == waiting:
-                for k in range(flow.z.shape[0]):
-                    states[p, k] = flow.z[k]
-            if code[p] == status.OK:
-                code[p] = run_flow(plan, flow, omega[p], 0.0, turn, problem.rate)
+        code[p] = _turn_after(problem, states[p], omega[p], turn, waiting)
         if code[p] != status.OK:
             continue
         for g in range(coordinate.shape[0]):
             low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
         for e in range(flow.segments[0]):
             _coordinate_segment(problem, e, omega[p], coordinate, motion)
-            count = plan.count[flow.slot[e]] + 1
+            count = plan.mode_count[flow.slot[e]] + 1
             prepare_search(motion, count)
             for g in range(coordinate.shape[0]):
                 smallest, largest = extremes(motion, count, g, flow.length[e])
@@ -71,13 +63,28 @@ def observe_flow(
 
 
 @kernel
+def _turn_after(problem: Shooting, z: Real, omega: float, turn: float, waiting: int) -> int:
+    """Record a turn after ``waiting`` turns from z, which becomes the state at its start."""
+    flow = problem.flow
+    for k in range(flow.z.shape[0]):
+        flow.z[k] = z[k]
+    for _ in range(waiting):
+        code = run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
+        if code != status.OK:
+            return code
+    for k in range(flow.z.shape[0]):
+        z[k] = flow.z[k]
+    return run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
+
+
+@kernel
 def _coordinate_segment(
     problem: Shooting, e: int, omega: float, coordinate: Real, motion: GapMotion
 ) -> None:
     """Segment e as sums of exponentials in the given coordinates, the drive as the last term."""
     plan, flow = problem.plan, problem.flow
     slot = flow.slot[e]
-    count = plan.count[slot]
+    count = plan.mode_count[slot]
     n = coordinate.shape[1]
     turn = exponential(1j * omega * flow.start[e])
     motion.rate[count] = 1j * omega
@@ -181,7 +188,7 @@ def _displacements(problem: Balance, omega: float, series: Complex) -> None:
         h = problem.harmonics[a]
         for k in range(n):
             series[a, k] = problem.flow.drive[0, k] if h == 1 else 0.0
-        for i in range(plan.count[0]):
+        for i in range(plan.mode_count[0]):
             push = 0j
             push_conj = 0j
             for j in range(problem.linear.shape[0]):
@@ -213,9 +220,10 @@ def orbit_error(
 
     delta = (I - M)^-1 (flow(z) - z) corrects the state; the distance is the largest difference of
     any displacement between the corrected exact flow and the series (P, n_h, N); without
-    harmonics the motion is the flow itself and the distance is that of the states. Infinite when a second step does not shrink.
+    harmonics the motion is the flow itself and the distance is that of the states. Infinite when
+    a second step does not shrink.
     """
-    plan, flow = problem.plan, problem.flow
+    flow = problem.flow
     size = flow.z.shape[0]
     for p in range(omega.shape[0]):
         z = states[p]

@@ -28,7 +28,7 @@ class Plan(NamedTuple):
     """N degrees of freedom, m springs, S prepared configurations of up to R modes."""
 
     slot: Int  # (3**m,)
-    count: Int  # (S,) number of modes
+    mode_count: Int  # (S,) number of modes
     rate: Complex  # (S, R) eigenvalues in 1/s
     weight: Real  # (S, R)
     right: Complex  # (S, 2 N, R) v_i as columns

@@ -50,7 +50,7 @@ def piece_exponential(plan: Plan, slot: int, length: float, out: Real) -> None:
     for r in range(size):
         for c in range(size):
             out[r, c] = 0.0
-    for i in range(plan.count[slot]):
+    for i in range(plan.mode_count[slot]):
         factor = plan.weight[slot, i] * exponential(plan.rate[slot, i] * length)
         for r in range(size):
             v = plan.right[slot, r, i] * factor
@@ -155,7 +155,9 @@ def force_excess(problem: TwoEvent, omega: float, s: float) -> float:
 
 
 @kernel
-def root_between(problem: TwoEvent, omega: float, a: float, b: float, f_a: float, f_b: float) -> float:
+def root_between(
+    problem: TwoEvent, omega: float, a: float, b: float, f_a: float, f_b: float
+) -> float:
     """Zero of f in [a, b] by false position with halving of the stale end (Illinois)."""
     for _ in range(MOST_ROOT_STEPS):
         s = (a * f_b - b * f_a) / (f_b - f_a)
@@ -171,7 +173,9 @@ def root_between(problem: TwoEvent, omega: float, a: float, b: float, f_a: float
 
 
 @kernel(entry=True)
-def two_event_states(problem: TwoEvent, omega: float, samples: int, states: Real, shares: Real) -> int:
+def two_event_states(
+    problem: TwoEvent, omega: float, samples: int, states: Real, shares: Real
+) -> int:
     """All zeros of f that lie more than one sample apart: states at t = 0 and shares; their number.
 
     The state at contact is carried on by the exact flow to the next t = 0; whether its touches

@@ -1,1 +1,1 @@
-"""flipflow.methods"""
+"""Methods: options, machines flattened into plans, solvers of periodic motions."""

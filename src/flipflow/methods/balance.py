@@ -69,13 +69,7 @@ class BalanceSolver(Solver):
     def motion(self, u: Real, omega: float) -> Motion:
         series, _ = self._describe(u[None], np.array([omega]))
         flow = self.problem.flow
-        e = int(flow.segments[0])
-        empty = np.zeros((e, 0), np.complex128)
-        pieces = Pieces(
-            *(array[:e].copy() for array in (flow.slot, flow.start, flow.length)),
-            empty,
-            flow.states[:e].copy(),
-        )
+        pieces = Pieces.recorded(flow, np.zeros((flow.start.size, 0), np.complex128))
         return SeriesMotion(
             self.system, omega, 2.0 * np.pi / omega, pieces, self.harmonics, series[0]
         )

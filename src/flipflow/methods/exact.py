@@ -47,11 +47,7 @@ class ExactSolver(Solver):
         if np.isnan(low).any():
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
         flow = self.turn.flow
-        e = int(flow.segments[0])
-        pieces = Pieces(
-            *(array[:e].copy() for array in (flow.slot, flow.start, flow.length, flow.modes)),
-            flow.states[:e].copy(),
-        )
+        pieces = Pieces.recorded(flow, flow.modes)
         period = 2.0 * np.pi / omega * self.turn.fraction
         return PiecewiseMotion(
             self.system, omega, period, pieces, self.builder.plan, flow.drive.copy()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.kernels.flow import Flow
 from flipflow.kernels.plan import Plan
 from flipflow.model.system import MechanicalSystem
 
@@ -38,6 +40,18 @@ class Pieces:
     modes: Complex  # (E, R) modal amplitudes at the start; empty for a series
     states: NDArray[np.int64]  # (E, m) contact state of each spring
 
+    @classmethod
+    def recorded(cls, flow: Flow, modes: Complex) -> Self:
+        """Copy of what the kernels left in their record."""
+        e = int(flow.segments[0])
+        return cls(
+            flow.slot[:e].copy(),
+            flow.start[:e].copy(),
+            flow.length[:e].copy(),
+            modes[:e].copy(),
+            flow.states[:e].copy(),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Motion(ABC):
@@ -59,7 +73,8 @@ class Motion(ABC):
     def piece(self, t: ArrayLike) -> NDArray[np.intp]:
         """Index of the piece in which each time lies."""
         inside = np.mod(np.asarray(t, float), self.period)
-        return np.maximum(np.searchsorted(self.pieces.start, inside, side="right") - 1, 0)
+        after = np.searchsorted(self.pieces.start, inside, side="right")
+        return np.asarray(np.maximum(after - 1, 0))
 
     def samples(self, least: int = 256) -> tuple[Real, NDArray[np.intp]]:
         """Times and pieces of a grid that holds both ends of every piece, (K,) each.

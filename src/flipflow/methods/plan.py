@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from flipflow.errors import InputError
@@ -16,7 +15,9 @@ from flipflow.model.system import MechanicalSystem
 MAX_SPRINGS = 12
 PREPARED_AT_ONCE = 27
 NEARLY_DEFECTIVE = 1e8
-NUDGE = 1e-10
+NUDGE, MOST_NUDGES = 1e-10, 3
+
+Complex = NDArray[np.complex128]
 
 
 class PlanBuilder:
@@ -55,7 +56,7 @@ class PlanBuilder:
                 "with all stops open nothing holds the machine in place; give every free motion "
                 "a spring",
             )
-        self._rows: dict[int, dict[str, NDArray[np.generic]]] = {}
+        self._rows: dict[int, _Configuration] = {}
         everything = 3 ** len(self.springs) <= PREPARED_AT_ONCE
         self.add(range(3 ** len(self.springs)) if everything else [0])
 
@@ -75,7 +76,7 @@ class PlanBuilder:
             for digit, spring in zip(self._digits(code), self.springs, strict=True)
         )
 
-    def _configuration(self, code: int) -> dict[str, NDArray[np.generic]]:
+    def _configuration(self, code: int) -> _Configuration:
         """Modes of one configuration."""
         system, n = self.system, self.system.size
         C, K = system.C.copy(), system.K.copy()
@@ -89,18 +90,8 @@ class PlanBuilder:
         rate, right = _eigen(system.M, C, K)
         left = np.linalg.inv(right)
         keep = rate.imag >= 0.0
-        rate, right, left = rate[keep], right[:, keep], left[keep]
-        push = np.concatenate([np.zeros(n), np.linalg.solve(system.M, system.excitation.vector)])
-        return {
-            "rate": rate,
-            "weight": np.where(rate.imag > 0.0, 2.0, 1.0),
-            "right": right,
-            "left": left,
-            "rest": np.concatenate([np.linalg.solve(K, preload), np.zeros(n)]),
-            "force": left @ push,
-            "force_conj": left.conj() @ push,
-            "gap_shape": self._directions() @ right[:n],
-        }
+        rest = np.concatenate([np.linalg.solve(K, preload), np.zeros(n)])
+        return _Configuration(rate[keep], right[:, keep], np.asarray(left)[keep], rest)
 
     def _directions(self) -> NDArray[np.float64]:
         return np.array([s.direction for s in self.springs]).reshape(-1, self.system.size)
@@ -110,35 +101,27 @@ class PlanBuilder:
         slot = np.full(3**m, -1, dtype=np.int64)
         for place, code in enumerate(rows):
             slot[code] = place
-        size, modes = len(rows), 2 * n
-        count = np.array([row["rate"].size for row in rows.values()], dtype=np.int64)
-
-        def table(name: str, shape: tuple[int, ...], axis: int, kind: type) -> NDArray[np.generic]:
-            out = np.zeros((size, *shape), dtype=kind)
-            for place, row in enumerate(rows.values()):
-                index = [slice(None)] * len(shape)
-                index[axis] = slice(row["rate"].size)
-                out[(place, *index)] = row[name]
-            return out
-
+        modes = 2 * n
         D = self._directions()
         spread = np.linalg.solve(self.system.M, D.T)
-        left = next(iter(rows.values()))["left"]
-        gap_pick = np.zeros((modes, m), dtype=np.complex128)
-        gap_pick[: left.shape[0]] = left[:, n:] @ spread
+        push = np.concatenate(
+            [np.zeros(n), np.linalg.solve(self.system.M, self.system.excitation.vector)]
+        )
+        right = _stacked([_padded(row.right, modes, 1) for row in rows.values()])
+        left = _stacked([_padded(row.left, modes, 0) for row in rows.values()])
         damping = np.array([s.damping for s in self.springs], dtype=float)
         return Plan(
             slot=slot,
-            count=count,
-            rate=table("rate", (modes,), 0, np.complex128),
-            weight=table("weight", (modes,), 0, np.float64),
-            right=table("right", (modes, modes), 1, np.complex128),
-            left=table("left", (modes, modes), 0, np.complex128),
-            rest=np.array([row["rest"] for row in rows.values()], dtype=float),
-            force=table("force", (modes,), 0, np.complex128),
-            force_conj=table("force_conj", (modes,), 0, np.complex128),
-            gap_shape=table("gap_shape", (m, modes), 1, np.complex128),
-            gap_pick=gap_pick,
+            mode_count=np.array([row.rate.size for row in rows.values()], dtype=np.int64),
+            rate=_stacked([_padded(row.rate, modes, 0) for row in rows.values()]),
+            weight=np.array([_padded(row.weight, modes, 0).real for row in rows.values()]),
+            right=right,
+            left=left,
+            rest=np.array([row.rest for row in rows.values()], dtype=float),
+            force=left @ push,
+            force_conj=left.conj() @ push,
+            gap_shape=np.ascontiguousarray(D @ right[:, :n]),
+            gap_pick=np.ascontiguousarray(left[0, :, n:] @ spread),
             direction=D,
             kick=np.ascontiguousarray((damping[:, None] * spread.T).reshape(m, n)),
             stiffness=np.array([s.stiffness for s in self.springs], dtype=float),
@@ -150,26 +133,49 @@ class PlanBuilder:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class _Configuration:
+    """Modes of one configuration, one of each conjugate pair, and where it would stand still."""
+
+    rate: Complex  # (r,)
+    right: Complex  # (2 N, r)
+    left: Complex  # (r, 2 N)
+    rest: NDArray[np.float64]  # (2 N,)
+
+    @property
+    def weight(self) -> Complex:
+        """2 for a conjugate pair, 1 for a real eigenvalue."""
+        return np.where(self.rate.imag > 0.0, 2.0, 1.0).astype(np.complex128)
+
+
+def _padded(array: Complex, modes: int, axis: int) -> Complex:
+    """Zeros behind the last mode, up to the most a configuration can have."""
+    width = [(0, 0)] * array.ndim
+    width[axis] = (0, modes - array.shape[axis])
+    return np.pad(array, width)
+
+
+def _stacked(arrays: list[Complex]) -> Complex:
+    return np.ascontiguousarray(np.stack(arrays))
+
+
 def _eigen(
     M: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64]
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+) -> tuple[Complex, Complex]:
     """Eigenvalues and right vectors of the state matrix; conjugate pairs exactly conjugate."""
     n = M.shape[0]
-    for nudge in itertools.count():
-        A = np.block(
-            [
-                [np.zeros((n, n)), np.eye(n)],
-                [-np.linalg.solve(M, K), -np.linalg.solve(M, C) * (1.0 + nudge * NUDGE)],
-            ]
-        )
-        rate, right = scipy.linalg.eig(A)
+    accelerations = np.linalg.solve(M, np.hstack([K, C]))
+    for nudge in range(MOST_NUDGES + 1):
+        damping = accelerations[:, n:] * (1.0 + nudge * NUDGE)
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-accelerations[:, :n], -damping]])
+        rate, right = np.linalg.eig(A)
         # Exactly critical damping has no full set of eigenvectors; a damping changed in its
         # tenth digit has one, and costs less than the digits a defective basis would.
-        if np.linalg.cond(right / _scale(right)) < NEARLY_DEFECTIVE or nudge == 3:
-            return rate, right
-    raise AssertionError
+        if np.linalg.cond(right / _scale(right)) < NEARLY_DEFECTIVE:
+            break
+    return rate.astype(np.complex128), right.astype(np.complex128)
 
 
-def _scale(right: NDArray[np.complex128]) -> NDArray[np.float64]:
+def _scale(right: Complex) -> NDArray[np.float64]:
     """Row scale that brings displacements and velocities to one size."""
-    return np.maximum(np.abs(right).max(axis=1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(np.maximum(np.abs(right).max(axis=1, keepdims=True), np.finfo(float).tiny))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,24 @@ class Traced:
     course: arclength.Course
     record: arclength.Branch
 
+    @classmethod
+    def recorded(
+        cls, record: arclength.Branch, points: int, code: int, course: arclength.Course
+    ) -> Self:
+        """The first ``points`` of a record, and what happened on the way to the next."""
+        return cls(
+            record.u[:points],
+            record.omega[:points],
+            record.tangent[:points],
+            record.jacobian[:points],
+            record.iterations[:points],
+            record.rejected[: points + 1],
+            record.reason[: points + 1],
+            code,
+            course,
+            record,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -48,6 +66,11 @@ class Point:
     omega: float
     omega_tangent: float
     return_map: Real
+
+    @property
+    def eigenvalues(self) -> Complex:
+        """Eigenvalues of the return map, (2 N,)."""
+        return np.linalg.eigvals(self.return_map).astype(np.complex128)
 
 
 class Solver(ABC):
@@ -122,16 +145,7 @@ class Solver(ABC):
             if code != status.MISSING_CONFIGURATION:
                 break
             self.add_missing_configuration()
-        return Traced(
-            *(array[:points] for array in (record.u, record.omega, record.tangent)),
-            record.jacobian[:points],
-            record.iterations[:points],
-            record.rejected[: points + 1],
-            record.reason[: points + 1],
-            code,
-            course,
-            record,
-        )
+        return Traced.recorded(record, points, code, course)
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
@@ -191,7 +205,7 @@ class Solver(ABC):
             )
             if not np.any(code == status.MISSING_CONFIGURATION):
                 return error
-            self.builder.add([code for code in range(self.builder.plan.slot.size)])
+            self.builder.add(range(self.builder.plan.slot.size))
             self._prepare()
 
     def _new_work(self) -> None:

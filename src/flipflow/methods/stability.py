@@ -24,7 +24,7 @@ def full_turn(eigenvalues: Complex, *, half_turn: bool) -> Complex:
 def stability_words(
     eigenvalues: Complex, saddle_side: NDArray[np.bool_] | None
 ) -> NDArray[np.str_]:
-    """ "stable", "unstable" or "undetermined" for return-map eigenvalues (P, 2 N).
+    """Stability of motions with return-map eigenvalues (P, 2 N), a word each.
 
     ``saddle_side`` tells where the Jacobian of the equations has an odd number of positive
     real eigenvalues beyond +1. Near a fold it decides, for the multipliers of a truncated series

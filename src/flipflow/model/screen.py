@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Self, get_args
@@ -112,7 +113,7 @@ class FlipFlowScreen:
             choices = ", ".join(get_args(ContactLaw))
             raise InputError("stop_law", self.stop_law, f"choose one of {choices}")
         temperatures = [t for t, _ in self.temperature_factor]
-        if any(b <= a for a, b in zip(temperatures, temperatures[1:], strict=False)):
+        if any(b <= a for a, b in itertools.pairwise(temperatures)):
             raise InputError(
                 "temperature_factor", temperatures, "list temperatures in rising order"
             )
@@ -150,7 +151,7 @@ class FlipFlowScreen:
             raise InputError(
                 "temperature",
                 temperature,
-                f"stay within the table of the shear springs, {degrees[0]:g} to {degrees[-1]:g} degC",
+                f"stay within the springs' table, {degrees[0]:g} to {degrees[-1]:g} degC",
             )
         return float(np.interp(temperature, degrees, factors))
 

@@ -112,7 +112,12 @@ class MechanicalSystem:
             return self.coordinates[which]
         if isinstance(which, bool) or not 0 <= which < self.size:
             raise InputError("coordinate", which, f"choose an index from 0 to {self.size - 1}")
-        return np.eye(self.size)[which]
+        return np.asarray(np.eye(self.size)[which])
+
+    @property
+    def named(self) -> tuple[Coordinate, ...]:
+        """Names of the coordinates, or indices of degrees of freedom where none is named."""
+        return tuple(self.coordinates) or tuple(range(self.size))
 
     def with_bonded(self) -> MechanicalSystem:
         """Return the same machine with springs that always act moved into C and K."""

@@ -1,1 +1,1 @@
-"""flipflow.results"""
+"""Frozen results and their data documents."""

@@ -180,15 +180,13 @@ class Orbit:
         return self._mean(square)
 
     def input_power(self) -> float:
-        """Mean power that the excitation feeds in, W."""
+        """Mean power that the excitation feeds in, W: only the first harmonic takes part in it."""
         force = self.system.excitation
         F = force.vector * self.omega**force.power
-
-        def power(t: Real, piece: NDArray[np.intp]) -> Real:
-            push = (F * np.exp(1j * self.omega * t)[:, None]).real
-            return np.asarray((push * self.motion.piece_derivative(t, piece, 1)).sum(axis=1))
-
-        return self._mean(power)
+        _, _, first = self.solver.extremes(
+            self.unknowns[None], np.array([self.omega]), np.eye(self.system.size)
+        )
+        return float(0.5 * (F.conj() @ (1j * self.omega * first[0])).real)
 
     def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)

@@ -1,0 +1,68 @@
+"""A branch from its document: nothing is computed again but what is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from flipflow.analyses.frequency_response import solver_for
+from flipflow.errors import StoreError
+from flipflow.kernels import arclength
+from flipflow.methods.scratch import new_branch
+from flipflow.methods.solver import Traced
+from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.results.document import BRANCH, machine_from, method_from
+from flipflow.results.orbit import Orbit
+from flipflow.results.status import BranchStatus
+
+
+def branch_from(document: Mapping[str, Any]) -> Branch:
+    """The branch that :func:`flipflow.results.document.branch_document` wrote.
+
+    Raises
+    ------
+    StoreError
+        When the document is of another kind, or does not fit its machine.
+    """
+    if document.get("schema") != BRANCH:
+        raise StoreError(f"schema {document.get('schema')!r} is not a branch of this version")
+    machine, method = machine_from(document["machine"]), method_from(document["method"])
+    solver = solver_for(machine.system(), method, half_turn=document["half_turn"])
+    u = np.asarray(document["unknowns"], dtype=float).reshape(-1, solver.unknowns)
+    points = u.shape[0]
+    record = new_branch(solver.unknowns, max(points, 1))
+    record.u[:points] = u
+    record.omega[:points] = document["omega"]
+    record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
+    record.iterations[:points] = document["iterations"]
+    record.rejected[:points] = document["rejected"][:points]
+    record.reason[:points] = document["reason"][:points]
+    course = arclength.Course(*document["course"])
+    traced = Traced.recorded(record, points, int(document["code"]), course)
+    n = solver.system.size
+    special = tuple(
+        SpecialPoint(
+            one["kind"],
+            Orbit(solver, np.asarray(one["unknowns"]), one["omega"], np.asarray(one["return_map"])),
+            one["position"],
+            one["spring"],
+            one["side"],
+        )
+        for one in document["special_points"]
+    )
+    multipliers = np.asarray(document["multipliers"], dtype=float).reshape(points, 2 * n, 2)
+    return Branch(
+        machine=machine,
+        method=method,
+        solver=solver,
+        traced=traced,
+        return_maps=np.asarray(document["return_maps"], dtype=float).reshape(points, 2 * n, 2 * n),
+        multipliers=multipliers[..., 0] + 1j * multipliers[..., 1],
+        stability=np.asarray(document["stability"], dtype="<U12"),
+        special_points=special,
+        status=BranchStatus[document["status"]],
+        notes=tuple(document["notes"]),
+        version=document["version"],
+    )

@@ -1,0 +1,232 @@
+"""Results in and out of files: JSON documents, NetCDF and CSV tables."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flipflow.analyses.assessment import Assessment
+from flipflow.analyses.reopen import branch_from
+from flipflow.errors import InputError, StoreError
+from flipflow.results.branch import Branch
+from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
+from flipflow.results.orbit import Orbit
+
+if TYPE_CHECKING:
+    import xarray
+
+RPM = 30.0 / np.pi
+COORDINATES = ("main", "floating", "relative")
+
+
+def save(result: object, path: str | os.PathLike[str]) -> None:
+    """Write a result: ``.json`` (opens again), ``.nc`` (NetCDF) or ``.csv`` (a table).
+
+    Parameters
+    ----------
+    result
+        A Branch, Orbit or Assessment.
+    path
+        File to write; its ending decides the form.
+
+    Raises
+    ------
+    InputError
+        For an ending or a result that is not known, and where the file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix == ".json":
+        text = json.dumps(document_of(result), indent=1, ensure_ascii=False, allow_nan=False)
+        _write(target, text.encode())
+    elif target.suffix in (".nc", ".csv") and isinstance(result, Branch):
+        table = branch_table(result)
+        _write(target, table.to_netcdf() if target.suffix == ".nc" else _csv(table))
+    else:
+        raise InputError(
+            "path", str(path), f"{type(result).__name__} is written as .json; a branch also as "
+            ".nc or .csv"
+        )  # fmt: skip
+
+
+def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
+    """Open what :func:`save` wrote as JSON: a branch as a Branch, other documents as they are.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing.
+    StoreError
+        For a file that is not a document of flipflow.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise InputError("path", str(path), "there is no such file; give one that ff.save wrote")
+    try:
+        document = json.loads(source.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path} cannot be read as a result: {error}") from None
+    if not isinstance(document, dict) or not str(document.get("schema")).startswith("flipflow/"):
+        raise StoreError(f"{path} is not a result of flipflow: it has no schema")
+    try:
+        return branch_from(document) if document["schema"] == BRANCH else document
+    except (KeyError, ValueError, TypeError) as error:
+        raise StoreError(f"{path} is damaged: {error!r}") from None
+
+
+def document_of(result: object) -> dict[str, Any]:
+    """The data document of a result."""
+    if isinstance(result, Branch):
+        return branch_document(result)
+    if isinstance(result, Orbit):
+        return orbit_document(result)
+    if isinstance(result, Assessment):
+        return assessment_document(result)
+    raise InputError("result", type(result).__name__, "give a Branch, an Orbit or an Assessment")
+
+
+def assessment_document(assessment: Assessment) -> dict[str, Any]:
+    """Verdict, limits, region and cases of an assessment."""
+    region = assessment.region
+    frequencies = ("omega_ea", "omega_ar", "omega_cs", "omega_lb", "omega_ub", "lower", "upper")
+    return {
+        "schema": "flipflow/assessment/1",
+        "version": assessment.version,
+        "input_hash": assessment.input_hash,
+        "name": assessment.project.document.name or assessment.project.name,
+        "verdict": assessment.verdict,
+        "omega": assessment.omega,
+        "limits": [plain(vars(row)) for row in assessment.limits_table],
+        "region": {
+            **{name: plain(getattr(region, name)) for name in frequencies},
+            "feasible": plain(region.feasible),
+            "binding": [[vars(bound) for bound in pair] for pair in region.binding],
+            "cases": [
+                {"name": c.name, "intervals": plain(c.intervals), "unchecked": plain(c.unchecked)}
+                for c in region.cases
+            ],
+        },
+        "cases": [
+            {
+                "name": case.name,
+                "values": plain(case.values),
+                "energy": plain(case.energy),
+                "stop_reached": case.stop_reached,
+                "stability": None if case.orbit is None else case.orbit.stability,
+                "multipliers": None if case.orbit is None else plain(case.orbit.multipliers),
+                "branch_status": case.branch.status.name,
+                "special_points": [
+                    {
+                        "kind": p.kind,
+                        "omega": p.omega,
+                        "relative_amplitude": p.amplitude("relative"),
+                    }
+                    for p in case.branch.special_points
+                ],
+            }
+            for case in assessment.cases
+        ],
+        "notes": list(assessment.notes),
+    }
+
+
+def branch_table(branch: Branch) -> xarray.Dataset:
+    """The points of a branch as a labelled table along the dimension "point"."""
+    import xarray as xr  # noqa: PLC0415  slow to import, and only files need it
+
+    columns: dict[str, tuple[str, Any, Mapping[str, str]]] = {
+        "omega": ("point", branch.omega, {"units": "rad/s"}),
+        "speed": ("point", branch.omega * RPM, {"units": "rpm"}),
+        "stable": ("point", branch.stable.astype(np.int8), {"flag_meanings": "1: returns"}),
+        "error": ("point", branch.error, {"units": "m"}),
+        "largest_multiplier": ("point", np.abs(branch.multipliers[:, 0]), {}),
+    }
+    for which in branch.system.named:
+        columns[f"amplitude_{which}"] = ("point", branch.amplitude(which), {"units": "m"})
+        columns[f"phase_{which}"] = ("point", branch.phase(which), {"units": "rad"})
+    attributes = {
+        "title": "Periodic motions over frequency",
+        "method": repr(branch.method),
+        "status": branch.status.value,
+        "flipflow_version": branch.version,
+    }
+    return xr.Dataset(columns, attrs=attributes)
+
+
+def write_response(assessment: Assessment, folder: Path) -> list[str]:
+    """Write the response of every case as NetCDF and CSV; the names of the files.
+
+    Branches have different numbers of points, so the cases follow each other along "point".
+    """
+    import xarray as xr  # noqa: PLC0415  slow to import, and only files need it
+
+    tables = [branch_table(case.branch) for case in assessment.cases]
+    owner = np.repeat(np.arange(len(tables)), [table.sizes["point"] for table in tables])
+    joined = xr.concat(tables, dim="point", combine_attrs="drop_conflicts")
+    meanings = ", ".join(f"{k}: {case.name}" for k, case in enumerate(assessment.cases))
+    joined["case"] = ("point", owner.astype(np.int32), {"flag_meanings": meanings})
+    joined.attrs["input_hash"] = assessment.input_hash
+    _write(folder / "response.nc", joined.to_netcdf())
+    rows = [
+        _csv(table, case=case.name, head=k == 0)
+        for k, (case, table) in enumerate(zip(assessment.cases, tables, strict=True))
+    ]
+    _write(folder / "response.csv", b"".join(rows))
+    return ["response.nc", "response.csv"]
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make an output folder and see that it can be written, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        When it cannot.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        remedy = f"it cannot be written ({error.strerror}); name a folder you own"
+        raise InputError("--output", str(folder), remedy) from None
+
+
+def _csv(table: xarray.Dataset, case: str | None = None, *, head: bool = True) -> bytes:
+    import io  # noqa: PLC0415  shadows the package elsewhere
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [str(name) for name in table.data_vars]
+    if head:
+        units = [table[name].attrs.get("units", "") for name in names]
+        heads = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
+        writer.writerow(heads if case is None else ["case", *heads])
+    for row in zip(*(table[name].values.tolist() for name in names), strict=True):
+        writer.writerow(row if case is None else (case, *row))
+    return text.getvalue().encode()
+
+
+def _write(target: Path, content: bytes | memoryview) -> None:
+    """Write a whole file or nothing."""
+    try:
+        with tempfile.NamedTemporaryFile(dir=target.parent, delete=False) as part:
+            part.write(bytes(content))
+        # A temporary file is its owner's alone; a result is as readable as any other file.
+        Path(part.name).chmod(0o666 & ~_umask())
+        Path(part.name).replace(target)
+    except OSError as error:
+        remedy = f"it cannot be written ({error.strerror}); name a file in a folder you own"
+        raise InputError("path", str(target), remedy) from None
+
+
+def _umask() -> int:
+    current = os.umask(0)
+    os.umask(current)
+    return current
