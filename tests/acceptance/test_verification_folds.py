@@ -11,7 +11,7 @@ import pytest
 import flipflow as ff
 from conftest import LIGHT_DAMPING
 from judge import close
-from reference import two_event
+from reference import integrate, two_event
 
 ROW_18 = {
     "e = 8 mm": ({"clearance": 8e-3}, (198.64747, 164.12941), (198.67, 164.08)),
@@ -117,3 +117,24 @@ def test_row_19_no_folds_on_the_near_side_of_the_cusps(response) -> None:
     for field, (value, _, _) in CUSPS.items():
         assert response(**{field: 0.998 * value}).folds == (), f"{field} before its cusp"
         fold_pair(response(**{field: 1.002 * value}), f"{field} beyond its cusp")
+
+
+def test_row_19_a_small_pair_just_above_contact_is_real(screen, response) -> None:
+    """Row 19 speaks of the folds of the resonance. At 1 mm there is another pair at 40 rad/s.
+
+    Within 0.1 rad/s above contact three motions coexist. Both methods find the pair, and DOP853
+    comes back to each of the three after ten turns (rounding grows by the multiplier 1.17).
+    """
+    exact = response(clearance=1e-3)
+    folds = [fold.omega for fold in exact.folds]
+    assert len(folds) == 2
+    assert 39.9 < min(folds) < max(folds) < 40.1, folds
+    series = response(ff.HarmonicBalance(21), clearance=1e-3)
+    close("folds by H = 21", [fold.omega for fold in series.folds], folds, abs=1e-2)
+    machine = integrate.Machine.of(screen.replace(clearance=1e-3).system())
+    omega = sum(folds) / 2.0
+    orbits = exact.orbits_at(omega)
+    assert [orbit.stability for orbit in orbits] == ["stable", "unstable", "stable"]
+    for orbit in orbits:
+        end = integrate.flow(machine, orbit.state, omega, 0.0, 10.0 * orbit.period).final
+        close("state after ten turns", end, orbit.state, abs=1e-9)

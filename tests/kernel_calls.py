@@ -1,0 +1,76 @@
+"""Kernels that only other kernels call, made callable for tests; cached as the package's own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flipflow.kernels.balance import balance_residual
+from flipflow.kernels.compile import kernel
+from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
+from flipflow.kernels.flow import saltation
+from flipflow.kernels.gapmotion import extremes, next_change
+from flipflow.kernels.shooting import shooting_residual
+
+
+@kernel(entry=True)
+def solve(A, pivot, b):
+    """Solution in b, factors in A; the determinant's sign, 0 for a singular matrix."""
+    if not lu_factor(A, pivot):
+        return 0.0
+    lu_solve(A, pivot, b)
+    return lu_sign(A, pivot)
+
+
+@kernel(entry=True)
+def change_after(motion, contact, state, horizon, fired):
+    """``next_change`` with all terms of the motion."""
+    return next_change(motion, contact, state, motion.rate.shape[0], horizon, fired)
+
+
+@kernel(entry=True)
+def range_of(motion, duration):
+    """``extremes`` of the first gap."""
+    return extremes(motion, motion.rate.shape[0], 0, duration)
+
+
+@kernel(entry=True)
+def shoot(problem, z, omega, r, J):
+    """``shooting_residual``."""
+    return shooting_residual(problem, z, omega, r, J)
+
+
+@kernel(entry=True)
+def balance(problem, u, omega, r, J):
+    """``balance_residual``."""
+    return balance_residual(problem, u, omega, r, J)
+
+
+@kernel(entry=True)
+def jump(plan, spring, sign, U):
+    """``saltation``."""
+    saltation(plan, spring, sign, U, U.shape[0])
+
+
+def residual_of(call, problem, unknowns: int):
+    """A Python function (u, omega) -> (r, J) of a residual kernel."""
+
+    def evaluate(u: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray]:
+        r, J = np.zeros(unknowns), np.zeros((unknowns, unknowns + 1))
+        code = call(problem, np.ascontiguousarray(u), float(omega), r, J)
+        assert code == 0, f"status {code}"
+        return r, J
+
+    return evaluate
+
+
+def central_differences(evaluate, u: np.ndarray, omega: float, steps: np.ndarray) -> np.ndarray:
+    """[dr/du, dr/d omega] by central differences; the last step is that of omega."""
+    columns = []
+    for k, h in enumerate(steps):
+        d = np.zeros(u.size)
+        if k < u.size:
+            d[k] = h
+        dw = h if k == u.size else 0.0
+        ahead, behind = evaluate(u + d, omega + dw)[0], evaluate(u - d, omega - dw)[0]
+        columns.append((ahead - behind) / (2.0 * h))
+    return np.array(columns).T
