@@ -68,7 +68,7 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
         "all bars overlap, within the operating region (contact begins at w_cs; equal amplitudes "
         "at w_ea; antiresonance of the main frame at w_ar; jump speeds w_lb and w_ub)."
     )
-    return Figure("Allowed speed range", caption, (panel,), height=130 + 34 * len(rows))
+    return Figure("Allowed speed range", caption, (panel,), height=120 + 28 * len(rows))
 
 
 def energy_figure(assessment: Assessment) -> Figure | None:

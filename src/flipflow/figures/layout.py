@@ -74,7 +74,7 @@ def arrange(figure: Figure) -> Geometry:
         for panel, (left, width) in zip(row, spans, strict=False):
             rects.append(Rect(left, top, width, height))
             labels.append(place_labels(panel, width))
-            titles.append(_labels_height(labels[-1]))
+            titles.append(head - 6.0 - TITLE_ROW)
         top += height + ROW_GAP
     return Geometry(tuple(rects), tuple(labels), tuple(titles), 0.0)
 
@@ -99,21 +99,36 @@ def legend_rows(figure: Figure) -> int:
 
 
 def place_labels(panel: Panel, width: float) -> dict[int, Label]:
-    """Places for the labels of vertical lines, so that none covers another or is cut off."""
-    marked = [(line.at, k) for k, line in enumerate(panel.lines) if _labelled(line)]
+    """Places for the labels of vertical lines, so that none covers another or is cut off.
+
+    Labels of two lines close together are pushed apart, the next ones go a row up.
+    """
+    marked = sorted((line.at, k) for k, line in enumerate(panel.lines) if _labelled(line))
     if panel.x.bounds is None:
         return {k: Label(0, 0.0) for _, k in marked}
     low, high = panel.x.bounds
+    lines = [(at - low) / (high - low) * width for at, _ in marked]
+    halves = [CHARACTER * len(panel.lines[k].text) / 2.0 + 3.0 for _, k in marked]
+    middles = list(_apart(lines, halves, width))
     ends: list[float] = []
     labels: dict[int, Label] = {}
-    for at, k in sorted(marked):
-        line = (at - low) / (high - low) * width
-        half = CHARACTER * len(panel.lines[k].text) / 2.0 + 3.0
-        middle = max(min(line, width + RIGHT - half), half - 20.0)
-        level = next((n for n, end in enumerate(ends) if middle - half >= end), len(ends))
+    for (_, k), line, half, middle in zip(marked, lines, halves, middles, strict=True):
+        level = next((n for n, end in enumerate(ends) if middle - half >= end - 1.0), len(ends))
         ends[level : level + 1] = [middle + half]
         labels[k] = Label(level, middle - line)
     return labels
+
+
+def _apart(lines: list[float], halves: list[float], width: float) -> Iterator[float]:
+    """Middles of labels: a label too close to the next moves left of its line, the next right."""
+    moved = False
+    for k, (line, half) in enumerate(zip(lines, halves, strict=True)):
+        middle = line
+        if moved:
+            middle, moved = line + half - 3.0, False
+        elif k + 1 < len(lines) and line + half > lines[k + 1] - halves[k + 1]:
+            middle, moved = line - half + 3.0, True
+        yield max(min(middle, width + RIGHT - half), half - 20.0)
 
 
 def _labelled(line: Line) -> bool:

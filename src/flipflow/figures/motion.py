@@ -19,13 +19,19 @@ from flipflow.model.system import Coordinate
 from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
+Found = Sequence[tuple[int, CaseAssessment, Orbit]]
 TURNS = 2
 POINTS = 181
+MOTION_HEIGHT = 186
 TICKS = tuple((90.0 * k, f"{90 * k}") for k in range(0, 4 * TURNS + 1, 2))
 CONTACT_WORDS = (
     "Shaded: the stop is touched; dark on the plus side (x2 > 0), light on the minus side."
 )
 NO_CONTACT = "The stop is not reached."
+ORBITS = (
+    "Orbit: path of a frame in one turn, both axes at the same scale; dot: where it is when the "
+    "unbalance points along x."
+)
 PORTRAIT = "Velocity over displacement of the relative motion: one closed loop a turn."
 
 
@@ -60,22 +66,36 @@ def orbit_figure(orbit: Orbit) -> Figure:
     return Figure(title, caption, panels, columns=2, height=300, shares=(0.6, 0.4))
 
 
-def two_turns_figure(assessment: Assessment) -> Figure | None:
-    """Relative motion of all load cases over two turns; contact of the first case shaded."""
+def motions_figure(assessment: Assessment) -> Figure | None:
+    """Orbits of both frames beside two turns of relative motion, all load cases.
+
+    The first case is drawn bold, and its contact is shaded. Without the normal direction there
+    are no orbits.
+    """
     found = _with_motion(assessment)
     if not found:
         return None
-    traces = tuple(_in_time(orbit, "relative", case.name, k) for k, case, orbit in found)
     _, case, orbit = found[0]
+    traces = tuple(_in_time(o, "relative", c.name, k, legend=False) for k, c, o in found)
+    turns = Panel(
+        _shaft(), Axis("relative motion (x2)", "mm"), traces,
+        bands=tuple(contact_bands(orbit)), lines=gap_lines(orbit),
+    )  # fmt: skip
     said = f"The stop is not reached in case {case.name}."
     if case.stop_reached:
         share = 100.0 * orbit.contact_share()
-        said = f"{CONTACT_WORDS} Case {case.name}, {share:.3g} % of the turn."
-    panel = Panel(
-        _shaft(), Axis("relative displacement (x2)", "mm"), traces,
-        bands=tuple(contact_bands(orbit)), lines=gap_lines(orbit),
+        said = (
+            f"Shaded: the stop is touched, {share:.3g} % of the turn, dark on the plus side (case "
+            f"{case.name})."
+        )
+    orbits = _orbits(found)
+    if orbits is None:
+        return Figure("Relative motion over two turns", said, (turns,), height=MOTION_HEIGHT)
+    return Figure(
+        "Orbits of both frames at true scale; relative motion over two turns",
+        f"Dot: the unbalance points along x. {said}", (orbits, turns), 2, MOTION_HEIGHT,
+        _shares(orbits),
     )  # fmt: skip
-    return Figure("Relative motion over two turns", said, (panel,), height=270)
 
 
 def portrait_figure(assessment: Assessment) -> Figure | None:
@@ -97,22 +117,19 @@ def portrait_figure(assessment: Assessment) -> Figure | None:
 
 def orbits_figure(assessment: Assessment) -> Figure | None:
     """Paths of both frames in the x-y plane at true scale, one panel for each load case."""
-    found = [(case, orbit) for _, case, orbit in _with_motion(assessment) if case.normal]
+    found = [one for one in _with_motion(assessment) if one[1].normal is not None]
     if not found:
         return None
-    reach = 1.08 * max(float(np.abs(v).max()) for c, o in found for v in _paths(c, o).values())
-    columns = 4 if len(found) == 4 or len(found) > 6 else 3
+    columns = 2
+    whole = _orbits(found)
+    bounds = (whole.x, whole.y) if whole is not None else None
     panels = tuple(
-        _orbit_panel(case, orbit, reach, first=k == 0, left=k % columns == 0)
-        for k, (case, orbit) in enumerate(found)
+        Panel(*bounds, tuple(_paths([one], legend=k == 0)), title=one[1].name, equal=True)
+        for k, one in enumerate(found)
+        if bounds is not None
     )
     rows = math.ceil(len(panels) / columns)
-    caption = (
-        "Path of each frame in one turn, x along the screen surface and y normal to it, the same "
-        "scale on both axes. Dot: where the frame is when the unbalance points along x."
-    )
-    height = 84 + rows * (580 // columns) + (rows - 1) * 71
-    return Figure("Orbits of both frames", caption, panels, columns=columns, height=height)
+    return Figure("Orbits of both frames", ORBITS, panels, columns, 60 + 172 * rows)
 
 
 def contact_bands(orbit: Orbit, spring: int = 0) -> Iterator[Band]:
@@ -161,7 +178,7 @@ def _across(orbit: Orbit) -> Coordinate:
     return coordinates(orbit.system)[-1]
 
 
-def _with_motion(assessment: Assessment) -> Sequence[tuple[int, CaseAssessment, Orbit]]:
+def _with_motion(assessment: Assessment) -> Found:
     return [(k, c, c.orbit) for k, c in enumerate(assessment.cases) if c.orbit is not None]
 
 
@@ -169,12 +186,14 @@ def _shaft() -> Axis:
     return Axis("shaft angle", "deg", (0.0, 360.0 * TURNS), TICKS)
 
 
-def _in_time(orbit: Orbit, which: Coordinate, name: str, index: int = 0) -> Trace:
+def _in_time(
+    orbit: Orbit, which: Coordinate, name: str, index: int = 0, *, legend: bool = True
+) -> Trace:
     angle = np.linspace(0.0, 360.0 * TURNS, TURNS * POINTS)
     t = np.radians(angle) / orbit.omega
     return Trace(
         name, angle, orbit.displacement(which, t) * MM, "motion", case_colour(index),
-        symbol=case_symbol(index), bold=index == 0,
+        symbol=case_symbol(index), bold=index == 0, legend=legend,
     )  # fmt: skip
 
 
@@ -186,22 +205,42 @@ def _loop(orbit: Orbit, which: Coordinate, name: str, index: int = 0) -> Trace:
     )  # fmt: skip
 
 
-def _paths(case: CaseAssessment, orbit: Orbit) -> dict[str, Real]:
-    t = np.linspace(0.0, orbit.period, POINTS)
-    y = case.normal.displacement(t) if case.normal is not None else np.zeros_like(t)
-    return {name: np.array([orbit.displacement(name, t), y]) * MM for name in ("main", "floating")}
+def _orbits(found: Found) -> Panel | None:
+    """Orbits of all load cases in one panel; None without the normal direction."""
+    traces = tuple(_paths(found, legend=True))
+    if not traces:
+        return None
+    x = 1.1 * max(float(np.abs(trace.x).max()) for trace in traces)
+    y = 1.1 * max(float(np.abs(trace.y).max()) for trace in traces)
+    return Panel(
+        Axis("x, along the surface", "mm", (-x, x)), Axis("y, normal", "mm", (-y, y)), traces,
+        equal=True,
+    )  # fmt: skip
 
 
-def _orbit_panel(
-    case: CaseAssessment, orbit: Orbit, reach: float, *, first: bool, left: bool
-) -> Panel:
-    traces = []
-    for name, (x, y) in _paths(case, orbit).items():
-        start = (x[:1], y[:1])
-        traces += [
-            Trace(label(name), x, y, "motion", name, bold=name == "main", legend=first),
-            Trace(label(name), *start, "point", name, symbol="circle", legend=False),
-        ]
-    axis = Axis("x", "mm", (-reach, reach))
-    across = Axis("y" if left else "", "mm" if left else "", (-reach, reach))
-    return Panel(axis, across, tuple(traces), title=case.name, equal=True)
+def _paths(found: Found, *, legend: bool) -> Iterator[Trace]:
+    """Both frames of each case, the first bold, with a dot at shaft angle 0."""
+    for k, case, orbit in found:
+        if case.normal is None:
+            continue
+        t = np.linspace(0.0, orbit.period, POINTS * orbit.periods)
+        y = case.normal.displacement(t) * MM
+        first = k == found[0][0]
+        for name in ("floating", "main"):
+            x = orbit.displacement(name, t) * MM
+            symbol = None if first else case_symbol(k)
+            yield Trace(
+                label(name), x, y, "motion", name, symbol, bold=first, legend=legend and first,
+                dash="dashdot" if name == "floating" else "",
+            )  # fmt: skip
+            if first:
+                dot = (x[:1], y[:1])
+                yield Trace(label(name), *dot, "point", name, symbol="circle", legend=False)
+
+
+def _shares(orbits: Panel) -> tuple[float, float]:
+    """Widths of the columns such that the orbits fill their panel at true scale."""
+    room, chrome = 545.0, 66.0
+    aspect = orbits.x.bounds[1] / orbits.y.bounds[1] if orbits.x.bounds and orbits.y.bounds else 1.0
+    share = min(max((MOTION_HEIGHT - chrome) * aspect / room, 0.2), 0.55)
+    return share, 1.0 - share

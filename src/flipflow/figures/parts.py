@@ -60,6 +60,8 @@ class Trace:
         Whether it stands in the legend.
     lower
         Lower edge of an area, (n,).
+    dash
+        Another dash than the role's.
     x_also
         x in other units, for the hover text: pairs of unit and values.
     """
@@ -73,6 +75,7 @@ class Trace:
     bold: bool = False
     legend: bool = True
     lower: Real | None = None
+    dash: str = ""
     x_also: tuple[tuple[str, Real], ...] = ()
 
 

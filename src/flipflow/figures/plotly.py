@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Iterator
 from importlib import resources
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,8 @@ Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 SYMBOLS = {"triangle": "triangle-up", "cross": "x-thin-open"}
 MARKS_SHOWN = 9
-CONFIG = {"displaylogo": False, "responsive": False, "showTips": False}
+# The bar of tools would cover the legend; zoom, pan and reset work with the mouse alone.
+CONFIG = {"displayModeBar": False, "displaylogo": False, "responsive": False, "showTips": False}
 START = """
 for (const place of document.querySelectorAll("[data-figure]")) {
   const figure = JSON.parse(place.querySelector("script").textContent);
@@ -116,7 +116,7 @@ def _axis(axis: Axis, rect: Rect, figure: Figure, key: str, *, across: bool) -> 
     made: Json = {
         "domain": [start / whole, min((start + length) / whole, 1.0)],
         "anchor": f"{'y' if across else 'x'}{key}",
-        "title": {"text": axis.title, "standoff": 6},
+        "title": {"text": axis.title, "standoff": 5, "font": {"size": FONT}},
         "ticks": "outside", "ticklen": 4, "tickcolor": INK, "linecolor": INK, "mirror": True,
         "showline": True, "gridcolor": FAINT, "zeroline": False, "automargin": False,
         "exponentformat": "none", "separatethousands": False,
@@ -161,7 +161,11 @@ def _look(trace: Trace, colour: str) -> Json:
     width = 2.2 if trace.bold else 1.4
     look: Json = {
         "mode": "lines",
-        "line": {"color": colour, "width": width, "dash": DASHES.get(trace.role, "solid")},
+        "line": {
+            "color": colour,
+            "width": width,
+            "dash": trace.dash or DASHES.get(trace.role, "solid"),
+        },
     }
     if trace.symbol:
         shape = SYMBOLS.get(trace.symbol, trace.symbol)
@@ -185,16 +189,14 @@ def _hover(trace: Trace, panel: Panel) -> str:
 
 
 def _bars(bars: tuple[Bar, ...], key: str) -> Iterator[Json]:
-    """One trace for each kind of bar."""
-
-    def kind(bar: Bar) -> tuple[str, str, str, bool]:
-        return bar.name, bar.colour, bar.hatch, bar.legend
-
-    for (name, colour, hatch, legend), group in groupby(sorted(bars, key=kind), key=kind):
-        some = list(group)
+    """One trace for each kind of bar, in the order of their first appearance."""
+    kinds: dict[tuple[str, str, str], list[Bar]] = {}
+    for bar in bars:
+        kinds.setdefault((bar.name, bar.colour, bar.hatch), []).append(bar)
+    for (name, colour, hatch), some in kinds.items():
         yield {
             "type": "bar", "orientation": "h", "name": name, "legendgroup": name,
-            "showlegend": legend, "xaxis": f"x{key}", "yaxis": f"y{key}",
+            "showlegend": any(bar.legend for bar in some), "xaxis": f"x{key}", "yaxis": f"y{key}",
             "base": [bar.low for bar in some], "x": [bar.high - bar.low for bar in some],
             "y": [bar.y for bar in some], "width": [bar.thickness for bar in some],
             "text": [bar.text for bar in some], "textposition": "outside", "cliponaxis": False,
@@ -202,8 +204,8 @@ def _bars(bars: tuple[Bar, ...], key: str) -> Iterator[Json]:
             "hovertemplate": f"<b>{html.escape(name)}</b><br>"
             "%{customdata[0]:.4~r} to %{customdata[1]:.4~r}<extra></extra>",
             "marker": {"color": COLOURS[colour], "line": {"width": 0.6, "color": INK},
-                       "pattern": {"shape": hatch, "fgcolor": "white", "solidity": 0.25,
-                                   "size": 5}},
+                       "pattern": {"shape": hatch, "bgcolor": COLOURS[colour],
+                                   "fgcolor": "white", "solidity": 0.25, "size": 5}},
         }  # fmt: skip
 
 

@@ -29,7 +29,7 @@ NEAR = 0.35
 MOST_COORDINATES = CASES
 READING = (
     "Solid: the motion returns after a small disturbance. Dashed: it does not, so the machine "
-    "leaves it. Arrows: the amplitude jumps there."
+    "leaves it. Arrows: the amplitude jumps, as the speed rises or falls."
 )
 
 
@@ -70,7 +70,7 @@ def branch_figure(branch: Branch, omega: float | None = None, title: str = "") -
         "Amplitude is half the peak-to-peak motion; phase is that of the first harmonic against "
         f"the unbalance force, negative when the motion lags. {READING}"
     )
-    return Figure(title or "Response over speed", caption, (top, bottom), height=560)
+    return Figure(title or "Response over speed", caption, (top, bottom), height=430)
 
 
 def linear_figure(response: LinearResponse) -> Figure:
@@ -126,11 +126,11 @@ def cases_figure(assessment: Assessment) -> Figure:
     close = () if near is None else (_cases_panel(assessment, names, curves, near),)
     panels = (*close, whole)
     caption = (
-        "Relative amplitude (|x2|), half the peak-to-peak motion between the frames. Grey-blue: "
-        f"the band of all load cases as the speed rises. Green: allowed speed range. {READING}"
+        "Half the peak-to-peak motion. Green strip: allowed speeds. Dashed: does not return after "
+        "a small disturbance. Arrows: jumps."
     )
     return Figure(
-        "Amplitude over speed", caption, panels, columns=len(panels), height=330,
+        "Amplitude of the relative motion over speed", caption, panels, len(panels), 216,
         shares=(0.56, 0.44) if len(panels) == 2 else (),
     )  # fmt: skip
 
@@ -229,19 +229,18 @@ def _cases_panel(
     bounds = None if near is None else (near[0] * RPM, near[1] * RPM)
     return Panel(
         speed_axis(curves[0].omega, bounds),
-        Axis("relative amplitude (|x2|)", "mm", (0.0, 1.08 * MM * max(top, *limits, 0.0))),
+        Axis("amplitude (|x2|)", "mm", (0.0, 1.08 * MM * max(top, *limits, 0.0))),
         traces=tuple(traces),
         bands=tuple(Band("x", a * RPM, b * RPM) for a, b in assessment.region.feasible),
         lines=(
             *_working(assessment.omega, text=near is not None),
-            *_jump_lines(jumps),
+            *_jump_lines(jumps, brief=True),
             *(
                 Line("y", limit * MM, f"{word} {limit * MM:.3g} mm" if word else "", text_at=at)
                 for limit, word, at in zip(limits, words, (1.0, 0.0), strict=False)
             ),
         ),
         arrows=_arrows(jumps),
-        title="near the working speed" if near is not None else "whole range",
     )
 
 
@@ -280,16 +279,13 @@ def _arrows(jumps: Sequence[Jump]) -> tuple[Arrow, ...]:
     return tuple(Arrow(j.omega * RPM, j.start * MM, j.omega * RPM, j.end * MM) for j in jumps)
 
 
-def _jump_lines(jumps: Sequence[Jump]) -> tuple[Line, ...]:
+def _jump_lines(jumps: Sequence[Jump], *, brief: bool = False) -> tuple[Line, ...]:
     """The jump speeds, labelled above the panel."""
+    words = {True: "" if brief else "jump (rising) ", False: "" if brief else "jump (falling) "}
     return tuple(
-        Line(
-            "x", jump.omega * RPM,
-            f"jump, speed {'rising' if jump.rising_speed else 'falling'}: {jump.omega * RPM:.4g}",
-            "mark",
-        )
-        for jump in jumps
-    )  # fmt: skip
+        Line("x", j.omega * RPM, f"{words[j.rising_speed]}{j.omega * RPM:.4g} rpm", "mark")
+        for j in jumps
+    )
 
 
 def _phase_axis(curves: Sequence[Curve]) -> Axis:
@@ -301,7 +297,7 @@ def _phase_axis(curves: Sequence[Curve]) -> Axis:
     ticks = tuple((k * step, f"{k * step:.0f}") for k in range(first, last + 1))
     margin = 0.04 * (high - low)
     bounds = (min(low - margin, first * step), max(high + margin, last * step))
-    return Axis("phase to the unbalance force", "deg", bounds, ticks)
+    return Axis("phase", "deg", bounds, ticks)
 
 
 def _from_zero(values: Iterator[Real]) -> tuple[float, float]:

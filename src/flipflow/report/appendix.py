@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from flipflow.analyses.assessment import Assessment, CaseAssessment
+from flipflow.figures.curves import Curve
 from flipflow.figures.palette import STABILITY_WORDS
+from flipflow.io.units import in_unit
 from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Values, cells
 from flipflow.report.numbers import multiplier, number, quantity, rpm
 from flipflow.report.registry import Part, section
@@ -55,8 +57,9 @@ def special_points(assessment: Assessment) -> Iterator[Block]:
         Column("Relative amplitude", "mm", numeric=True),
     )
     rows = tuple(
-        _point_row(case.name, point)
+        _point_row(case.name, point, jumps)
         for case in assessment.cases
+        for jumps in (_jumps(case.branch),)
         for point in case.branch.special_points
     )
     caption = (
@@ -125,20 +128,28 @@ def _branch_row(name: str, branch: Branch) -> tuple[Cell, ...]:
     )
 
 
-def _point_row(name: str, point: SpecialPoint) -> tuple[Cell, ...]:
+def _point_row(name: str, point: SpecialPoint, jumps: Mapping[float, str]) -> tuple[Cell, ...]:
     happens = KINDS.get(point.kind, point.kind)
     if point.kind == "fold":
-        happens = "jump speed (fold)"
-    if point.side:
+        happens = jumps.get(point.omega, "jump speed (fold)")
+    if point.side and not point.orbit.system.symmetric:
         happens += " (+ side)" if point.side > 0 else " (- side)"
     return cells(
         name,
         happens,
         rpm(point.omega),
-        quantity(point.omega, "Hz", "rad/s", with_unit=False),
-        number(point.omega),
+        f"{in_unit(point.omega, 'Hz', 'rad/s'):.4g}",
+        f"{point.omega:.4g}",
         quantity(point.amplitude("relative"), "mm", "m", with_unit=False),
     )
+
+
+def _jumps(branch: Branch) -> dict[float, str]:
+    """Folds that a slowly changing speed meets, in words."""
+    return {
+        jump.omega: f"jump when the speed {'rises' if jump.rising_speed else 'falls'} (fold)"
+        for jump in Curve.of(branch, "relative").jumps()
+    }
 
 
 def _motion_rows(case: CaseAssessment) -> Iterator[tuple[Cell, ...]]:

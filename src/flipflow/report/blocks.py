@@ -27,10 +27,11 @@ class TitleBlock(Block):
 
 @dataclass(frozen=True)
 class Heading(Block):
-    """A heading; level 1 is a part of the report and begins a page."""
+    """A heading; level 1 is a part of the report, which begins a page unless told otherwise."""
 
     text: str
     level: int = 2
+    new_page: bool = True
 
 
 @dataclass(frozen=True)

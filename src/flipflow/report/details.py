@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.bars import energy_figure, region_figure
-from flipflow.figures.motion import portrait_figure
+from flipflow.figures.motion import orbits_figure, portrait_figure
 from flipflow.figures.response import branch_figure
 from flipflow.figures.schematic import schematic
 from flipflow.io.check import Case, Check, Value, check_project
@@ -75,7 +75,7 @@ def quantities(assessment: Assessment) -> Iterator[Block]:
     found = [case for case in assessment.cases if case.values]
     if not found:
         return
-    yield Heading("Results", 1)
+    yield Heading("Results", 1, new_page=False)
     columns = [Column("Quantity"), Column("Symbol")]
     columns += [Column(case.name, numeric=True) for case in found]
     rows = []
@@ -95,8 +95,8 @@ def allowed_speeds(assessment: Assessment) -> Iterator[Block]:
 
 @section(Assessment, Part.DETAILS, 50)
 def portrait(assessment: Assessment) -> Iterator[Block]:
-    """Phase portrait and energy balance."""
-    figures = (portrait_figure(assessment), energy_figure(assessment))
+    """Orbits case by case, phase portrait and energy balance."""
+    figures = [make(assessment) for make in (orbits_figure, portrait_figure, energy_figure)]
     yield from (FigureBlock(figure) for figure in figures if figure is not None)
 
 

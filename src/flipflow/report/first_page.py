@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from flipflow.analyses.assessment import Assessment, CaseAssessment, LimitRow
 from flipflow.analyses.feasible import Bound
 from flipflow.analyses.quantities import QUANTITIES
-from flipflow.figures.motion import orbits_figure, two_turns_figure
+from flipflow.figures.motion import motions_figure
 from flipflow.figures.response import cases_figure
 from flipflow.report.blocks import (
     Block,
@@ -26,6 +26,10 @@ from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, r
 from flipflow.report.registry import Part, section
 
 FAIL, ATTENTION, PASS, NOT_CHECKED = "fail", "attention", "pass", "not checked"
+NO_NORMAL = (
+    "Orbits are not drawn: isolation.normal_stiffness or isolation.normal_damping is missing in "
+    "the machine file."
+)
 NO_LIMIT = (-math.inf, math.inf)
 CASE_COLUMNS = (
     ("relative_amplitude", "amplitude"),
@@ -50,8 +54,9 @@ def title_block(assessment: Assessment) -> Iterator[Block]:
             ("Revision", document.revision),
             ("Prepared by", document.prepared_by),
             ("Checked by", document.checked_by),
-            ("Working speed", speed(omega) if omega is not None else "not given"),
-            ("Date, signature", ""),
+            ("Date", ""),
+            ("Signature", ""),
+            ("Speed", speed(omega) if omega is not None else "not given"),
         ),
     )
 
@@ -76,16 +81,11 @@ def amplitude(assessment: Assessment) -> Iterator[Block]:
 @section(Assessment, Part.FIRST_PAGE, 40)
 def motions(assessment: Assessment) -> Iterator[Block]:
     """Orbits at true scale, and two turns of relative motion."""
-    orbits, turns = orbits_figure(assessment), two_turns_figure(assessment)
-    if orbits is not None:
-        yield FigureBlock(orbits)
-    elif turns is not None:
-        yield Note(
-            "Orbits are not drawn: isolation.normal_stiffness or isolation.normal_damping is "
-            "missing in the machine file."
-        )
-    if turns is not None:
-        yield FigureBlock(turns)
+    figure = motions_figure(assessment)
+    if figure is not None:
+        yield FigureBlock(figure)
+        if not any(case.normal for case in assessment.cases):
+            yield Note(NO_NORMAL)
     elif assessment.omega is not None:
         yield Note("No motion was found at the working speed, so none is drawn.")
 
@@ -102,11 +102,11 @@ def limits(assessment: Assessment) -> Iterator[Block]:
         Column("State"),
     )
     caption = (
-        "Worst value over all load cases at the working speed. Margin: distance from the limit "
-        "as a share of the limit. Attention: met by less than 5 %."
+        "Worst value over all load cases. Margin: distance from the limit as a share of it. "
+        "Attention: met by less than 5 %."
     )
     rows = tuple(_limit_row(row) for row in assessment.limits_table)
-    yield Table("Limits", columns, rows, caption)
+    yield Table("", columns, rows, caption)
 
 
 @section(Assessment, Part.FIRST_PAGE, 60, brief=True)
@@ -118,12 +118,11 @@ def cases(assessment: Assessment) -> Iterator[Block]:
     for name, title in CASE_COLUMNS:
         columns.append(Column(title, QUANTITIES[name].shown_unit, numeric=True))
     caption = (
-        "At the working speed. Amplitude (|x2|): half the peak-to-peak motion between the frames; "
-        "stroke is twice that. Phase: the relative motion against the unbalance force, negative "
-        "when it lags. g: greatest acceleration in any direction."
+        "Relative motion: amplitude (|x2|), stroke (twice that), phase to the unbalance force "
+        "(negative: it lags). Frames: greatest acceleration in any direction."
     )
     rows = tuple(_case_row(case) for case in assessment.cases)
-    yield Table("Load cases", tuple(columns), rows, caption)
+    yield Table("", tuple(columns), rows, caption)
 
 
 @section(Assessment, Part.FIRST_PAGE, 70)
@@ -136,9 +135,8 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
             ("Foundation", _line(assessment, "foundation_force", "support_force")),
             ("Shear springs", _line(assessment, "shear_strain")),
             ("Stop springs", _line(assessment, "stop_force", "stop_piece_force")),
-            ("Exciter and bearings", _line(assessment, "exciter_force", "bearing_force")),
-            ("Power", _line(assessment, "dissipated_power")),
-            ("Material", _line(assessment, "throw_number", lowest=True)),
+            ("Exciter, bearings", _line(assessment, "exciter_force", "bearing_force")),
+            ("Power, throw", f"{_line(assessment, 'dissipated_power')}; {_throw(assessment)}"),
         )
     )
 
@@ -235,4 +233,8 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
         if case.values.get(name) is not None
     ]
     where = f" (case {case.name})" if len(assessment.cases) > 1 else ""
-    return f"{', '.join(parts)}{where}. {QUANTITIES[first].sentence}"
+    return f"{', '.join(parts)}{where}"
+
+
+def _throw(assessment: Assessment) -> str:
+    return _line(assessment, "throw_number", lowest=True)

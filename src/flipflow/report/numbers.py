@@ -72,7 +72,9 @@ def percent(share: float | None) -> str:
     """A margin with its sign."""
     if share is None:
         return NOTHING
-    return f"{100.0 * share:+.3g} %" if math.isfinite(share) else "no end"
+    if not math.isfinite(share):
+        return "no end"
+    return f"{'+' if share > 0.0 else ''}{number(100.0 * share)} %"
 
 
 def multiplier(value: complex) -> str:

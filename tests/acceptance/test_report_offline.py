@@ -1,0 +1,100 @@
+"""The report in a real browser without network: it draws itself, complains of and asks for nothing.
+
+Issue 2, "Must show" 8. Chromium logs every request it starts, and whether a page started it or the
+browser for its own housekeeping. No name is resolved, so that nothing could be fetched anyway.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+import flipflow as ff
+from flipflow.analyses.assessment import assess
+from flipflow.report.blocks import FigureBlock
+from flipflow.report.html import html
+from flipflow.report.registry import blocks_of
+
+CHROMIUM = shutil.which("chromium")
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed"),
+]
+QUIET = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--no-first-run", "--disable-extensions",
+    "--enable-logging=stderr", "--v=0", "--virtual-time-budget=10000",
+    "--host-resolver-rules=MAP * ~NOTFOUND",
+)  # fmt: skip
+NO_PAGE = "not an origin"  # who asks, when the browser does so for itself
+
+
+@pytest.fixture(scope="module")
+def assessment():
+    return assess(ff.load_project("ffs0827"))
+
+
+@pytest.fixture(scope="module")
+def opened(assessment, tmp_path_factory):
+    """The document after its scripts ran, the browser's messages, the addresses it asked for."""
+    folder = tmp_path_factory.mktemp("browser")
+    report = folder / "report.html"
+    report.write_text(html(assessment), encoding="utf-8")
+    return browse(report.as_uri(), folder)
+
+
+def browse(address, folder):
+    log = folder / "net.json"
+    ran = subprocess.run(
+        [CHROMIUM, *QUIET, f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}",
+         "--dump-dom", address],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    return ran.stdout, ran.stderr, requests(json.loads(log.read_text(encoding="utf-8")))
+
+
+def requests(log):
+    """Addresses a page asked for, from a log of Chromium's network stack; files do not pass it."""
+    kinds = {number: name for name, number in log["constants"]["logEventTypes"].items()}
+    started = [
+        event.get("params", {})
+        for event in log["events"]
+        if kinds[event["type"]] == "URL_REQUEST_START_JOB"
+    ]
+    return [one["url"] for one in started if "url" in one and one["initiator"] != NO_PAGE]
+
+
+def test_every_figure_is_drawn(opened, assessment):
+    dom, _, _ = opened
+    wanted = sum(isinstance(block, FigureBlock) for block in blocks_of(assessment))
+    assert wanted > 5
+    assert len(re.findall(r"<div[^>]*data-figure[^>]*class=\"js-plotly-plot\"", dom)) == wanted
+    assert len(re.findall(r'<svg class="main-svg"', dom)) >= wanted
+    assert assessment.verdict in dom
+
+
+def test_the_console_stays_silent(opened):
+    _, messages, _ = opened
+    said = [line for line in messages.splitlines() if "CONSOLE" in line]
+    assert said == []
+
+
+def test_nothing_is_asked_for(opened):
+    _, _, asked = opened
+    assert [url for url in asked if not url.startswith("data:")] == []
+
+
+def test_the_watch_would_notice(tmp_path):
+    """A page that does ask and does complain is caught, so silence means something."""
+    page = tmp_path / "bad.html"
+    page.write_text(
+        '<!DOCTYPE html><img src="http://127.0.0.1:9/x.png"><script>console.error("oh")</script>',
+        encoding="utf-8",
+    )
+    _, messages, asked = browse(page.as_uri(), tmp_path)
+    assert any("CONSOLE" in line and "oh" in line for line in messages.splitlines())
+    assert any(url.startswith("http://127.0.0.1:9/") for url in asked)

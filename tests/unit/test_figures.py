@@ -1,0 +1,265 @@
+"""Neutral figures show the result's own numbers, in rpm and mm; both renderers take them."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import math
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.analyses.assessment import assess
+from flipflow.errors import InputError, MissingExtra, StoreError
+from flipflow.figures.bars import energy_figure, region_figure
+from flipflow.figures.curves import Curve
+from flipflow.figures.layout import WIDTH, arrange, place_labels
+from flipflow.figures.motion import contact_bands, motions_figure, orbits_figure, portrait_figure
+from flipflow.figures.parts import Axis, Figure, Line, Panel
+from flipflow.figures.plotly import described
+from flipflow.figures.response import cases_figure
+from flipflow.figures.scales import MM, RPM
+from flipflow.figures.schematic import schematic
+
+
+@pytest.fixture(scope="module")
+def assessment():
+    return assess(ff.load_project("ffs0827"))
+
+
+@pytest.fixture(scope="module")
+def branch(assessment):
+    return assessment.cases[0].branch
+
+
+@pytest.fixture(scope="module")
+def orbit(assessment):
+    return assessment.cases[0].orbit
+
+
+def figures(assessment):
+    case = assessment.cases[0]
+    omega = np.linspace(5.0, 250.0, 50)
+    results = (
+        case.branch,
+        case.orbit,
+        ff.linear_response(assessment.project.screen, omega),
+        assessment.region,
+        assessment,
+    )
+    made = [orbits_figure(assessment), portrait_figure(assessment), energy_figure(assessment)]
+    return [*map(ff.figure, results), *made, motions_figure(assessment)]
+
+
+def test_every_result_has_a_figure_with_units(assessment):
+    for figure in figures(assessment):
+        assert figure.title
+        assert figure.caption.endswith(".")
+        for panel in figure.panels:
+            assert panel.x.unit in {"rpm", "mm", "deg", "kW"}
+            assert panel.y.unit or panel.y.ticks
+
+
+def test_unknown_result_is_refused_with_what_would_do():
+    with pytest.raises(InputError, match=r"result = 'int'.*Assessment, Branch"):
+        ff.figure(3)
+
+
+def test_branch_is_drawn_in_rpm_and_mm_with_unstable_parts_apart(branch):
+    panel = ff.figure(branch).panels[0]
+    lines = [t for t in panel.traces if t.name == "relative (x2)"]
+    assert {t.role for t in lines} == {"stable", "unstable"}
+    drawn = np.concatenate([t.x for t in lines])
+    assert drawn.min() == pytest.approx(branch.omega.min() * RPM)
+    assert drawn.max() == pytest.approx(branch.omega.max() * RPM)
+    top = max(float(t.y.max()) for t in lines)
+    assert top == pytest.approx(branch.amplitude("relative").max() * MM)
+    assert sum(t.legend for t in lines) == 1
+    for trace in lines:
+        hertz, radians = (values for _, values in trace.x_also)
+        assert np.allclose(hertz * 60.0, trace.x)
+        assert np.allclose(radians * RPM, trace.x)
+
+
+def test_runs_meet_and_the_stable_one_ends_at_the_fold(branch):
+    curve = Curve.of(branch, "relative")
+    runs = list(curve.runs())
+    assert runs[0][1].start == 0
+    assert runs[-1][1].stop == curve.omega.size
+    for (_, one), (_, two) in itertools.pairwise(runs):
+        assert one.stop - 1 == two.start
+    _, first = runs[0]
+    assert curve.omega[first][-1] == branch.folds[0].omega
+
+
+def test_jumps_start_at_the_folds_and_end_on_the_branch(branch):
+    rising, falling = Curve.of(branch, "relative").jumps()
+    upper, lower = branch.folds
+    assert (rising.omega, rising.start) == (upper.omega, upper.amplitude("relative"))
+    assert (falling.omega, falling.start) == (lower.omega, lower.amplitude("relative"))
+    assert rising.end < rising.start
+    assert falling.end > falling.start
+    for jump in (rising, falling):
+        motions = [o.amplitude("relative") for o in branch.orbits_at(jump.omega)]
+        # The line between two points of the branch is what the eye sees there.
+        assert min(abs(jump.end - a) for a in motions) < 2e-2 * max(motions)
+
+
+def test_from_below_never_turns_back(branch):
+    omega, amplitude = Curve.of(branch, "relative").from_below()
+    assert np.all(np.diff(omega) > 0.0)
+    assert amplitude.max() == pytest.approx(branch.amplitude("relative").max())
+
+
+def test_phase_has_no_false_jumps(branch):
+    assert np.abs(np.diff(Curve.of(branch, "floating").phase)).max() < 1.0
+
+
+def test_shaded_contact_is_the_contact_share(orbit):
+    shaded = sum(band.high - band.low for band in contact_bands(orbit))
+    assert shaded == pytest.approx(720.0 * orbit.contact_share(), rel=1e-9)
+
+
+def test_orbits_have_one_scale(assessment):
+    figure = motions_figure(assessment)
+    orbits = figure.panels[0]
+    assert orbits.equal
+    rect = arrange(figure).rects[0]
+    scale = [
+        size / (axis.bounds[1] - axis.bounds[0])
+        for size, axis in ((rect.width, orbits.x), (rect.height, orbits.y))
+    ]
+    # The box fits the motion, so that little of the page is lost to the equal scales.
+    assert scale[0] == pytest.approx(scale[1], rel=0.35)
+
+
+def test_without_the_normal_direction_there_are_no_orbits():
+    project = ff.load_project("ffs0827")
+    screen = project.screen.replace(normal_stiffness=None)
+    bare = assess(dataclasses.replace(project, screen=screen, load_cases=project.load_cases[:1]))
+    assert orbits_figure(bare) is None
+    assert len(motions_figure(bare).panels) == 1
+
+
+def test_without_a_speed_only_the_whole_range_is_drawn():
+    project = ff.load_project("ffs0827")
+    idle = assess(dataclasses.replace(project, speed=None, load_cases=project.load_cases[:1]))
+    assert motions_figure(idle) is None
+    assert energy_figure(idle) is None
+    assert len(cases_figure(idle).panels) == 1
+
+
+def test_band_holds_every_case_at_the_working_speed(assessment):
+    panel = cases_figure(assessment).panels[0]
+    band = next(t for t in panel.traces if t.lower is not None)
+    at = assessment.omega * RPM
+    low, high = np.interp(at, band.x, band.lower), np.interp(at, band.x, band.y)
+    amplitudes = [case.values["relative_amplitude"] * MM for case in assessment.cases]
+    assert low == pytest.approx(min(amplitudes), rel=2e-3)
+    assert high == pytest.approx(max(amplitudes), rel=2e-3)
+
+
+def test_energy_bars_add_up_to_what_is_fed_in(assessment):
+    figure = energy_figure(assessment)
+    for y, case in zip((3.0, 2.0, 1.0, 0.0), assessment.cases, strict=True):
+        end = max(bar.high for bar in figure.panels[0].bars if bar.y == y)
+        fed = case.energy["input"] + case.energy["normal"]
+        assert end == pytest.approx(fed * 1e-3, rel=1e-9)
+
+
+def test_region_shows_every_interval_of_every_case(assessment):
+    bars = region_figure(assessment.region).panels[0].bars
+    wanted = sum(len(i) for case in assessment.region.cases for i in case.intervals.values())
+    names = {case.name for case in assessment.cases}
+    assert sum(bar.name in names for bar in bars) == wanted
+    (allowed,) = (bar for bar in bars if bar.name == "allowed speed range")
+    assert (allowed.low, allowed.high) == pytest.approx(
+        tuple(end * RPM for end in assessment.region.feasible[0])
+    )
+
+
+@pytest.mark.parametrize("places", [(500.0, 505.0), (500.0, 540.0, 560.0, 580.0), (0.0, 1000.0)])
+def test_labels_of_lines_do_not_cover_each_other(places):
+    lines = tuple(Line("x", at, "1234 rpm") for at in places)
+    panel = Panel(Axis("speed", "rpm", (0.0, 1000.0)), Axis("y", "mm"), lines=lines)
+    width = 0.5 * WIDTH
+    taken = {}
+    for k, label in place_labels(panel, width).items():
+        middle = places[k] / 1000.0 * width + label.shift
+        for other in taken.get(label.level, []):
+            assert abs(other - middle) > 40.0
+        taken.setdefault(label.level, []).append(middle)
+
+
+def test_plotly_takes_plain_json(assessment):
+    for figure in figures(assessment):
+        text = json.dumps(described(figure), allow_nan=False)
+        assert json.loads(text)["layout"]["width"] == WIDTH
+
+
+@pytest.mark.parametrize(
+    ("ending", "start"),
+    [(".html", b"<!DOCTYPE html>"), (".svg", b"<?xml"), (".pdf", b"%PDF"), (".png", b"\x89PNG")],
+)
+def test_every_format_is_written(assessment, tmp_path, ending, start):
+    for k, figure in enumerate(figures(assessment)[-2:]):
+        path = figure.write(tmp_path / f"{k}{ending}")
+        assert path.read_bytes().startswith(start)
+
+
+def test_the_same_figure_makes_the_same_file(orbit, tmp_path):
+    one, two = (ff.figure(orbit).write(tmp_path / f"{k}.svg") for k in "ab")
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_bad_paths_are_refused(orbit, tmp_path):
+    with pytest.raises(InputError, match=r"ends in \.html, \.svg, \.pdf, \.png"):
+        ff.figure(orbit).write(tmp_path / "x.docx")
+    with pytest.raises(StoreError, match="cannot be written"):
+        ff.figure(orbit).write(tmp_path / "no" / "x.html")
+
+
+def test_without_matplotlib_the_extra_is_named(orbit, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtra, match="report"):
+        ff.figure(orbit).write(tmp_path / "x.svg")
+
+
+def test_general_systems_are_drawn_by_degree_of_freedom():
+    system = ff.MechanicalSystem(
+        M=np.eye(2), C=0.1 * np.eye(2), K=[[2.0, -1.0], [-1.0, 2.0]],
+        excitation=ff.HarmonicForce([1.0, 0.0]),
+    )  # fmt: skip
+    figure = ff.figure(ff.frequency_response(system, (0.2, 3.0)))
+    assert {t.name for t in figure.panels[0].traces} == {"x1", "x2"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "stops"),
+    [({}, 2), ({"clearance_minus": math.inf}, 1), ({"clearance": math.inf}, 0)],
+)
+def test_schematic_is_a_drawing_with_the_stops_there_are(screen, changes, stops):
+    drawing = schematic(screen.replace(**changes), {"main_mass": "m1 = 1 < 2 kg"})
+    root = ET.fromstring(drawing)  # noqa: S314  our own text
+    words = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert "m1 = 1 < 2 kg" in words
+    assert sum(word in {"e", "e+", "e-"} for word in words) == stops
+
+
+def test_figures_load_no_renderer():
+    code = (
+        "import sys, flipflow.figures.dispatch; "
+        "print([m for m in ('plotly', 'matplotlib') if m in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_a_figure_is_frozen():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Figure("a", "b", ()).title = "c"
