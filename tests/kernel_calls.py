@@ -8,7 +8,7 @@ from flipflow.kernels.balance import balance_residual
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
 from flipflow.kernels.flow import saltation
-from flipflow.kernels.gapmotion import extremes, next_change
+from flipflow.kernels.gapmotion import extremes, next_change, prepare_search
 from flipflow.kernels.shooting import shooting_residual
 
 
@@ -30,6 +30,7 @@ def change_after(motion, contact, state, horizon, fired):
 @kernel(entry=True)
 def range_of(motion, duration):
     """``extremes`` of the first gap."""
+    prepare_search(motion, motion.rate.shape[0])
     return extremes(motion, motion.rate.shape[0], 0, duration)
 
 
