@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flipflow import __version__
-from flipflow.analyses.feasible import limit_bounds, missing_for, working_motion
+from flipflow.analyses.feasible import limit_bounds, missing_for, missing_words, working_motion
 from flipflow.analyses.normal import NormalMotion
 from flipflow.analyses.operating_region import Monitor, OperatingRegion, operating_region
 from flipflow.analyses.quantities import QUANTITIES, Working
@@ -23,6 +23,7 @@ from flipflow.results.orbit import Orbit
 
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
 CLOSE = 0.05
+NO_LIMIT = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -215,13 +216,12 @@ def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) ->
     unit = LIMIT_FIELD[name].unit
     shown = LIMIT_FIELD[name].file_unit
     if getattr(project.limits, name) is None:
-        no_limit = (-math.inf, math.inf)
-        return LimitRow(name, label, unit, shown, no_limit, reason="no limit in the machine file")
+        return LimitRow(name, label, unit, shown, NO_LIMIT, reason="no limit in the machine file")
     low, high = limit_bounds(project.limits, name)
     row = LimitRow(name, label, unit, shown, (low, high))
     missing = missing_for(project.screen, name)
     if missing:
-        return dataclasses.replace(row, reason="missing: " + ", ".join(missing))
+        return dataclasses.replace(row, reason=missing_words(missing))
     if project.speed is None:
         return dataclasses.replace(row, reason="no operating speed in the machine file")
     judged = [
@@ -254,7 +254,7 @@ def verdict(
     if lost:
         return f"{speed}: no motion that returns after a small disturbance in {', '.join(lost)}."
     judged = [row for row in rows if row.margin is not None]
-    unchecked = [row for row in rows if row.state == NOT_CHECKED and math.isfinite(sum(row.limit))]
+    unchecked = [row for row in rows if row.state == NOT_CHECKED and row.limit != NO_LIMIT]
     if not judged:
         return f"{speed}: no limit could be checked."
     tightest = min(judged, key=lambda row: row.margin if row.margin is not None else math.inf)

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.errors import IncompleteError
+from flipflow.model.fields import FIELD
 from flipflow.model.limits import LIMIT_FIELD, Limits
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.results.branch import Branch
@@ -65,12 +66,17 @@ def missing_for(screen: FlipFlowScreen, name: str) -> tuple[str, ...]:
     return tuple(sorted(need for need in needs if getattr(screen, need) is None))
 
 
+def missing_words(fields: tuple[str, ...]) -> str:
+    """Where in the machine file the missing fields belong, in words."""
+    return "missing in the machine file: " + ", ".join(FIELD[name].key for name in fields)
+
+
 def case_window(
     screen: FlipFlowScreen, load: Load, branch: Branch, limits: Limits, span: Interval
 ) -> CaseWindow:
     """Intervals of every limit over ``span`` (rad/s) on the motion reached from below."""
     unchecked = {
-        name: "missing: " + ", ".join(missing)
+        name: missing_words(missing)
         for name in limits.given
         if (missing := missing_for(screen, name))
     }

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
-from flipflow.analyses.linear import complex_amplitudes
 from flipflow.errors import InputError
 from flipflow.kernels import arclength, status
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.exact import ExactSolver
+from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
 from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced
 from flipflow.methods.special import Found, find_special_points

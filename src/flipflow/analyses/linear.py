@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
 from flipflow.errors import InputError
+from flipflow.methods.linear import complex_amplitudes
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 
@@ -118,14 +119,6 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     if not np.any(system.C):
         raise InputError("damping", 0.0, "without any damping no steady state exists; give some")
     return LinearResponse(machine, system, frequencies)
-
-
-def complex_amplitudes(system: MechanicalSystem, omega: Real) -> NDArray[np.complex128]:
-    """X in x = Re(X exp(i omega t)) without contact, (n, N)."""
-    w = omega[:, None, None]
-    Z = system.K - w**2 * system.M + 1j * w * system.C
-    F = system.excitation.vector * omega[:, None] ** system.excitation.power
-    return np.asarray(np.linalg.solve(Z, F[:, :, None])[:, :, 0])
 
 
 def equal_amplitude_frequency(machine: Machine) -> float | None:

@@ -13,6 +13,7 @@ from flipflow.analyses.linear import (
     equal_amplitude_frequency,
     linear_response,
 )
+from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import InputError
 from flipflow.methods.special import CONTACT_BEGIN
 from flipflow.model.limits import Limits
@@ -113,7 +114,11 @@ def operating_region(
         cases.append(case_window(loaded, load, own, wanted, within))
     marks = _landmarks(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
-    notes = {f"{name}: {why}" for case in cases for name, why in case.unchecked.items()}
+    notes = {
+        f"The limit on {QUANTITIES[name].label} is not checked: {why}."
+        for case in cases
+        for name, why in case.unchecked.items()
+    }
     incomplete = [f"{b.status.value}" for b in branches if not b.complete]
     return OperatingRegion(
         screen, branch, *marks.frequencies, marks.lower, marks.upper, feasible, binding,

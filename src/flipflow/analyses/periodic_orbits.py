@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.frequency_response import first_unknowns
-from flipflow.analyses.linear import complex_amplitudes
 from flipflow.errors import InputError
 from flipflow.methods.exact import ExactSolver
+from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.solver import Point, Real
 from flipflow.methods.two_event import TwoEventProblem
 from flipflow.model.system import Machine, MechanicalSystem

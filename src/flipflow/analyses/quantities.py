@@ -137,8 +137,8 @@ def _jump_margin(w: Working) -> float:
         return math.inf
     low, high = min(w.jumps), max(w.jumps)
     if w.omega < low:
-        return (low - w.omega) / w.omega
-    return (w.omega - high) / w.omega if w.omega > high else 0.0
+        return (low - w.omega) / low
+    return (w.omega - high) / high if w.omega > high else 0.0
 
 
 def _throw_number(w: Working) -> float | None:
@@ -235,7 +235,7 @@ _ALL = (
     ),
     Quantity(
         "jump_margin", "margin to the jump", "", "", "%",
-        "Distance of the speed from the nearest speed at which the amplitude can jump.",
+        "Distance of the speed from the nearest jump speed, as a share of the jump speed.",
         _jump_margin,
     ),
     Quantity(

@@ -36,6 +36,7 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
     record.u[:points] = u
     record.omega[:points] = document["omega"]
     record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
+    record.signature[:points] = document["signature"]
     record.iterations[:points] = document["iterations"]
     record.rejected[:points] = document["rejected"][:points]
     record.reason[:points] = document["reason"][:points]

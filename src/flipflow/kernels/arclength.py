@@ -115,6 +115,7 @@ def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     n = work.r.shape[0]
     for k in range(n + 1):
         work.w[k] = work.guess[k]
+    before = math.inf
     for iteration in range(1, NEWTON_MOST + 1):
         if not work.w[n] > 0.0:
             return status.NO_CONVERGENCE, iteration
@@ -126,8 +127,10 @@ def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
         length = newton_update(work)
         if not length < 1e3:
             return status.NO_CONVERGENCE, iteration
-        if length < tolerance:
+        # A step that no longer shrinks and is tiny has met the rounding of the residual.
+        if length < tolerance or before <= length < QUICK:
             return status.OK, iteration
+        before = length
     return status.NO_CONVERGENCE, NEWTON_MOST
 
 

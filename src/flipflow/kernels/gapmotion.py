@@ -193,6 +193,7 @@ def next_change(
     (horizon, -1, 0) when nothing happens before, and a time of NaN when the search does not end.
     """
     t = 0.0
+    least = SMALLEST_STEP * horizon
     prepare_search(motion, count)
     for _ in range(MAX_SEARCH):
         exponentials(motion, count, t)
@@ -200,8 +201,9 @@ def next_change(
         for j in range(state.shape[0]):
             low, new = spring_change(motion, contact, state[j], count, j)
             if new != NOTHING and not (t == 0.0 and j == fired):
-                return t, j, new
-            step = min(step, max(low, SMALLEST_STEP * horizon))
+                # The last step may have been the smallest one: Newton takes back what it overshot.
+                return max(t + max(min(low, least), -least), 0.0), j, new
+            step = min(step, max(low, least))
         t += step
         if t >= horizon:
             return horizon, -1, 0
@@ -212,7 +214,7 @@ def next_change(
 def spring_change(
     motion: GapMotion, contact: Contact, state: int, count: int, j: int
 ) -> tuple[float, int]:
-    """Time before which spring j cannot change, and its new state where it changes now."""
+    """Time before which spring j cannot change, or Newton's last step and its new state."""
     y, v = gap_state(motion, count, j)
     a, second, third = gap_bounds(motion, count, j)
     scale = abs(y) + abs(motion.offset[j])
@@ -251,11 +253,11 @@ def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]
 def _approach(
     h: float, slope: float, curvature: float, second: float, third: float, scale: float, target: int
 ) -> tuple[float, int]:
-    """Safe step towards the zero of h, and ``target`` once it is there and h still falls."""
+    """Safe step towards the zero of h; Newton's step and ``target`` once it is there."""
     if h == math.inf:
         return math.inf, NOTHING
     if h <= AT_GAP * scale and slope < 0.0:
-        return 0.0, target
+        return -h / slope, target
     return safe_step(h, slope, curvature, second, third), NOTHING
 
 

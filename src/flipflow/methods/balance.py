@@ -28,9 +28,22 @@ class BalanceSolver(Solver):
         kept = int(2 * np.count_nonzero(self.harmonics) + np.count_nonzero(self.harmonics == 0))
         self.unknowns = kept * len(self.builder.springs)
         self._new_work()
+        empty = np.zeros(0)
+        self._last: tuple[Real, Real, tuple[Complex, Real]] = (
+            empty,
+            empty,
+            (empty.astype(np.complex128), empty),
+        )
 
     def _describe(self, u: Real, omega: Real) -> tuple[Complex, Real]:
-        """Displacement harmonics (P, n_h, N) and return maps (P, 2 N, 2 N)."""
+        """Displacement harmonics (P, n_h, N) and return maps (P, 2 N, 2 N).
+
+        The last answer is kept: amplitudes and multipliers of the same points are asked for
+        one after the other.
+        """
+        kept_u, kept_omega, answer = self._last
+        if np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega):
+            return answer
         n = self.system.size
         series = np.empty((omega.size, self.harmonics.size, n), np.complex128)
         maps = np.empty((omega.size, 2 * n, 2 * n))
@@ -41,7 +54,9 @@ class BalanceSolver(Solver):
         )  # fmt: skip
         bad = code != status.OK
         series[bad], maps[bad] = np.nan, np.nan
-        return series, -maps if self.half_turn else maps
+        maps = -maps if self.half_turn else maps
+        self._last = (u.copy(), omega.copy(), (series, maps))
+        return series, maps
 
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
         return self._describe(u, omega)[1]
@@ -67,6 +82,7 @@ class BalanceSolver(Solver):
         return low, high, seen[:, :, self.harmonics == 1][:, :, 0]
 
     def motion(self, u: Real, omega: float) -> Motion:
+        self._last = (np.zeros(0), *self._last[1:])  # the record of contacts is wanted too
         series, _ = self._describe(u[None], np.array([omega]))
         flow = self.problem.flow
         pieces = Pieces.recorded(flow, np.zeros((flow.start.size, 0), np.complex128))

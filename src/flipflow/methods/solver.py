@@ -32,6 +32,7 @@ class Traced:
     omega: Real
     tangent: Real
     jacobian: Real
+    signature: NDArray[np.int64]
     iterations: NDArray[np.int64]
     rejected: NDArray[np.int64]
     reason: NDArray[np.int64]
@@ -49,6 +50,7 @@ class Traced:
             record.omega[:points],
             record.tangent[:points],
             record.jacobian[:points],
+            record.signature[:points],
             record.iterations[:points],
             record.rejected[: points + 1],
             record.reason[: points + 1],

@@ -69,6 +69,7 @@ def branch_document(branch: Branch) -> Document:
         "tangent": plain(traced.tangent),
         "return_maps": plain(branch.return_maps),
         "course": plain(tuple(traced.course)),
+        "signature": plain(traced.signature),
         "iterations": plain(traced.iterations),
         "rejected": plain(traced.rejected),
         "reason": plain(traced.reason),

@@ -120,7 +120,7 @@ class Orbit:
 
     def stop_force(self, spring: int = 0, t: ArrayLike | None = None) -> Real:
         """Force H of a stop in N at times t (default: :attr:`t`), positive against +d."""
-        times = self.t if t is None else np.asarray(t, float)
+        times = np.mod(self.t if t is None else np.asarray(t, float), self.period)
         return self._force(spring, times, self.motion.piece(times))
 
     def amplitude(self, which: Coordinate) -> float:
