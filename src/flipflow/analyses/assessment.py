@@ -14,7 +14,7 @@ from flipflow.analyses.feasible import limit_bounds, missing_for, missing_words,
 from flipflow.analyses.normal import NormalMotion
 from flipflow.analyses.operating_region import Monitor, OperatingRegion, operating_region
 from flipflow.analyses.quantities import QUANTITIES, Working
-from flipflow.methods.options import PiecewiseExact
+from flipflow.methods.options import Method, PiecewiseExact
 from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -137,12 +137,18 @@ class Assessment:
     limits_table: tuple[LimitRow, ...]
     verdict: str
     notes: tuple[str, ...]
-    method: PiecewiseExact
+    method: Method
     version: str
     input_hash: str
 
 
-def assess(project: Project, monitor: Monitor | None = None) -> Assessment:
+def assess(
+    project: Project,
+    monitor: Monitor | None = None,
+    *,
+    omega: tuple[float, float] | None = None,
+    method: Method | None = None,
+) -> Assessment:
     """Judge a project: operating region, feasible window, every case against every limit.
 
     Parameters
@@ -151,8 +157,12 @@ def assess(project: Project, monitor: Monitor | None = None) -> Assessment:
         What :func:`flipflow.load_project` returns.
     monitor
         Called with a sentence and the share done, 0 to 1.
+    omega, method
+        As for :func:`~flipflow.operating_region`.
     """
-    region = operating_region(project.screen, project.limits, project.load_cases, monitor)
+    region = operating_region(
+        project.screen, project.limits, project.load_cases, monitor, omega=omega, method=method
+    )
     cases = tuple(
         assess_case(project.screen.loaded(load), load, branch, project.speed)
         for load, branch in zip(project.load_cases, region.branches, strict=True)
@@ -166,7 +176,7 @@ def assess(project: Project, monitor: Monitor | None = None) -> Assessment:
         limits_table=rows,
         verdict=verdict(project.speed, rows, cases),
         notes=(*project.warnings, *region.notes),
-        method=PiecewiseExact(),
+        method=method or PiecewiseExact(),
         version=__version__,
         input_hash=input_hash(project),
     )

@@ -185,6 +185,7 @@ def _finished(
         solver=solver,
         traced=traced,
         return_maps=maps,
+        saddle_side_at_start=_starts_beyond(eigenvalues),
         multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
         stability=stability_words(eigenvalues, _saddle_side(traced, eigenvalues)),
         special_points=special,
@@ -198,7 +199,13 @@ def _saddle_side(traced: Traced, eigenvalues: NDArray[np.complex128]) -> NDArray
     """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
     if traced.omega.size == 0:
         return None
-    first = eigenvalues[0]
-    beyond = int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
     backwards = traced.tangent[:, -1] * np.sign(traced.tangent[0, -1]) < 0.0
-    return np.asarray(backwards ^ beyond)
+    return np.asarray(backwards ^ _starts_beyond(eigenvalues))
+
+
+def _starts_beyond(eigenvalues: NDArray[np.complex128]) -> bool:
+    """Whether the first motion has an odd number of real eigenvalues beyond +1."""
+    if eigenvalues.shape[0] == 0:
+        return False
+    first = eigenvalues[0]
+    return int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flipflow.analyses.feasible import Bound, CaseWindow, Intervals, case_window, common_window
-from flipflow.analyses.frequency_response import frequency_response
+from flipflow.analyses.frequency_response import check_interval, frequency_response
 from flipflow.analyses.linear import (
     antiresonance_frequency,
     bonded_natural_frequencies,
@@ -15,6 +15,7 @@ from flipflow.analyses.linear import (
 )
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import InputError
+from flipflow.methods.options import Method
 from flipflow.methods.special import CONTACT_BEGIN
 from flipflow.model.limits import Limits
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -76,6 +77,9 @@ def operating_region(
     limits: Limits | None = None,
     load_cases: Sequence[Load] = (),
     monitor: Monitor | None = None,
+    *,
+    omega: tuple[float, float] | None = None,
+    method: Method | None = None,
 ) -> OperatingRegion:
     """The operating region of a screen and its feasible window over all load cases.
 
@@ -89,19 +93,24 @@ def operating_region(
         Loads under which the limits must hold; the empty machine where none is given.
     monitor
         Called with a sentence and the share done, 0 to 1.
+    omega
+        Frequencies (low, high) in rad/s to analyse; None: from well below the first natural
+        frequency to well above the last with all stops engaged.
+    method
+        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`.
 
     Raises
     ------
     InputError
-        For anything but a screen, whose frames the region speaks of.
+        For anything but a screen, whose frames the region speaks of, and for a bad interval.
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
     say = monitor or (lambda _sentence, _share: None)
     loads = tuple(load_cases) or (Load(name="empty"),)
-    span = analysed_range(screen)
+    span = analysed_range(screen) if omega is None else check_interval(omega)
     say("empty machine", 0.0)
-    branch = frequency_response(screen, span)
+    branch = frequency_response(screen, span, method)
     wanted = limits or Limits()
     window = wanted.speed if wanted.speed is not None else span
     within = (max(window[0], span[0]), min(window[1], span[1]))
@@ -109,7 +118,7 @@ def operating_region(
     for k, load in enumerate(loads):
         say(load.name or f"load case {k + 1}", (k + 1) / (len(loads) + 1))
         loaded = screen.loaded(load)
-        own = branch if loaded == screen else frequency_response(loaded, span)
+        own = branch if loaded == screen else frequency_response(loaded, span, method)
         branches.append(own)
         cases.append(case_window(loaded, load, own, wanted, within))
     marks = _landmarks(screen, branch)

@@ -60,6 +60,7 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
         solver=solver,
         traced=traced,
         return_maps=np.asarray(document["return_maps"], dtype=float).reshape(points, 2 * n, 2 * n),
+        saddle_side_at_start=bool(document["saddle_side_at_start"]),
         multipliers=multipliers[..., 0] + 1j * multipliers[..., 1],
         stability=np.asarray(document["stability"], dtype="<U12"),
         special_points=special,

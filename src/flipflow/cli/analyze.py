@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,6 +26,14 @@ def analyze(
         str | None,
         typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
     ] = None,
+    speeds: Annotated[
+        tuple[str, str] | None,
+        typer.Option("--speeds", metavar="LOW HIGH", help='Speeds to analyse: "300 rpm" "40 Hz".'),
+    ] = None,
+    harmonics: Annotated[
+        int | None,
+        typer.Option("--harmonics", metavar="H", help="Harmonic balance instead of exact motion."),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Let values through that look like a slip of units.")
     ] = False,
@@ -38,8 +46,9 @@ def analyze(
     folder = output or Path(f"{project.name}-flipflow")
     from flipflow.io.results import prepare_folder  # noqa: PLC0415
 
+    options = _options(speeds, harmonics)
     prepare_folder(folder)
-    assessment = _assessed(project)
+    assessment = _assessed(project, options)
 
     from flipflow.io.results import assessment_document, write_response  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
@@ -58,7 +67,22 @@ def analyze(
         out.print(f"Written to {folder}: {names}", soft_wrap=True)
 
 
-def _assessed(project: Project) -> Assessment:
+def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, Any]:
+    """Interval and method as the analysis takes them."""
+    from flipflow.analyses.frequency_response import check_interval  # noqa: PLC0415  quick --help
+    from flipflow.io.units import parse_quantity  # noqa: PLC0415
+    from flipflow.methods.options import HarmonicBalance  # noqa: PLC0415
+
+    options: dict[str, Any] = {}
+    if speeds is not None:
+        low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in speeds)
+        options["omega"] = check_interval((low, high))
+    if harmonics is not None:
+        options["method"] = HarmonicBalance(harmonics)
+    return options
+
+
+def _assessed(project: Project, options: dict[str, Any]) -> Assessment:
     """Analyse with progress on stderr."""
     from rich.console import Console  # noqa: PLC0415  keeps --help quick
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
@@ -69,10 +93,10 @@ def _assessed(project: Project) -> Assessment:
     )  # fmt: skip
     with progress:
         task = progress.add_task("starting", total=1.0)
-        return _run(project, progress, task)
+        return _run(project, options, progress, task)
 
 
-def _run(project: Project, progress: Progress, task: TaskID) -> Assessment:
+def _run(project: Project, options: dict[str, Any], progress: Progress, task: TaskID) -> Assessment:
     from flipflow.analyses.assessment import assess  # noqa: PLC0415  keeps --help quick
     from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
 
@@ -84,4 +108,5 @@ def _run(project: Project, progress: Progress, task: TaskID) -> Assessment:
     return assess(
         project,
         lambda sentence, share: progress.update(task, description=sentence, completed=share),
+        **options,
     )

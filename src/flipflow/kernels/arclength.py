@@ -269,7 +269,7 @@ def trace(
             return status.REACHED_UPPER if at_upper else status.REACHED_LOWER, p + 1
         if p > 0 and iterations <= NEWTON_FEW:
             length = min(step * GROW, LONGEST)
-        elif iterations >= NEWTON_MANY:
+        elif p > 0 and iterations >= NEWTON_MANY:
             length = step * SHRINK
         recall(problem, work, branch, p, course)
         p += 1

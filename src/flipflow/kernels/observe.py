@@ -203,7 +203,7 @@ def _displacements(problem: Balance, omega: float, series: Complex) -> None:
 
 
 @kernel(entry=True)
-def orbit_error(
+def corrected(
     problem: Shooting,
     states: Real,
     omega: Real,
@@ -213,15 +213,17 @@ def orbit_error(
     A: Real,
     pivot: Int,
     delta: Real,
+    maps: Real,
     error: Real,
     code: Int,
 ) -> None:
-    """Distance in m of each motion from the exact one, by one Newton step of the exact flow.
+    """Return map and distance in m of motions from the exact ones, by a Newton step of the flow.
 
-    delta = (I - M)^-1 (flow(z) - z) corrects the state; the distance is the largest difference of
-    any displacement between the corrected exact flow and the series (P, n_h, N); without
-    harmonics the motion is the flow itself and the distance is that of the states. Infinite when
-    a second step does not shrink.
+    delta = (I - M)^-1 (flow(z) - z) corrects the state (P, 2 N) in place. The map (P, 2 N, 2 N),
+    with the problem's sign, is the one at the corrected state. The distance is the largest
+    difference of any displacement between the corrected flow and the series (P, n_h, N); without
+    harmonics it is that of the states. Infinite, and the map NaN, when a second step does not
+    shrink.
     """
     flow = problem.flow
     size = flow.z.shape[0]
@@ -229,21 +231,34 @@ def orbit_error(
         z = states[p]
         before = math.inf
         error[p] = math.inf
+        for k in range(size):
+            for c in range(size):
+                maps[p, k, c] = math.nan
         for step in range(2):
             code[p] = shooting_residual(problem, z, omega[p], delta, J)
-            length = 0.0
+            length = math.inf
             if code[p] == status.OK:
                 length = _newton_step(J, A, pivot, delta, omega[p])
-            if code[p] != status.OK or not length <= max(0.5 * before, ROUNDING):
+            if not length <= max(0.5 * before, ROUNDING):
                 break
             if step == 0:
                 for k in range(size):
                     z[k] += delta[k]
                 before = length
-            elif harmonics.shape[0] == 0:
-                error[p] = before + length
             else:
-                error[p] = _distance(problem, omega[p], harmonics, series[p], length)
+                error[p] = before + length
+                if harmonics.shape[0] > 0:
+                    error[p] = _distance(problem, omega[p], harmonics, series[p], length)
+                _store_map(J, maps[p])
+
+
+@kernel
+def _store_map(J: Real, out: Real) -> None:
+    """The return map J + I."""
+    for k in range(out.shape[0]):
+        for c in range(out.shape[0]):
+            out[k, c] = J[k, c]
+        out[k, k] += 1.0
 
 
 @kernel

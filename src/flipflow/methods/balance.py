@@ -54,9 +54,20 @@ class BalanceSolver(Solver):
         )  # fmt: skip
         bad = code != status.OK
         series[bad], maps[bad] = np.nan, np.nan
-        maps = -maps if self.half_turn else maps
+        maps = self._exact_maps(series, omega, -maps if self.half_turn else maps)
         self._last = (u.copy(), omega.copy(), (series, maps))
         return series, maps
+
+    def _exact_maps(self, series: Complex, omega: Real, own: Real) -> Real:
+        """Maps of the corrected exact motions; the series' own where no correction is to be had.
+
+        A truncated series blurs the instants of contact, to which the multipliers of a stiff
+        stop are far more sensitive than its amplitudes are.
+        """
+        none = np.zeros(0, np.int64), np.zeros((omega.size, 0, self.system.size), np.complex128)
+        states = _states(series, self.harmonics, omega)
+        maps, _ = self.corrected(states, omega, *none, half_turn=self.half_turn)
+        return np.asarray(np.where(np.isnan(maps), own, maps))
 
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
         return self._describe(u, omega)[1]
@@ -65,10 +76,7 @@ class BalanceSolver(Solver):
         return self.harmonics, self._describe(u, omega)[0]
 
     def states(self, u: Real, omega: Real) -> Real:
-        _, series = self.series(u, omega)
-        rate = 1j * omega[:, None] * self.harmonics
-        position, velocity = series.sum(axis=1), np.einsum("ph,phn->pn", rate, series)
-        return np.concatenate([position.real, velocity.real], axis=1)
+        return _states(self.series(u, omega)[1], self.harmonics, omega)
 
     def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
         _, series = self.series(u, omega)
@@ -102,3 +110,10 @@ class BalanceSolver(Solver):
                 pairs = 2.0 * np.stack([spectrum[h].real, spectrum[h].imag], axis=1)
                 parts += [pairs.ravel()]
         return np.concatenate(parts)
+
+
+def _states(series: Complex, harmonics: NDArray[np.int64], omega: Real) -> Real:
+    """State (x, x') of series (P, n_h, N) at t = 0, (P, 2 N)."""
+    rate = 1j * omega[:, None] * harmonics
+    position, velocity = series.sum(axis=1), np.einsum("ph,phn->pn", rate, series)
+    return np.concatenate([position.real, velocity.real], axis=1)

@@ -14,7 +14,7 @@ from flipflow.model.system import MechanicalSystem
 
 MAX_SPRINGS = 12
 PREPARED_AT_ONCE = 27
-NEARLY_DEFECTIVE = 1e8
+NEARLY_DEFECTIVE = 1e6
 NUDGE, MOST_NUDGES = 1e-10, 3
 
 Complex = NDArray[np.complex128]

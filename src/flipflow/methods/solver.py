@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flipflow.errors import IncompleteError
 from flipflow.kernels import arclength, status
 from flipflow.kernels.flow import Flow
-from flipflow.kernels.observe import orbit_error
+from flipflow.kernels.observe import corrected
 from flipflow.methods.motion import Motion
 from flipflow.methods.plan import PlanBuilder
 from flipflow.methods.scratch import new_branch, new_corrector, new_shooting
@@ -187,26 +187,32 @@ class Solver(ABC):
         the motion is the estimate. Where a second step does not shrink, as close to a fold,
         nothing is promised.
         """
-        states = self.states(u, omega).copy()
         harmonics, series = self.series(u, omega)
-        size = states.shape[1]
+        states = self.states(u, omega)
+        return self.corrected(states, omega, harmonics, series, half_turn=False)[1]
+
+    def corrected(
+        self,
+        states: Real,
+        omega: Real,
+        harmonics: NDArray[np.int64],
+        series: Complex,
+        *,
+        half_turn: bool,
+    ) -> tuple[Real, Real]:
+        """Return maps (P, 2 N, 2 N) and distances (P,) after one Newton step of the exact flow."""
+        points, size = states.shape
+        maps, error = np.empty((points, size, size)), np.empty(points)
+        code = np.zeros(points, np.int64)
         while True:
-            problem = new_shooting(self.builder.plan, half_turn=False, length=self.length)
-            error, code = np.empty(omega.size), np.zeros(omega.size, np.int64)
-            scratch = np.empty((size, size + 1)), np.empty((size, size)), np.zeros(size, np.int64)
-            orbit_error(
-                problem,
-                states.copy(),
-                omega,
-                harmonics,
-                series,
-                *scratch,
-                np.empty(size),
-                error,
-                code,
-            )
+            problem = new_shooting(self.builder.plan, half_turn=half_turn, length=self.length)
+            square, pivot = np.empty((size, size)), np.zeros(size, np.int64)
+            corrected(
+                problem, states.copy(), omega, harmonics, series, np.empty((size, size + 1)),
+                square, pivot, np.empty(size), maps, error, code,
+            )  # fmt: skip
             if not np.any(code == status.MISSING_CONFIGURATION):
-                return error
+                return maps, error
             self.builder.add(range(self.builder.plan.slot.size))
             self._prepare()
 

@@ -11,9 +11,9 @@ from scipy.optimize import minimize_scalar
 
 from flipflow.errors import InputError
 from flipflow.methods.options import Method
-from flipflow.methods.solver import Solver, Traced
+from flipflow.methods.solver import Point, Solver, Traced
 from flipflow.methods.special import FOLD
-from flipflow.methods.stability import STABLE
+from flipflow.methods.stability import STABLE, stability_words
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.orbit import Orbit
 from flipflow.results.status import BranchStatus
@@ -69,6 +69,8 @@ class Branch:
         Options of the method used.
     solver, traced
         The solver and the points it left.
+    saddle_side_at_start
+        Whether an odd number of real multipliers lies beyond +1 where the branch rises.
     multipliers
         Floquet multipliers of the full turn, (n, 2 N), largest modulus first.
     stability
@@ -88,6 +90,7 @@ class Branch:
     solver: Solver
     traced: Traced
     return_maps: Real
+    saddle_side_at_start: bool
     multipliers: NDArray[np.complex128]
     stability: NDArray[np.str_]
     special_points: tuple[SpecialPoint, ...]
@@ -161,8 +164,7 @@ class Branch:
                 continue
             same = any(np.allclose(point.u, one.unknowns, rtol=1e-7, atol=1e-12) for one in found)
             if not same:
-                word = str(self.stability[p if share < 0.5 else p + 1])
-                found.append(Orbit(self.solver, point.u, omega, point.return_map, word))
+                found.append(self._solved(point, rises=span > 0.0))
         return tuple(found)
 
     @cached_property
@@ -201,8 +203,13 @@ class Branch:
         point = self.solver.solve(guess, omega)
         if point is None:
             return None
-        word = str(self.stability[before if share < 0.5 else after])
-        return Orbit(self.solver, point.u, omega, point.return_map, word)
+        return self._solved(point, rises=True)
+
+    def _solved(self, point: Point, *, rises: bool) -> Orbit:
+        """A motion solved for on a part of the branch that rises or falls in omega."""
+        side = np.array([self.saddle_side_at_start ^ (not rises)])
+        word = stability_words(point.eigenvalues[None], side)[0]
+        return Orbit(self.solver, point.u, point.omega, point.return_map, str(word))
 
     def peak(self, which: Coordinate) -> SpecialPoint:
         """The motion of largest amplitude on the branch, refined between its points."""

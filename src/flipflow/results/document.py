@@ -65,6 +65,7 @@ def branch_document(branch: Branch) -> Document:
         "error": plain(branch.error),
         "special_points": [special_point_document(point) for point in branch.special_points],
         "half_turn": branch.solver.half_turn,
+        "saddle_side_at_start": branch.saddle_side_at_start,
         "unknowns": plain(traced.u),
         "tangent": plain(traced.tangent),
         "return_maps": plain(branch.return_maps),
