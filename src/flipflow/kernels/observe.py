@@ -222,8 +222,8 @@ def corrected(
     delta = (I - M)^-1 (flow(z) - z) corrects the state (P, 2 N) in place. The map (P, 2 N, 2 N),
     with the problem's sign, is the one at the corrected state. The distance is the largest
     difference of any displacement between the corrected flow and the series (P, n_h, N); without
-    harmonics it is that of the states. Infinite, and the map NaN, when a second step does not
-    shrink.
+    harmonics it is that of the states. Where a second step does not shrink, as next to a fold,
+    the distance is infinite and the map the one at the state given; NaN where the flow fails.
     """
     flow = problem.flow
     size = flow.z.shape[0]
@@ -239,6 +239,8 @@ def corrected(
             length = math.inf
             if code[p] == status.OK:
                 length = _newton_step(J, A, pivot, delta, omega[p])
+                if step == 0:
+                    _store_map(J, maps[p])
             if not length <= max(0.5 * before, ROUNDING):
                 break
             if step == 0:
@@ -246,10 +248,10 @@ def corrected(
                     z[k] += delta[k]
                 before = length
             else:
+                _store_map(J, maps[p])
                 error[p] = before + length
                 if harmonics.shape[0] > 0:
                     error[p] = _distance(problem, omega[p], harmonics, series[p], length)
-                _store_map(J, maps[p])
 
 
 @kernel

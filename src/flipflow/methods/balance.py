@@ -59,7 +59,7 @@ class BalanceSolver(Solver):
         return series, maps
 
     def _exact_maps(self, series: Complex, omega: Real, own: Real) -> Real:
-        """Maps of the corrected exact motions; the series' own where no correction is to be had.
+        """Maps of the exact flow beside the series; the series' own where the flow fails.
 
         A truncated series blurs the instants of contact, to which the multipliers of a stiff
         stop are far more sensitive than its amplitudes are.
