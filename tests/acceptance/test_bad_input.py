@@ -13,7 +13,7 @@ import pytest
 from flipflow.cli.main import main
 
 # Commands that read a machine file as their first argument.
-COMMANDS = ("check",)
+COMMANDS = ("check", "analyze")
 
 GOOD = (
     (Path(__file__).parents[2] / "src/flipflow/io/machines/ffs0827.toml")

@@ -113,7 +113,7 @@ def test_row_13_determinant(screen, exact, response, omega: float) -> None:
     close("contact share", orbit.contact_share(), SHARES[omega], abs=5e-7)
     for method, motion, rel in (
         ("exact", orbit, 1e-9),
-        ("H9", upper_orbit(response(ff.HarmonicBalance(9)), omega), 1e-7),
+        ("H9", upper_orbit(response(ff.HarmonicBalance(9)), omega), 1e-6),
     ):
         contact = orbit.contact_share() * turn
         expected = np.exp(-turn * (c1 / screen.main_mass + c2 * v) - contact * c3 * v)

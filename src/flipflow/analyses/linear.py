@@ -116,8 +116,7 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies > 0.0)):
         raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
     system = machine.system().with_bonded()
-    if not np.any(system.C):
-        raise InputError("damping", 0.0, "without any damping no steady state exists; give some")
+    system.require_damping()
     return LinearResponse(machine, system, frequencies)
 
 

@@ -87,9 +87,10 @@ def _assessed(project: Project, options: dict[str, Any]) -> Assessment:
     from rich.console import Console  # noqa: PLC0415  keeps --help quick
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
 
+    terminal = Console(stderr=True)
     progress = Progress(
         SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
-        console=Console(stderr=True), transient=True,
+        console=terminal, transient=True, disable=not terminal.is_terminal,
     )  # fmt: skip
     with progress:
         task = progress.add_task("starting", total=1.0)

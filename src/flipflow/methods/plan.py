@@ -42,13 +42,7 @@ class PlanBuilder:
             raise InputError(
                 "springs", len(self.springs), f"at most {MAX_SPRINGS} springs with a gap"
             )
-        if not np.any(self.system.C):
-            raise InputError(
-                "damping",
-                0.0,
-                "without any damping a free vibration never dies out and no steady state exists; "
-                "give at least one damping above 0",
-            )
+        self.system.require_damping()
         if np.linalg.matrix_rank(self.system.K) < self.system.size:
             raise InputError(
                 "K",

@@ -119,6 +119,16 @@ class MechanicalSystem:
         """Names of the coordinates, or indices of degrees of freedom where none is named."""
         return tuple(self.coordinates) or tuple(range(self.size))
 
+    def require_damping(self) -> None:
+        """Raise InputError for a machine without any damping: it has no steady state."""
+        if not np.any(self.C) and not any(s.bonded and s.damping > 0.0 for s in self.springs):
+            raise InputError(
+                "damping",
+                0.0,
+                "without any damping a free vibration never dies out and no steady state exists; "
+                "give at least one damping above 0",
+            )
+
     def with_bonded(self) -> MechanicalSystem:
         """Return the same machine with springs that always act moved into C and K."""
         C, K = self.C.copy(), self.K.copy()

@@ -1,0 +1,61 @@
+"""The scalar two-touch problem against general shooting, over whole branches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.methods.plan import PlanBuilder
+from flipflow.methods.two_event import TwoEventProblem
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"clearance": 8e-3}, {"shear_stiffness": 3510e3}, {"stop_damping": 0.0}],
+    ids=["nominal", "wide gap", "stiff", "no stop damping"],
+)
+def test_every_contact_point_of_the_branch_is_a_zero(changes):
+    """f(s, omega) = |F| - 1 vanishes at the shares of all shooting points, stable or not."""
+    screen = ff.load("ffs0827").replace(**changes)
+    branch = ff.frequency_response(screen, (5.0, 250.0))
+    problem = TwoEventProblem(PlanBuilder(screen.system()))
+    orbits = [branch.orbit(i) for i in range(0, branch.omega.size, 7)]
+    touching = [orbit for orbit in orbits if len(orbit.contact_intervals) == 2]
+    assert len(touching) > 20
+    omega = np.array([orbit.omega for orbit in touching])
+    share = np.array([orbit.contact_share() for orbit in touching])
+    keep = share > 0.02
+    np.testing.assert_allclose(problem.excess(omega[keep], share[keep]), 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("omega", [85.0, 120.0, 190.0, 199.0, 203.0, 215.0])
+def test_all_touching_motions_are_found_without_a_guess(omega):
+    screen = ff.load("ffs0827")
+    branch = ff.frequency_response(screen, (5.0, 250.0))
+    states, shares = TwoEventProblem(PlanBuilder(screen.system())).states(omega)
+    known = [orbit for orbit in branch.orbits_at(omega) if orbit.contact_intervals]
+    assert len(shares) == len(known)
+    for orbit in known:
+        nearest = np.abs(shares - orbit.contact_share()).argmin()
+        assert shares[nearest] == pytest.approx(orbit.contact_share(), abs=1e-9)
+        np.testing.assert_allclose(states[nearest], orbit.state, rtol=1e-8, atol=1e-10)
+
+
+def test_shooting_has_the_last_word_where_motion_leans():
+    """Row 25, e = 2 mm at 57.7 rad/s: of the scalar problem's candidates one is a motion.
+
+    The others would touch more often than they assume. Shooting finds that one, which is
+    unstable, and the two stable motions that lean to either side.
+    """
+    screen = ff.load("ffs0827").replace(clearance=2e-3)
+    states, _ = TwoEventProblem(PlanBuilder(screen.system())).states(57.7)
+    motions = ff.periodic_orbits(screen, omega=57.7)
+    assert sorted(motion.stability for motion in motions) == ["stable", "stable", "unstable"]
+    true = [
+        motion
+        for motion in motions
+        if any(np.allclose(state, motion.state, rtol=1e-7, atol=1e-9) for state in states)
+    ]
+    assert [motion.stability for motion in true] == ["unstable"]
+    assert len(states) > len(true)
