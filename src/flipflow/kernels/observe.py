@@ -225,33 +225,41 @@ def corrected(
     harmonics it is that of the states. Where a second step does not shrink, as next to a fold,
     the distance is infinite and the map the one at the state given; NaN where the flow fails.
     """
-    flow = problem.flow
-    size = flow.z.shape[0]
     for p in range(omega.shape[0]):
-        z = states[p]
-        before = math.inf
-        error[p] = math.inf
-        for k in range(size):
-            for c in range(size):
-                maps[p, k, c] = math.nan
-        for step in range(2):
-            code[p] = shooting_residual(problem, z, omega[p], delta, J)
-            length = math.inf
-            if code[p] == status.OK:
-                length = _newton_step(J, A, pivot, delta, omega[p])
-                if step == 0:
-                    _store_map(J, maps[p])
-            if not length <= max(0.5 * before, ROUNDING):
-                break
-            if step == 0:
-                for k in range(size):
-                    z[k] += delta[k]
-                before = length
-            else:
-                _store_map(J, maps[p])
-                error[p] = before + length
-                if harmonics.shape[0] > 0:
-                    error[p] = _distance(problem, omega[p], harmonics, series[p], length)
+        code[p], first, last = _correct_state(
+            problem, states[p], omega[p], J, A, pivot, delta, maps[p]
+        )
+        error[p] = first + last
+        if harmonics.shape[0] > 0 and math.isfinite(error[p]):
+            error[p] = _distance(problem, omega[p], harmonics, series[p], last)
+
+
+@kernel
+def _correct_state(
+    problem: Shooting, z: Real, omega: float, J: Real, A: Real, pivot: Int, delta: Real, out: Real
+) -> tuple[int, float, float]:
+    """One Newton step of z in place, and the length of it and of the next, infinite when longer."""
+    size = delta.shape[0]
+    for k in range(size):
+        for c in range(size):
+            out[k, c] = math.nan
+    code = shooting_residual(problem, z, omega, delta, J)
+    if code != status.OK:
+        return code, math.inf, math.inf
+    _store_map(J, out)
+    first = _newton_step(J, A, pivot, delta, omega)
+    if not math.isfinite(first):
+        return code, math.inf, math.inf
+    for k in range(size):
+        z[k] += delta[k]
+    code = shooting_residual(problem, z, omega, delta, J)
+    if code != status.OK:
+        return code, first, math.inf
+    last = _newton_step(J, A, pivot, delta, omega)
+    if not last <= max(0.5 * first, ROUNDING):
+        return code, first, math.inf
+    _store_map(J, out)
+    return code, first, last
 
 
 @kernel
