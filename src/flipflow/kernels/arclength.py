@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
-from flipflow.kernels.dense import lu_factor, lu_solve
+from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
 from flipflow.kernels.plan import Int, Real
 from flipflow.kernels.problem import residual, signature, unknown_scale
 
@@ -20,9 +20,9 @@ NEWTON_FEW, NEWTON_MANY = 3, 5
 QUICK, SHARP = 1e-6, 1e-10
 GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
 LONGEST, SHORTEST = 1.0, 1e-7
-TURN_MOST = 0.90
-CONTACT_STEP = 0.03
-REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND = range(5)
+TURN_MOST, ASTRAY_MOST = 0.90, 0.2
+CONTACT_STEP, STRAND_STEP, LABOURED_STEP = 0.03, 1e-4, 1e-3
+REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
 
 class Branch(NamedTuple):
@@ -32,6 +32,7 @@ class Branch(NamedTuple):
     omega: Real  # (P,)
     tangent: Real  # (P, n + 1) unit in scaled unknowns, stored unscaled
     jacobian: Real  # (P, n, n) dr/du
+    side: Real  # (P,) sign of det [J; tangent]
     signature: Int  # (P,)
     iterations: Int  # (P,) Newton iterations
     rejected: Int  # (P,) steps rejected on the way to the point
@@ -58,6 +59,7 @@ class Corrector(NamedTuple):
     before: Real  # (n + 1,) tangent at the point before
     tangent: Real  # (n + 1,)
     scale: Real  # (n + 1,)
+    side: Real  # (1,) sign of det [J; tangent]
     r: Real  # (n,)
     J: Real  # (n, n + 1)
     A: Real  # (n + 1, n + 1)
@@ -165,6 +167,7 @@ def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     for k in range(n + 1):
         branch.tangent[p, k] = work.tangent[k] * work.scale[k]
     branch.signature[p] = signature(problem)
+    branch.side[p] = work.side[0]
 
 
 @kernel(inline=True)
@@ -204,22 +207,41 @@ def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course
     return ends
 
 
+@kernel
+def astray(work: Corrector) -> float:
+    """Distance of the corrected point from the guess, in steps: far away is another strand."""
+    square = 0.0
+    for k in range(work.w.shape[0]):
+        square += ((work.w[k] - work.guess[k]) / work.scale[k]) ** 2
+    return math.sqrt(square)
+
+
 @kernel(inline=True)
 def judge(
-    problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, course: Course
-) -> int:
-    """Why the corrected step from point p is refused, REASON_NONE when it is good."""
+    problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, iterations: int,
+    course: Course,
+) -> int:  # fmt: skip
+    """Why the corrected step from point p is refused, REASON_NONE when it is good.
+
+    The sign of det [J; tangent] is the same all along a branch. A corrected point where it differs
+    lies on another strand that runs the other way.
+    """
     n = work.r.shape[0]
-    if code != status.OK:
+    laboured = iterations > NEWTON_MANY and step > LABOURED_STEP
+    if code != status.OK or laboured:
         return REASON_NEWTON
     if work.w[n] > course.upper or work.w[n] < course.lower:
         return REASON_BOUND
     cosine = new_tangent(work)
+    work.side[0] = lu_sign(work.A, work.pivot)
     if cosine < 0.0:
+        work.side[0] = -work.side[0]
         for k in range(work.tangent.shape[0]):
             work.tangent[k] = -work.tangent[k]
-    if abs(cosine) < TURN_MOST:
+    if abs(cosine) < TURN_MOST or astray(work) > ASTRAY_MOST * step:
         return REASON_TURN
+    if work.side[0] != branch.side[p] and step > STRAND_STEP:
+        return REASON_STRAND
     if signature(problem) != branch.signature[p] and step > CONTACT_STEP:
         return REASON_CONTACT
     return REASON_NONE
@@ -254,7 +276,7 @@ def trace(
         code, iterations = correct(problem, work, course.tolerance)
         if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
             return code, p
-        reason = judge(problem, work, branch, max(p - 1, 0), step, code, course)
+        reason = judge(problem, work, branch, max(p - 1, 0), step, code, iterations, course)
         if reason != REASON_NONE and p > 0:
             branch.reason[p] = reason
             branch.rejected[p] += 1

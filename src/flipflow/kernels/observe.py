@@ -20,7 +20,7 @@ from flipflow.kernels.gapmotion import GapMotion, exponential, extremes, prepare
 from flipflow.kernels.plan import Complex, Int, Real
 from flipflow.kernels.shooting import Shooting, shooting_residual
 
-ROUNDING = 1e-12
+ROUNDING = 1e-9
 
 
 @kernel(entry=True)
@@ -256,7 +256,11 @@ def _correct_state(
     if code != status.OK:
         return code, first, math.inf
     last = _newton_step(J, A, pivot, delta, omega)
-    if not last <= max(0.5 * first, ROUNDING):
+    # Steps within the rounding of the flow do not shrink; relative to the motion they are nothing.
+    size_of_motion = 0.0
+    for k in range(size // 2):
+        size_of_motion = max(size_of_motion, abs(z[k]), abs(z[size // 2 + k]) / omega)
+    if not last <= max(0.5 * first, ROUNDING * size_of_motion):
         return code, first, math.inf
     _store_map(J, out)
     return code, first, last

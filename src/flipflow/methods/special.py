@@ -22,7 +22,8 @@ from flipflow.methods.solver import Point, Real, Solver, Traced
 from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker
 
 SHARE_TOLERANCE = 1e-10
-DIP = 0.25
+DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
+BOTTOM_STEPS = 15
 
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
@@ -143,7 +144,7 @@ def _brackets(
 
 
 def _dips(values: Real) -> list[int]:
-    """Interior points where |test| is least and a parabola says that it may fall to nothing."""
+    """Interior points where |test| is least and by its neighbours may fall to nothing."""
     inner = np.abs(values[1:-1])
     before, after = np.abs(values[:-2]), np.abs(values[2:])
     same = (np.sign(values[:-2]) == np.sign(values[1:-1])) & (
@@ -153,7 +154,9 @@ def _dips(values: Real) -> list[int]:
     curvature = before - 2.0 * inner + after
     with np.errstate(divide="ignore", invalid="ignore"):
         bottom = inner - (after - before) ** 2 / (8.0 * curvature)
-    deep = (bottom < DIP * inner) | (inner < 1e-3 * np.abs(values).max(initial=0.0))
+    low = LOW * float(np.abs(values).max(initial=0.0))
+    sharp = inner < SHARP_DIP * np.minimum(before, after)
+    deep = (bottom < DIP * inner) | (inner < low) | sharp
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
@@ -163,7 +166,9 @@ def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) ->
     def height(share: float) -> float:
         return sign * test.evaluate(solver.between(traced, p, share))
 
-    best = minimize_scalar(height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": 25})
+    best = minimize_scalar(
+        height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": BOTTOM_STEPS}
+    )
     return float(best.x) if best.fun < 0.0 else None
 
 

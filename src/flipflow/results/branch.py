@@ -16,7 +16,7 @@ from flipflow.methods.special import FOLD
 from flipflow.methods.stability import STABLE, stability_words
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.orbit import Orbit
-from flipflow.results.status import BranchStatus
+from flipflow.results.status import STEP_REASON, BranchStatus
 
 Real = NDArray[np.float64]
 
@@ -52,6 +52,15 @@ class SpecialPoint:
     def amplitude(self, which: Coordinate) -> float:
         """Half peak-to-peak of a coordinate in m."""
         return self.orbit.amplitude(which)
+
+
+@dataclass(frozen=True)
+class ShortenedStep:
+    """A step that was refused: omega in rad/s where it began, how often halved, why at last."""
+
+    omega: float
+    times: int
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +136,16 @@ class Branch:
     def error(self) -> Real:
         """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
         return self.solver.errors(self.traced.u, self.omega)
+
+    @property
+    def shortened_steps(self) -> tuple[ShortenedStep, ...]:
+        """Steps that were refused and halved on the way, the one at which the branch ended too."""
+        rejected, reason = self.traced.rejected, self.traced.reason
+        return tuple(
+            ShortenedStep(float(self.omega[p - 1]), int(rejected[p]), STEP_REASON[int(reason[p])])
+            for p in np.flatnonzero(rejected)
+            if p > 0
+        )
 
     def points_of(self, kind: str) -> tuple[SpecialPoint, ...]:
         """Special points of one kind, in branch order."""

@@ -57,6 +57,7 @@ def branch_document(branch: Branch) -> Document:
         "status_sentence": branch.status.value,
         "complete": branch.complete,
         "notes": list(branch.notes),
+        "shortened_steps": [dataclasses.asdict(step) for step in branch.shortened_steps],
         "omega": plain(branch.omega),
         "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
         "phase": {str(which): plain(branch.phase(which)) for which in system.named},

@@ -6,7 +6,13 @@ from enum import Enum
 from typing import Self
 
 from flipflow.kernels import status
-from flipflow.kernels.arclength import REASON_BOUND, REASON_CONTACT, REASON_NEWTON, REASON_TURN
+from flipflow.kernels.arclength import (
+    REASON_BOUND,
+    REASON_CONTACT,
+    REASON_NEWTON,
+    REASON_STRAND,
+    REASON_TURN,
+)
 
 
 class BranchStatus(Enum):
@@ -57,4 +63,5 @@ STEP_REASON = {
     REASON_TURN: "the branch turned too far",
     REASON_CONTACT: "a contact changed",
     REASON_BOUND: "the step left the interval",
+    REASON_STRAND: "the point lies on another strand of the branch",
 }
