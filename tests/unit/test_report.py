@@ -126,7 +126,7 @@ def test_what_cannot_be_checked_names_what_is_missing(project):
     (table,) = first_page.limits(bare)
     rows = {row[0].text: row for row in table.rows}
     assert rows["Shear strain"][-1].text == "not checked"
-    assert "shear_height" in rows["Shear strain"][3].text
+    assert "shear_springs.height" in rows["Shear strain"][3].text
     assert first_page.verdict_state(bare) == "not checked"
     notes = [b.text for b in blocks_of(bare) if isinstance(b, Note)]
     assert any("Orbits are not drawn" in note for note in notes)

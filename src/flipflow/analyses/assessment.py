@@ -12,7 +12,12 @@ from dataclasses import dataclass
 from flipflow import __version__
 from flipflow.analyses.feasible import limit_bounds, missing_for, missing_words, working_motion
 from flipflow.analyses.normal import NormalMotion
-from flipflow.analyses.operating_region import Monitor, OperatingRegion, operating_region
+from flipflow.analyses.operating_region import (
+    Monitor,
+    OperatingRegion,
+    analysed_range,
+    operating_region,
+)
 from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.methods.options import Method, PiecewiseExact
 from flipflow.model.limits import LIMIT_FIELD
@@ -103,7 +108,7 @@ class CaseAssessment:
     @property
     def stop_reached(self) -> bool:
         """Whether a stop is touched at working speed."""
-        return self.orbit is not None and bool(self.orbit.contact_intervals)
+        return self.orbit is not None and self.orbit.touches
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +166,12 @@ def assess(
         As for :func:`~flipflow.operating_region`.
     """
     region = operating_region(
-        project.screen, project.limits, project.load_cases, monitor, omega=omega, method=method
+        project.screen,
+        project.limits,
+        project.load_cases,
+        monitor,
+        omega=omega or analysed_range(project.screen, project.speed),
+        method=method,
     )
     cases = tuple(
         assess_case(project.screen.loaded(load), load, branch, project.speed)
@@ -174,8 +184,8 @@ def assess(
         cases=cases,
         omega=project.speed,
         limits_table=rows,
-        verdict=verdict(project.speed, rows, cases),
-        notes=(*project.warnings, *region.notes),
+        verdict=verdict(project.speed, rows, cases, region),
+        notes=(*project.warnings, *region.notes, *coexisting(cases)),
         method=method or PiecewiseExact(),
         version=__version__,
         input_hash=input_hash(project),
@@ -196,7 +206,7 @@ def assess_case(
         screen=screen,
         branch=branch,
         working=working,
-        orbits=() if omega is None else branch.orbits_at(omega),
+        orbits=() if working is None else branch.orbits_at(working.omega),
         values=values,
         energy={} if working is None else energy_balance(working),
     )
@@ -254,15 +264,25 @@ def relative_margin(value: float, low: float, high: float) -> float:
 
 
 def verdict(
-    omega: float | None, rows: tuple[LimitRow, ...], cases: tuple[CaseAssessment, ...]
+    omega: float | None,
+    rows: tuple[LimitRow, ...],
+    cases: tuple[CaseAssessment, ...],
+    region: OperatingRegion,
 ) -> str:
     """One sentence for the top of the report."""
     if omega is None:
         return "No operating speed is given: the allowed speed range stands below."
     speed = f"{omega * 30.0 / math.pi:.4g} rpm"
-    lost = [case.name for case in cases if case.orbit is None or case.orbit.stability == "unstable"]
+    unknown = [case.name for case in cases if case.orbit is None]
+    if unknown:
+        return (
+            f"{speed}: not judged, for the speeds analysed do not hold it in {', '.join(unknown)}."
+        )
+    lost = [case.name for case in cases if case.orbit is not None and not case.orbit.stable]
     if lost:
-        return f"{speed}: no motion that returns after a small disturbance in {', '.join(lost)}."
+        return (
+            f"{speed}: the motion is not sure to return after a disturbance in {', '.join(lost)}."
+        )
     judged = [row for row in rows if row.margin is not None]
     unchecked = [row for row in rows if row.state == NOT_CHECKED and row.limit != NO_LIMIT]
     if not judged:
@@ -275,7 +295,19 @@ def verdict(
         head = f"{len(broken)} of {len(judged)} limits broken; worst"
     elif unchecked:
         head = f"all limits that could be checked are met {where}; tightest"
-    return f"{speed}: {head}: {_against(tightest)}."
+    inside = any(low <= omega <= high for low, high in region.feasible)
+    outside = "" if inside or broken else ", but outside the operating region"
+    return f"{speed}: {head}: {_against(tightest)}{outside}."
+
+
+def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
+    """A sentence for each case in which another motion is possible at working speed."""
+    return tuple(
+        f"Case {case.name}: another motion is possible at this speed; shown is the one reached "
+        f"when the speed is raised from below."
+        for case in cases
+        if sum(orbit.stable for orbit in case.orbits) > 1
+    )
 
 
 def _against(row: LimitRow) -> str:

@@ -109,8 +109,8 @@ def common_window(
     """Intervals in which every limit is met in every case, and what binds their two ends."""
     window: Intervals = (region,)
     ends: dict[float, Bound] = {
-        region[0]: Bound("operating region", cases[0].name if cases else ""),
-        region[1]: Bound("operating region", cases[0].name if cases else ""),
+        region[0]: Bound("operating region", "empty"),
+        region[1]: Bound("operating region", "empty"),
     }
     for case in cases:
         for name, intervals in case.intervals.items():

@@ -16,15 +16,16 @@ from flipflow.methods.exact import ExactSolver
 from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
 from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced
-from flipflow.methods.special import Found, find_special_points
-from flipflow.methods.stability import full_turn, stability_words
-from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.methods.special import STABILITY_CHANGES, Found, find_special_points
+from flipflow.methods.stability import UNDETERMINED, full_turn, stability_words
+from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.orbit import Orbit
 from flipflow.results.status import BranchStatus
 
 SETTLING_TURNS = 4000
 OMEGA_MOST = 1e6
+SCAN_POINTS = 2000
 
 
 def frequency_response(
@@ -58,7 +59,9 @@ def frequency_response(
     """
     low, high = check_interval(omega)
     method = method or PiecewiseExact()
-    solver = solver_for(machine.system(), method)
+    if not isinstance(method, (PiecewiseExact, HarmonicBalance)):
+        raise InputError("method", method, "give ff.PiecewiseExact() or ff.HarmonicBalance(3)")
+    solver = solver_for(system_of(machine), method)
     course = arclength.Course(
         low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK
     )
@@ -104,12 +107,13 @@ def check_interval(omega: object) -> tuple[float, float]:
 def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
-    Below the first contact that is the contact-free motion. Otherwise the branch is followed up
-    from a frequency without contact, and where there is none, the machine is let settle from rest.
+    Where no lower frequency touches a stop that is the contact-free motion. Otherwise the branch
+    is followed up from a frequency without contact, and where there is none, the machine is let
+    settle from rest.
     """
-    if contact_free(solver, omega):
+    lower = lowest_contact(solver, omega)
+    if lower is None:
         return contact_free_unknowns(solver, omega)
-    lower = omega
     while lower > 1e-3 * omega:
         lower *= 0.96
         if contact_free(solver, lower):
@@ -121,6 +125,16 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
                 return np.asarray(traced.u[-1])
             break
     return settled_unknowns(solver, omega)
+
+
+def lowest_contact(solver: Solver, omega: float) -> float | None:
+    """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
+    scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
+    X = complex_amplitudes(solver.system, scan)
+    beyond = np.zeros(scan.size, dtype=bool)
+    for spring in solver.builder.springs:
+        beyond |= np.abs(X @ spring.direction) >= min(spring.gaps)
+    return float(scan[beyond][0]) if beyond.any() else None
 
 
 def contact_free(solver: Solver, omega: float) -> bool:
@@ -172,7 +186,7 @@ def _finished(
     special = tuple(
         SpecialPoint(
             one.kind,
-            Orbit(solver, one.point.u, one.point.omega, one.point.return_map),
+            Orbit(solver, one.point.u, one.point.omega, one.point.return_map, _word(one.kind)),
             one.index + one.share,
             one.spring,
             one.side,
@@ -193,6 +207,11 @@ def _finished(
         notes=tuple(notes),
         version=__version__,
     )
+
+
+def _word(kind: str) -> str | None:
+    """Where stability changes the motion is neither; elsewhere its multipliers tell."""
+    return UNDETERMINED if kind in STABILITY_CHANGES else None
 
 
 def _saddle_side(traced: Traced, eigenvalues: NDArray[np.complex128]) -> NDArray[np.bool_] | None:

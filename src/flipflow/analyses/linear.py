@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from flipflow.errors import InputError
 from flipflow.methods.linear import complex_amplitudes
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import Coordinate, Machine, MechanicalSystem
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 
 Real = NDArray[np.float64]
 SCAN_POINTS = 4000
@@ -115,7 +115,7 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
     if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies > 0.0)):
         raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
-    system = machine.system().with_bonded()
+    system = system_of(machine).with_bonded()
     system.require_damping()
     return LinearResponse(machine, system, frequencies)
 

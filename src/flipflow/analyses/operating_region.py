@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from flipflow.analyses.feasible import Bound, CaseWindow, Intervals, case_window, common_window
 from flipflow.analyses.frequency_response import check_interval, frequency_response
 from flipflow.analyses.linear import (
@@ -128,17 +130,28 @@ def operating_region(
         for case in cases
         for name, why in case.unchecked.items()
     }
-    incomplete = [f"{b.status.value}" for b in branches if not b.complete]
+    named = zip(("empty", *(case.name for case in cases)), (branch, *branches), strict=True)
+    unfinished = dict.fromkeys(
+        f"Case {name}: {text}"
+        for name, one in named
+        for text in (*one.notes, *([] if one.complete else [one.status.value]))
+    )
     return OperatingRegion(
         screen, branch, *marks.frequencies, marks.lower, marks.upper, feasible, binding,
-        tuple(cases), tuple(branches), (*sorted(notes), *incomplete, *marks.notes),
+        tuple(cases), tuple(branches), (*sorted(notes), *unfinished, *marks.notes),
     )  # fmt: skip
 
 
-def analysed_range(screen: FlipFlowScreen) -> tuple[float, float]:
-    """From well below the first natural frequency to well above the last with stops engaged."""
-    first = float(linear_response(screen, 1.0).natural_frequencies[0])
-    return LOWEST_SHARE * first, HIGHEST_SHARE * float(bonded_natural_frequencies(screen)[-1])
+def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[float, float]:
+    """From well below the first natural frequency to well above the last with stops engaged.
+
+    A working speed in rad/s that lies outside widens the range.
+    """
+    low = LOWEST_SHARE * float(linear_response(screen, 1.0).natural_frequencies[0])
+    high = HIGHEST_SHARE * float(bonded_natural_frequencies(screen)[-1])
+    if speed is None:
+        return low, high
+    return min(low, 0.9 * speed), max(high, 1.1 * speed)
 
 
 @dataclass(frozen=True)
@@ -158,11 +171,16 @@ def _landmarks(screen: FlipFlowScreen, branch: Branch) -> _Landmarks:
     cs = begins[-1] if begins else None
     lb, ub = _main_folds(branch)
     span = (float(branch.omega.min()), float(branch.omega.max()))
-    if cs is None:
-        notes = ("The stop is not reached at any speed analysed.",) if screen.has_stop else ()
-        notes = () if effective is not screen else notes
-        return _Landmarks((ea, ar, cs, lb, ub), ea or span[0], ar or span[1], notes)
-    return _Landmarks((ea, ar, cs, lb, ub), cs, peak.omega if lb is None else lb)
+    touched = bool(np.any(branch.traced.signature != 0))
+    upper = peak.omega if lb is None else lb
+    if cs is not None:
+        return _Landmarks((ea, ar, cs, lb, ub), cs, upper)
+    if touched:
+        note = "Contact begins below the speeds analysed: the region starts with them."
+        return _Landmarks((ea, ar, cs, lb, ub), span[0], upper, (note,))
+    reaches = screen.has_stop and effective is screen
+    notes = ("The stop is not reached at any speed analysed.",) if reaches else ()
+    return _Landmarks((ea, ar, cs, lb, ub), ea or span[0], ar or span[1], notes)
 
 
 def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:

@@ -13,7 +13,7 @@ from flipflow.methods.exact import ExactSolver
 from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.solver import Point, Real
 from flipflow.methods.two_event import TwoEventProblem
-from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.results.orbit import Orbit
 
 STARTS = 64
@@ -22,7 +22,7 @@ SAME = 1e-6
 
 
 def periodic_orbits(
-    machine: Machine, omega: float, rng: int | np.random.Generator = 0
+    machine: Machine, omega: float, max_periods: int = 1, rng: int | np.random.Generator = 0
 ) -> tuple[Orbit, ...]:
     """Periodic motions of one forcing period at ``omega``, stable and unstable.
 
@@ -38,6 +38,8 @@ def periodic_orbits(
         A screen or a :class:`~flipflow.MechanicalSystem`.
     omega
         Forcing frequency in rad/s.
+    max_periods
+        Forcing periods after which a motion may repeat: 1.
     rng
         Seed or generator for the cloud of starts.
 
@@ -52,9 +54,14 @@ def periodic_orbits(
     InputError
         For a frequency that is not finite or not above 0.
     """
-    if isinstance(omega, bool) or not (math.isfinite(omega) and omega > 0.0):
+    if max_periods != 1:
+        raise InputError(
+            "max_periods", max_periods, "motions of one forcing period are searched: 1"
+        )
+    number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
+    if not (number and math.isfinite(omega) and omega > 0.0):
         raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    solver = ExactSolver(machine.system(), half_turn=False)
+    solver = ExactSolver(system_of(machine), half_turn=False)
     found: list[Point] = []
     for start in _starts(solver, omega, np.random.default_rng(rng)):
         for turns in (0, SETTLING_TURNS):

@@ -117,7 +117,7 @@ def _foundation_force(w: Working) -> float | None:
 
 
 def _stop_force(w: Working) -> float:
-    return w.orbit.stop_force_peak() if w.orbit.system.springs else 0.0
+    return w.orbit.stop_force_peak() if w.screen.has_stop else 0.0
 
 
 def _dissipated_power(w: Working) -> float | None:
@@ -135,10 +135,10 @@ def _shear_strain(w: Working) -> float | None:
 def _jump_margin(w: Working) -> float:
     if not w.jumps:
         return math.inf
-    low, high = min(w.jumps), max(w.jumps)
-    if w.omega < low:
-        return (low - w.omega) / low
-    return (w.omega - high) / high if w.omega > high else 0.0
+    zones = zip(w.jumps[::2], w.jumps[1::2], strict=False)
+    if any(min(zone) <= w.omega <= max(zone) for zone in zones):
+        return 0.0
+    return min(abs(w.omega - jump) / jump for jump in w.jumps)
 
 
 def _throw_number(w: Working) -> float | None:

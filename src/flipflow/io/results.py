@@ -68,6 +68,9 @@ def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
     source = Path(path)
     if not source.is_file():
         raise InputError("path", str(path), "there is no such file; give one that ff.save wrote")
+    if source.suffix != ".json":
+        remedy = "only .json opens again; read .nc with xarray.open_dataset, .csv as a table"
+        raise InputError("path", str(path), remedy)
     try:
         document = json.loads(source.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -31,7 +31,7 @@ class Branch(NamedTuple):
     u: Real  # (P, n)
     omega: Real  # (P,)
     tangent: Real  # (P, n + 1) unit in scaled unknowns, stored unscaled
-    jacobian: Real  # (P, n, n) dr/du
+    jacobian: Real  # (P, n, n) dr/du, or (P, 0, 0) where nothing is read off it
     side: Real  # (P,) sign of det [J; tangent]
     signature: Int  # (P,)
     iterations: Int  # (P,) Newton iterations
@@ -161,6 +161,7 @@ def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     n = work.r.shape[0]
     for i in range(n):
         branch.u[p, i] = work.w[i]
+    for i in range(branch.jacobian.shape[1]):
         for j in range(n):
             branch.jacobian[p, i, j] = work.J[i, j]
     branch.omega[p] = work.w[n]

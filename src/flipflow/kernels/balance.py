@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
-from flipflow.kernels.flow import Flow, configuration, kick_sign, prepare_drive
+from flipflow.kernels.flow import Flow, configuration, contact_number, kick_sign, prepare_drive
 from flipflow.kernels.gapmotion import (
     GapMotion,
     exponential,
@@ -159,7 +159,7 @@ def record_contacts(problem: Balance, omega: float) -> int:
             flow.states[e, j] = flow.state[j]
         length, spring, new = next_change_from(problem, theta, rest, fired)
         if math.isnan(length):
-            return status.NOT_FINITE
+            return status.SEARCH_NOT_ENDED
         flow.length[e] = length / omega
         flow.spring[e] = spring
         flow.kick[e] = 0.0
@@ -374,10 +374,7 @@ def _write_block(
 @kernel
 def contact_count(problem: Balance) -> int:
     """A number that changes when the contacts met in a turn change."""
-    total = 0
-    for e in range(problem.flow.segments[0] - 1):
-        total += 1 + 1000 * problem.flow.spring[e]
-    return total
+    return contact_number(problem.flow)
 
 
 @kernel

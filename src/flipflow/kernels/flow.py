@@ -208,7 +208,7 @@ def run_flow(plan: Plan, flow: Flow, omega: float, t: float, duration: float, ra
             flow.motion, flow.contact, flow.state, plan.mode_count[slot] + 1, end - t, fired
         )
         if math.isnan(length):
-            return status.NOT_FINITE
+            return status.SEARCH_NOT_ENDED
         flow.length[e] = length
         flow.spring[e] = spring
         flow.kick[e] = 0.0
@@ -220,6 +220,15 @@ def run_flow(plan: Plan, flow: Flow, omega: float, t: float, duration: float, ra
         fired = spring
         t += length
     return status.TOO_MANY_EVENTS
+
+
+@kernel
+def contact_number(flow: Flow) -> int:
+    """A number that changes when the contacts of the record change: how often each spring does."""
+    total = 0
+    for e in range(flow.segments[0] - 1):
+        total += 1 + 1000 * flow.spring[e]
+    return total
 
 
 @kernel

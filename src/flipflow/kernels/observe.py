@@ -46,6 +46,8 @@ def observe_flow(
     for p in range(omega.shape[0]):
         turn = problem.fraction * 2.0 * math.pi / omega[p]
         code[p] = _turn_after(problem, states[p], omega[p], turn, waiting)
+        if code[p] == status.MISSING_CONFIGURATION:
+            break
         if code[p] != status.OK:
             continue
         for g in range(coordinate.shape[0]):
@@ -229,6 +231,8 @@ def corrected(
         code[p], first, last = _correct_state(
             problem, states[p], omega[p], J, A, pivot, delta, maps[p]
         )
+        if code[p] == status.MISSING_CONFIGURATION:
+            break
         error[p] = first + last
         if harmonics.shape[0] > 0 and math.isfinite(error[p]):
             error[p] = _distance(problem, omega[p], harmonics, series[p], last)

@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
-from flipflow.kernels.dense import lu_factor, lu_solve
-from flipflow.kernels.flow import Flow, carry_tangent, run_flow
-from flipflow.kernels.plan import Complex, Int, Plan, Real
+from flipflow.kernels.flow import Flow, carry_tangent, contact_number, run_flow
+from flipflow.kernels.plan import Complex, Plan, Real
 
 
 class Shooting(NamedTuple):
@@ -63,10 +60,7 @@ def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real
 @kernel
 def crossings(problem: Shooting) -> int:
     """A number that changes when the contacts met in a turn change: crossings, spring by spring."""
-    total = 0
-    for e in range(problem.flow.segments[0] - 1):
-        total += 1 + 1000 * problem.flow.spring[e]
-    return total
+    return contact_number(problem.flow)
 
 
 @kernel
@@ -79,36 +73,3 @@ def state_scale(problem: Shooting, z: Real, omega: float, scale: Real) -> None:
     for k in range(n):
         scale[k] = amplitude
         scale[n + k] = amplitude * omega
-
-
-@kernel
-def newton_orbit(
-    problem: Shooting, z: Real, omega: float, r: Real, J: Real, A: Real, pivot: Int, most: int
-) -> tuple[int, int]:
-    """Newton on the shooting residual at fixed omega, z in place; status and iterations.
-
-    A step that is longer than the motion itself is cut to its length.
-    """
-    size = z.shape[0]
-    scale = np.empty(size)
-    for iteration in range(most):
-        code = shooting_residual(problem, z, omega, r, J)
-        if code != status.OK:
-            return code, iteration
-        state_scale(problem, z, omega, scale)
-        for i in range(size):
-            for j in range(size):
-                A[i, j] = J[i, j] * scale[j] / scale[i]
-            r[i] = -r[i] / scale[i]
-        if not lu_factor(A, pivot):
-            return status.SINGULAR, iteration
-        lu_solve(A, pivot, r)
-        longest = 0.0
-        for k in range(size):
-            longest = max(longest, abs(r[k]))
-        cut = min(1.0, 1.0 / longest) if longest > 0.0 else 1.0
-        for k in range(size):
-            z[k] += cut * r[k] * scale[k]
-        if longest < 1e-9:
-            return status.OK, iteration + 1
-    return status.NO_CONVERGENCE, most

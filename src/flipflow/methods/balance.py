@@ -16,6 +16,8 @@ from flipflow.model.system import MechanicalSystem
 class BalanceSolver(Solver):
     """Unknowns: the Fourier coefficients of the motion at the gaps."""
 
+    reads_jacobian = False
+
     def __init__(self, system: MechanicalSystem, harmonics: int, *, half_turn: bool) -> None:
         self.order = harmonics
         super().__init__(system, half_turn=half_turn)

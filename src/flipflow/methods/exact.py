@@ -16,6 +16,8 @@ from flipflow.methods.solver import Complex, Real, Solver
 class ExactSolver(Solver):
     """Unknown: the state (x, x') at t = 0, where the unbalance points along +x."""
 
+    reads_jacobian = True
+
     def _prepare(self) -> None:
         self.unknowns = 2 * self.system.size
         plan = self.builder.plan
@@ -70,8 +72,7 @@ class ExactSolver(Solver):
             )
             if not np.any(code == status.MISSING_CONFIGURATION):
                 break
-            self.problem.flow.state[:] = self.turn.flow.state
-            self.add_missing_configuration()
+            self._add_configuration(self.turn.flow)
             states[:] = begin
         bad = code != status.OK
         low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan

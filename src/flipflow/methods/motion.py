@@ -66,10 +66,6 @@ class Motion(ABC):
     def derivative(self, t: ArrayLike, order: int) -> Real:
         """x, x' or x'' (order 0, 1, 2) at times t, shape (..., N)."""
 
-    def contact_state(self, t: ArrayLike) -> NDArray[np.int64]:
-        """State of each spring at times t: 0 open, +-1 engaged, +-2 let go beyond the gap."""
-        return self.pieces.states[self.piece(t)]
-
     def piece(self, t: ArrayLike) -> NDArray[np.intp]:
         """Index of the piece in which each time lies."""
         inside = np.mod(np.asarray(t, float), self.period)

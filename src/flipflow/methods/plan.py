@@ -36,6 +36,7 @@ class PlanBuilder:
     """
 
     def __init__(self, system: MechanicalSystem) -> None:
+        self.original = system
         self.system = system.with_bonded()
         self.springs = self.system.springs
         if len(self.springs) > MAX_SPRINGS:

@@ -95,14 +95,14 @@ def new_corrector(unknowns: int) -> Corrector:
     )
 
 
-def new_branch(unknowns: int, points: int) -> Branch:
+def new_branch(unknowns: int, points: int, *, with_jacobian: bool = True) -> Branch:
     """Record of a branch of up to ``points`` points."""
     n = unknowns
     return Branch(
         u=np.zeros((points, n)),
         omega=np.zeros(points),
         tangent=np.zeros((points, n + 1)),
-        jacobian=np.zeros((points, n, n)),
+        jacobian=np.zeros((points, n, n) if with_jacobian else (points, 0, 0)),
         side=np.zeros(points),
         signature=np.zeros(points, np.int64),
         iterations=np.zeros(points, np.int64),

@@ -90,6 +90,7 @@ class Solver(ABC):
 
     unknowns: int
     problem: Any
+    reads_jacobian: bool
 
     def __init__(self, system: MechanicalSystem, *, half_turn: bool) -> None:
         self.builder = PlanBuilder(system)
@@ -133,14 +134,18 @@ class Solver(ABC):
 
     def add_missing_configuration(self) -> None:
         """Prepare the configuration a kernel stopped at, and the problem anew."""
-        digits = np.select([self.flow.state == 1, self.flow.state == -1], [1, 2], 0)
+        self._add_configuration(self.flow)
+
+    def _add_configuration(self, flow: Flow) -> None:
+        """Prepare the configuration at which a flow stopped, and the problem anew."""
+        digits = np.select([flow.state == 1, flow.state == -1], [1, 2], 0)
         self.builder.add([int(digits @ 3 ** np.arange(digits.size))])
         self._prepare()
 
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
         while True:
-            record = new_branch(self.unknowns, POINTS_MOST)
+            record = new_branch(self.unknowns, POINTS_MOST, with_jacobian=self.reads_jacobian)
             code, points = arclength.follow(
                 self.problem, self.work, record, u, omega, course, arclength.TRACE_ALL, 0.0
             )
@@ -166,7 +171,7 @@ class Solver(ABC):
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
         course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, arclength.SHARP)
-        record = new_branch(self.unknowns, 1)
+        record = new_branch(self.unknowns, 1, with_jacobian=self.reads_jacobian)
         while True:
             code, points = arclength.follow(
                 self.problem, self.work, record, u, omega, course, arclength.TRACE_ALL, 0.0
@@ -213,8 +218,7 @@ class Solver(ABC):
             )  # fmt: skip
             if not np.any(code == status.MISSING_CONFIGURATION):
                 return maps, error
-            self.builder.add(range(self.builder.plan.slot.size))
-            self._prepare()
+            self._add_configuration(problem.flow)
 
     def _new_work(self) -> None:
         self.work = new_corrector(self.unknowns)

@@ -28,6 +28,7 @@ BOTTOM_STEPS = 15
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
 SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Neimark-Sacker"
+STABILITY_CHANGES = (FOLD, SYMMETRY, DOUBLING, NEIMARK_SACKER)
 
 
 @dataclass(frozen=True, eq=False)

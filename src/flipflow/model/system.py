@@ -16,6 +16,14 @@ from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance, f
 Coordinate = str | int
 
 
+def system_of(machine: object) -> MechanicalSystem:
+    """The system of a screen or a system; anything else is refused with a sentence."""
+    if not isinstance(machine, Machine):
+        remedy = "give a FlipFlowScreen or a MechanicalSystem; of a project, its .screen"
+        raise InputError("machine", type(machine).__name__, remedy)
+    return machine.system()
+
+
 @runtime_checkable
 class Machine(Protocol):
     """Whatever can be flattened into a :class:`MechanicalSystem`."""
@@ -121,12 +129,12 @@ class MechanicalSystem:
 
     def require_damping(self) -> None:
         """Raise InputError for a machine without any damping: it has no steady state."""
-        if not np.any(self.C) and not any(s.bonded and s.damping > 0.0 for s in self.springs):
+        if not np.any(self.C):
             raise InputError(
                 "damping",
                 0.0,
-                "without any damping a free vibration never dies out and no steady state exists; "
-                "give at least one damping above 0",
+                "without any damping while the stops are open a free vibration never dies out "
+                "and no steady state exists; give one damping above 0 besides the stops'",
             )
 
     def with_bonded(self) -> MechanicalSystem:

@@ -169,6 +169,8 @@ def stop_sentence(assessment: Assessment) -> str:
         return ""
     if not assessment.project.screen.has_stop:
         return "the machine has none."
+    if any(case.orbit is None for case in assessment.cases):
+        return "not known, for no motion was found at working speed in every case."
     free = [case.name for case in assessment.cases if case.orbit and not case.stop_reached]
     if not free:
         return "reached in every load case."
@@ -180,7 +182,7 @@ def stop_sentence(assessment: Assessment) -> str:
 def _bound(bound: Bound) -> str:
     label = QUANTITIES[bound.limit].label if bound.limit in QUANTITIES else bound.limit
     if bound.limit in {"operating region", "speed"}:
-        return f"the end of the {label}" if bound.limit != "speed" else "the limit on speed"
+        return f"the bound of the {label}" if bound.limit != "speed" else "the limit on speed"
     return f"the limit on {label} (case {bound.case})"
 
 

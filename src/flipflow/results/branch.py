@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from flipflow.errors import InputError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.options import Method
 from flipflow.methods.solver import Point, Solver, Traced
 from flipflow.methods.special import FOLD
@@ -43,6 +44,9 @@ class SpecialPoint:
     position: float
     spring: int = -1
     side: int = 0
+
+    def __repr__(self) -> str:
+        return f"SpecialPoint({self.kind}, {self.omega:.9g} rad/s)"
 
     @property
     def omega(self) -> float:
@@ -107,6 +111,12 @@ class Branch:
     notes: tuple[str, ...]
     version: str
 
+    def __repr__(self) -> str:
+        ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s, " if self.omega.size else ""
+        counts = Counter(point.kind for point in self.special_points)
+        kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
+        return f"Branch({self.omega.size} points, {ends}{kinds}, {self.status.name})"
+
     @property
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
@@ -170,8 +180,17 @@ class Branch:
         )  # fmt: skip
 
     def orbits_at(self, omega: float) -> tuple[Orbit, ...]:
-        """The motions of this branch at exactly ``omega``, in branch order, each solved for."""
+        """The motions of this branch at exactly ``omega``, in branch order, each solved for.
+
+        Raises
+        ------
+        InputError
+            For a frequency outside the branch.
+        """
         ends = self.omega
+        if not isinstance(omega, (int, float)) or not ends.min() <= omega <= ends.max():
+            remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
+            raise InputError("omega", omega, remedy)
         hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
         found: list[Orbit] = []
         for p in hits:
@@ -207,17 +226,23 @@ class Branch:
     def orbit_from_below(self, omega: float) -> Orbit | None:
         """The motion met at ``omega`` when the speed is raised slowly from below."""
         for k, run in enumerate(self.rising_path):
-            low = self.omega[run.start] if k == 0 else self.omega[self.rising_path[k - 1].stop - 1]
-            if low <= omega <= self.omega[run.stop - 1]:
+            low = self.omega[run.start] if k == 0 else self._end_of(self.rising_path[k - 1])
+            if low <= omega <= self._end_of(run):
                 return self.solve_in(run, omega)
         return None
 
+    def _end_of(self, run: slice) -> float:
+        """Highest omega of a run: the refined fold behind its last point, or that point."""
+        last = run.stop - 1
+        folds = [fold.omega for fold in self.folds if last - 1 <= fold.position <= last + 1]
+        return max([float(self.omega[last]), *folds])
+
     def solve_in(self, run: slice, omega: float) -> Orbit | None:
         """The motion at exactly ``omega`` near a run of rising points."""
-        at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, self.omega.size - 1)
+        at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, run.stop - 1)
         before, after = int(at) - 1, int(at)
         span = self.omega[after] - self.omega[before]
-        share = (omega - self.omega[before]) / span if span else 0.0
+        share = min((omega - self.omega[before]) / span, 1.0) if span else 0.0
         guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
         point = self.solver.solve(guess, omega)
         if point is None:
@@ -232,6 +257,8 @@ class Branch:
 
     def peak(self, which: Coordinate) -> SpecialPoint:
         """The motion of largest amplitude on the branch, refined between its points."""
+        if self.omega.size == 0:
+            raise IncompleteError(f"the branch has no points: {self.status.value}")
         values = self.amplitude(which)
         top = int(values.argmax())
         best = SpecialPoint("peak", self.orbit(top), float(top))
@@ -252,7 +279,7 @@ class Branch:
                 ).x
             )
             point = self.solver.between(self.traced, p, share)
-            orbit = Orbit(self.solver, point.u, point.omega, point.return_map)
+            orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
             if orbit.amplitude(which) > best.amplitude(which):
                 best = SpecialPoint("peak", orbit, p + share)
         return best

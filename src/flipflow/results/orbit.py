@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.errors import InputError
 from flipflow.methods.motion import ContactInterval, Motion
 from flipflow.methods.solver import Solver
 from flipflow.methods.stability import STABLE, full_turn, stability_words
@@ -45,6 +46,9 @@ class Orbit:
     omega: float
     return_map: Real
     word: str | None = None
+
+    def __repr__(self) -> str:
+        return f"Orbit({self.omega:.6g} rad/s, {self.stability})"
 
     @property
     def system(self) -> MechanicalSystem:
@@ -121,7 +125,8 @@ class Orbit:
     def stop_force(self, spring: int = 0, t: ArrayLike | None = None) -> Real:
         """Force H of a stop in N at times t (default: :attr:`t`), positive against +d."""
         times = np.mod(self.t if t is None else np.asarray(t, float), self.period)
-        return self._force(spring, times, self.motion.piece(times))
+        flat = np.atleast_1d(times).ravel()
+        return self._force(spring, flat, self.motion.piece(flat)).reshape(times.shape)
 
     def amplitude(self, which: Coordinate) -> float:
         """Half peak-to-peak of a coordinate over the period, in m; from the exact extremes."""
@@ -212,12 +217,29 @@ class Orbit:
         x, v, a = (self.motion.piece_derivative(t, piece, order) for order in range(3))
         return t, piece, x, v, a
 
+    @property
+    def touches(self) -> bool:
+        """Whether any stop carries a force during the period; one without gap always does."""
+        always = any(
+            spring.bonded and spring.acts for spring in self.solver.builder.original.springs
+        )
+        return always or bool(self.contact_intervals)
+
     def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
-        stop = self.solver.builder.springs[spring]
-        plus, minus = stop.gaps
+        """Force of a spring of the machine as it was given; springs that never act carry none."""
+        springs = self.solver.builder.original.springs
+        if not 0 <= spring < len(springs):
+            raise InputError("spring", spring, f"the machine has {len(springs)} springs, from 0 on")
+        stop = springs[spring]
         y = self.motion.piece_derivative(t, piece, 0) @ stop.direction
         v = self.motion.piece_derivative(t, piece, 1) @ stop.direction
-        state = self.motion.pieces.states[piece, spring]
+        if stop.bonded:
+            return np.asarray(stop.stiffness * y + stop.damping * v)
+        if not stop.acts:
+            return np.zeros(y.shape)
+        kept = sum(one.acts and not one.bonded for one in springs[:spring])
+        plus, minus = stop.gaps
+        state = self.motion.pieces.states[piece, kept]
         gap = np.where(state == 1, plus, np.where(state == -1, -minus, 0.0))
         return np.where(np.abs(state) == 1, stop.stiffness * (y - gap) + stop.damping * v, 0.0)
 

@@ -44,7 +44,7 @@ class BranchStatus(Enum):
     @classmethod
     def from_code(cls, code: int) -> Self:
         """The status of a kernel's code."""
-        return cls(_SENTENCE.get(code, cls.STEP_TOO_SMALL.value))
+        return cls(_SENTENCE[code])
 
 
 _SENTENCE = {
@@ -56,6 +56,7 @@ _SENTENCE = {
     status.NO_CONVERGENCE: BranchStatus.NO_START.value,
     status.SINGULAR: BranchStatus.NO_START.value,
     status.NOT_FINITE: BranchStatus.NOT_FINITE.value,
+    status.SEARCH_NOT_ENDED: BranchStatus.TOO_MANY_CONTACTS.value,
 }
 
 STEP_REASON = {

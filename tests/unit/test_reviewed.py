@@ -1,0 +1,99 @@
+"""Cases in which a reader once found a wrong answer."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def screen():
+    return ff.load("ffs0827")
+
+
+def test_bonded_stop_carries_its_force(screen):
+    """With no gap the stop is a spring that always acts: H = k3 x2 + c3 x2'."""
+    orbit = ff.periodic_orbits(screen.replace(clearance=0.0), omega=120.0)[0]
+    size = abs(screen.stop_stiffness + 120j * screen.stop_damping)
+    assert orbit.stop_force_peak() == pytest.approx(size * orbit.amplitude("relative"), rel=1e-6)
+    assert orbit.touches
+
+
+def test_stop_force_repeats_with_the_period(screen):
+    orbit = ff.periodic_orbits(screen, omega=120.0)[0]
+    t = np.linspace(0.0, orbit.period, 50)
+    np.testing.assert_allclose(
+        orbit.stop_force(0, t + orbit.period), orbit.stop_force(0, t), rtol=1e-6, atol=1e-3
+    )
+
+
+def test_springs_are_counted_as_given():
+    """A spring without gap before one with a gap keeps its number."""
+    springs = [ff.ClearanceSpring([1.0], 0.5, 0.0, 0.0), ff.ClearanceSpring([1.0], 3.0, 0.0, 0.5)]
+    system = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], springs, ff.HarmonicForce([1.0]))
+    orbit = ff.frequency_response(system, (0.1, 1.0)).orbits_at(0.5)[0]
+    x = orbit.displacement(0)
+    np.testing.assert_allclose(orbit.stop_force(0), 0.5 * x, atol=1e-12)
+    beyond = np.where(np.abs(x) > 0.5, x - np.sign(x) * 0.5, 0.0)
+    np.testing.assert_allclose(orbit.stop_force(1), 3.0 * beyond, atol=1e-9)
+    with pytest.raises(InputError, match="2 springs"):
+        orbit.stop_force(2)
+
+
+def test_branch_that_starts_between_the_folds_comes_from_below(screen):
+    """e = 8 mm at 180 rad/s: the linear motion fits the gap, but is not the one reached."""
+    wide = screen.replace(clearance=8e-3)
+    part = ff.frequency_response(wide, (180.0, 250.0))
+    whole = ff.frequency_response(wide, (5.0, 250.0))
+    reached = whole.orbit_from_below(180.0)
+    assert part.amplitude("relative")[0] == pytest.approx(reached.amplitude("relative"), rel=1e-9)
+
+
+def test_upper_motion_is_followed_up_to_the_fold_itself(screen):
+    branch = ff.frequency_response(screen, (5.0, 250.0))
+    fold = branch.folds[0].omega
+    assert branch.orbit_from_below(fold - 1e-3).amplitude("relative") > 0.02
+    assert branch.orbit_from_below(fold + 1e-3).amplitude("relative") < 0.01
+
+
+def test_region_that_starts_in_contact_says_so(screen):
+    region = ff.operating_region(screen, omega=(100.0, 180.0))
+    assert region.lower == 100.0
+    assert any("below the speeds analysed" in note for note in region.notes)
+
+
+def test_five_stops_prepare_configurations_as_they_are_met():
+    """3^5 configurations are not prepared at once; the branch still completes."""
+    n = 5
+    K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    stops = [ff.ClearanceSpring(np.eye(n)[i], 3.0, 0.05, 0.4 + 0.1 * i) for i in range(n)]
+    system = ff.MechanicalSystem(
+        np.eye(n), 0.4 * K, K, stops, ff.HarmonicForce([1.0] + [0.0] * (n - 1))
+    )
+    branch = ff.frequency_response(system, (0.2, 1.2), ff.PiecewiseExact(60))
+    assert branch.complete
+    assert {touch.spring for touch in branch.orbit(40).contact_intervals} >= {0, 1}
+
+
+def test_frequency_outside_the_branch_is_refused(screen):
+    branch = ff.frequency_response(screen, (100.0, 120.0))
+    with pytest.raises(InputError, match="the branch runs from 100 to 120"):
+        branch.orbits_at(130.0)
+
+
+def test_what_is_no_machine_is_refused_with_a_sentence(screen):
+    with pytest.raises(InputError, match=r"of a project, its \.screen"):
+        ff.frequency_response(ff.load_project("ffs0827"), (5.0, 250.0))
+    with pytest.raises(InputError, match="PiecewiseExact"):
+        ff.frequency_response(screen, (5.0, 250.0), "HB")
+
+
+def test_high_orders_of_unequal_gaps_fit_the_memory(screen):
+    lean = screen.replace(clearance=6e-3, clearance_minus=math.inf)
+    branch = ff.frequency_response(lean, (100.0, 101.0), ff.HarmonicBalance(120, points=3))
+    assert branch.complete
