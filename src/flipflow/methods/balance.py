@@ -38,7 +38,7 @@ class BalanceSolver(Solver):
         )
 
     def _describe(self, u: Real, omega: Real) -> tuple[Complex, Real]:
-        """Displacement harmonics (P, n_h, N) and return maps (P, 2 N, 2 N).
+        """Displacement harmonics (P, n_h, N) and the series' own return maps (P, 2 N, 2 N).
 
         The last answer is kept: amplitudes and multipliers of the same points are asked for
         one after the other.
@@ -56,7 +56,7 @@ class BalanceSolver(Solver):
         )  # fmt: skip
         bad = code != status.OK
         series[bad], maps[bad] = np.nan, np.nan
-        maps = self._exact_maps(series, omega, -maps if self.half_turn else maps)
+        maps = -maps if self.half_turn else maps
         self._last = (u.copy(), omega.copy(), (series, maps))
         return series, maps
 
@@ -66,13 +66,26 @@ class BalanceSolver(Solver):
         A truncated series blurs the instants of contact, to which the multipliers of a stiff
         stop are far more sensitive than its amplitudes are.
         """
-        none = np.zeros(0, np.int64), np.zeros((omega.size, 0, self.system.size), np.complex128)
-        states = _states(series, self.harmonics, omega)
-        maps, _ = self.corrected(states, omega, *none, half_turn=self.half_turn)
-        return np.asarray(np.where(np.isnan(maps), own, maps))
+        maps = own.copy()
+        near = self._may_touch(series)
+        if not near.any():
+            return maps
+        none = np.zeros(0, np.int64), np.zeros((int(near.sum()), 0, self.system.size), complex)
+        states = _states(series[near], self.harmonics, omega[near])
+        exact, _ = self.corrected(states, omega[near], *none, half_turn=self.half_turn)
+        maps[near] = np.where(np.isnan(exact), own[near], exact)
+        return maps
+
+    def _may_touch(self, series: Complex) -> NDArray[np.bool_]:
+        """Where the sum of all harmonics reaches a gap; elsewhere the motion is the linear one."""
+        touching = np.zeros(series.shape[0], dtype=bool)
+        for spring in self.builder.springs:
+            touching |= np.abs(series @ spring.direction).sum(axis=1) > min(spring.gaps)
+        return touching
 
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
-        return self._describe(u, omega)[1]
+        series, own = self._describe(u, omega)
+        return self._exact_maps(series, omega, own)
 
     def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
         return self.harmonics, self._describe(u, omega)[0]

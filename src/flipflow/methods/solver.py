@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -62,12 +63,19 @@ class Traced:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One corrected point of a branch: unknowns, tangent's share in omega, return map."""
+    """One corrected point of a branch: unknowns, Jacobian, tangent's share in omega."""
 
+    solver: Solver
     u: Real
     omega: float
     omega_tangent: float
-    return_map: Real
+    jacobian: Real
+
+    @cached_property
+    def return_map(self) -> Real:
+        """Return map (2 N, 2 N); only the tests of stability ask for it."""
+        u, omega = self.u[None], np.array([self.omega])
+        return np.asarray(self.solver.return_maps(u, omega, self.jacobian[None])[0])
 
     @property
     def eigenvalues(self) -> Complex:
@@ -165,8 +173,8 @@ class Solver(ABC):
                 f"no point found between two of the branch near {omega:.6g} rad/s"
             )
         u, omega = self.work.w[:-1].copy(), float(self.work.w[-1])
-        maps = self.return_maps(u[None], np.array([omega]), self.work.J[None, :, :-1])
-        return Point(u, omega, float(self.work.tangent[-1]), maps[0])
+        jacobian = self.work.J[:, :-1].copy()
+        return Point(self, u, omega, float(self.work.tangent[-1]), jacobian)
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
@@ -181,8 +189,7 @@ class Solver(ABC):
             self.add_missing_configuration()
         if points == 0:
             return None
-        maps = self.return_maps(record.u, record.omega, record.jacobian)
-        return Point(record.u[0], omega, float(record.tangent[0, -1]), maps[0])
+        return Point(self, record.u[0], omega, float(record.tangent[0, -1]), record.jacobian[0])
 
     def errors(self, u: Real, omega: Real) -> Real:
         """Distance in m of each motion from the exact one; infinite where it is not bounded.
