@@ -35,6 +35,11 @@ class Derived:
 
 def derive(screen: FlipFlowScreen) -> Derived:
     """Compute the derived figures of a screen."""
+    from flipflow.analyses.linear import (  # noqa: PLC0415  slow to import
+        antiresonance_frequency,
+        equal_amplitude_frequency,
+    )
+
     m1, m2 = screen.main_mass, screen.floating_mass
     k2, c2 = screen.shear_stiffness, screen.shear_damping
     reduced = m1 * m2 / (m1 + m2)
@@ -44,11 +49,10 @@ def derive(screen: FlipFlowScreen) -> Derived:
     }
     if screen.has_stop and screen.stop_stiffness > 0.0:
         ratios["stops"] = _ratio(screen.stop_stiffness, screen.stop_damping, reduced)
-    under_root = 2.0 * m2 * k2 - c2 * c2
     return Derived(
         natural_frequencies=_natural_frequencies(screen),
-        omega_ea=k2 / math.sqrt(under_root) if under_root > 0.0 else None,
-        omega_ar=math.sqrt(k2 / m2),
+        omega_ea=equal_amplitude_frequency(screen),
+        omega_ar=float(antiresonance_frequency(screen) or math.nan),
         static_amplitude=screen.eccentric_moment / (m1 + m2),
         damping_ratios=ratios,
     )
