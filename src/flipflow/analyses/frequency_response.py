@@ -13,9 +13,8 @@ from flipflow.errors import InputError
 from flipflow.kernels import arclength, status
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
-from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced
+from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced, eigenvalues_of
 from flipflow.methods.special import STABILITY_CHANGES, Found, find_special_points
 from flipflow.methods.stability import UNDETERMINED, full_turn, stability_words
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -74,7 +73,7 @@ def followed(machine: Machine, method: Method, solver: Solver, course: arclength
     if traced.omega.size == 0:
         return _finished(machine, method, solver, traced, np.zeros((0, 0, 0)), [], [])
     maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
-    eigenvalues = np.linalg.eigvals(maps).astype(np.complex128)
+    eigenvalues = eigenvalues_of(maps)
     found, notes = find_special_points(solver, traced, maps, eigenvalues)
     return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
 
@@ -130,7 +129,7 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def lowest_contact(solver: Solver, omega: float) -> float | None:
     """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
     scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
-    X = complex_amplitudes(solver.system, scan)
+    X = solver.builder.contact_free(scan)
     beyond = np.zeros(scan.size, dtype=bool)
     for spring in solver.builder.springs:
         beyond |= np.abs(X @ spring.direction) >= min(spring.gaps)
@@ -139,14 +138,13 @@ def lowest_contact(solver: Solver, omega: float) -> float | None:
 
 def contact_free(solver: Solver, omega: float) -> bool:
     """Whether the linear motion at ``omega`` stays within all gaps."""
-    system = solver.system
-    X = complex_amplitudes(system, np.array([omega]))[0]
+    X = solver.builder.contact_free(np.array([omega]))[0]
     return all(abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs)
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = complex_amplitudes(solver.system, np.array([omega]))[0]
+    X = solver.builder.contact_free(np.array([omega]))[0]
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from flipflow.analyses.frequency_response import first_unknowns
 from flipflow.errors import InputError
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.solver import Point, Real
 from flipflow.methods.two_event import TwoEventProblem
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -82,7 +81,7 @@ def _starts(solver: ExactSolver, omega: float, rng: np.random.Generator) -> list
     from scipy.stats import qmc  # noqa: PLC0415  slow to import, and few ask for all motions
 
     n = solver.system.size
-    X = np.abs(complex_amplitudes(solver.system, np.array([omega]))[0])
+    X = np.abs(solver.builder.contact_free(np.array([omega]))[0])
     gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
     size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
     box = np.concatenate([size, omega * size])

@@ -107,7 +107,7 @@ def newton_update(work: Corrector) -> float:
     return math.sqrt(length)
 
 
-@kernel(inline=True)
+@kernel
 def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     """Newton from work.guess within the plane through it normal to work.border (scaled).
 
@@ -155,7 +155,7 @@ def new_tangent(work: Corrector) -> float:
     return cosine
 
 
-@kernel(inline=True)
+@kernel
 def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     """Write point p of the branch from the corrector's scratch."""
     n = work.r.shape[0]
@@ -171,7 +171,7 @@ def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     branch.side[p] = work.side[0]
 
 
-@kernel(inline=True)
+@kernel
 def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course) -> None:
     """Scale of point p, and its unit tangent in scaled unknowns into work.before."""
     n = work.r.shape[0]
@@ -186,7 +186,7 @@ def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course
         work.before[k] /= math.sqrt(norm)
 
 
-@kernel(inline=True)
+@kernel
 def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course) -> bool:
     """Guess a step along the tangent of point p; True when it ends on a bound of omega.
 
@@ -217,7 +217,7 @@ def astray(work: Corrector) -> float:
     return math.sqrt(square)
 
 
-@kernel(inline=True)
+@kernel
 def judge(
     problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, iterations: int,
     course: Course,

@@ -23,7 +23,14 @@ from typing import NamedTuple
 
 from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
-from flipflow.kernels.flow import Flow, configuration, contact_number, kick_sign, prepare_drive
+from flipflow.kernels.flow import (
+    Flow,
+    configuration,
+    contact_number,
+    contact_state,
+    kick_sign,
+    prepare_drive,
+)
 from flipflow.kernels.gapmotion import (
     GapMotion,
     exponential,
@@ -54,6 +61,7 @@ class Balance(NamedTuple):
     edge_depth: Complex  # (m, 2 H + 1) sum +-p exp(-i k theta) there, k = 0 ... 2 H
     force: Complex  # (n_h, m) Lambda_h
     force_slope: Complex  # (n_h, m) its derivative in omega at fixed A
+    walk: float  # angle over which contacts are sought: pi where the second half mirrors the first
     length: float
 
 
@@ -121,31 +129,21 @@ def prepare_receptance(problem: Balance, omega: float) -> None:
 @kernel
 def series_contact_state(problem: Balance) -> None:
     """Contact state of each spring at theta = 0."""
-    contact = problem.flow.contact
     count = problem.motion.rate.shape[0]
     exponentials(problem.motion, count, 0.0)
     for j in range(problem.linear.shape[0]):
         y, v = gap_state(problem.motion, count, j)
-        side = 0
-        if y > contact.gap_plus[j]:
-            side = 1
-        elif y < -contact.gap_minus[j]:
-            side = -1
-        if side != 0 and contact.clipped[j] == 1:
-            gap = contact.gap_plus[j] if side > 0 else -contact.gap_minus[j]
-            if side * (contact.stiffness[j] * (y - gap) + contact.damping[j] * v) < 0.0:
-                side *= 2
-        problem.flow.state[j] = side
+        problem.flow.state[j] = contact_state(problem.flow.contact, j, y, v)
 
 
 @kernel
 def record_contacts(problem: Balance, omega: float) -> int:
-    """Walk once round the series and record who touches when, as a flow does (times in s)."""
+    """Walk along the series and record who touches when, as a flow does (times in s)."""
     flow = problem.flow
     for j in range(problem.linear.shape[0]):
         flow.contact.damping[j] = problem.plan.damping[j] * omega
     series_contact_state(problem)
-    rest = 2.0 * math.pi
+    rest = problem.walk
     theta = 0.0
     fired = NO_SPRING
     for e in range(flow.start.shape[0]):
@@ -191,7 +189,11 @@ def next_change_from(
 
 @kernel
 def contact_integrals(problem: Balance, omega: float) -> None:
-    """int exp(i k theta) over the contacts, and what clipped limits leave."""
+    """int exp(i k theta) over the contacts, and what clipped limits leave.
+
+    The mirrored contact half a turn later has the same integral times (-1)^k and the opposite gap.
+    Odd harmonics ask for even k, and for odd k where a gap or depth is a factor: all double.
+    """
     flow = problem.flow
     m, most = problem.integral.shape
     for j in range(m):
@@ -228,10 +230,11 @@ def _add_clipped_limit(problem: Balance, e: int, theta: float) -> None:
 
 @kernel
 def _add_interval(problem: Balance, j: int, first: float, last: float, gap: float) -> None:
-    start, start_turn = 1.0 + 0j, exponential(1j * first)
-    end, end_turn = 1.0 + 0j, exponential(1j * last)
-    problem.integral[j, 0] += last - first
-    problem.integral_gap[j, 0] += gap * (last - first)
+    turns = 2.0 * math.pi / problem.walk
+    start, start_turn = turns + 0j, exponential(1j * first)
+    end, end_turn = turns + 0j, exponential(1j * last)
+    problem.integral[j, 0] += turns * (last - first)
+    problem.integral_gap[j, 0] += turns * gap * (last - first)
     for k in range(1, problem.integral.shape[1]):
         start *= start_turn
         end *= end_turn
@@ -249,6 +252,7 @@ def _add_edge(problem: Balance, j: int, theta: float, sign: float, side: int) ->
     y, _ = gap_state(problem.motion, count, j)
     contact = problem.flow.contact
     depth = y - contact.gap_plus[j] if side > 0 else y + contact.gap_minus[j]
+    sign *= 2.0 * math.pi / problem.walk
     for k in range(-(most - 1), most):
         turn = sign * exponential(1j * (k * theta))
         problem.edge[j, k + most - 1] += turn

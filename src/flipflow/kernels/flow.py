@@ -51,7 +51,7 @@ class Flow(NamedTuple):
     states: Int  # (E, m) contact states during the segment
 
 
-@kernel
+@kernel(inline=True)
 def configuration(state: NDArray[np.int64]) -> int:
     """Code of a contact state: base 3, a released spring counts as open."""
     code = 0
@@ -65,26 +65,33 @@ def configuration(state: NDArray[np.int64]) -> int:
     return code
 
 
-@kernel
-def set_contact_state(plan: Plan, z: Real, state: NDArray[np.int64]) -> None:
-    """Contact state of each spring as the position (and the push) at ``z`` says."""
+@kernel(inline=True)
+def contact_state(contact: Contact, j: int, y: float, v: float) -> int:
+    """Contact state of spring j as its position y (and the push) say; at the gap the rate tells."""
+    plus, minus = contact.gap_plus[j], contact.gap_minus[j]
+    if y > plus or (y == plus and v > 0.0):
+        pushes = contact.stiffness[j] * (y - plus) + contact.damping[j] * v >= 0.0
+        return PLUS if contact.clipped[j] == 0 or pushes else 2 * PLUS
+    if y < -minus or (y == -minus and v < 0.0):
+        pushes = contact.stiffness[j] * (y + minus) + contact.damping[j] * v <= 0.0
+        return MINUS if contact.clipped[j] == 0 or pushes else 2 * MINUS
+    return OPEN
+
+
+@kernel(inline=True)
+def set_contact_state(plan: Plan, flow: Flow) -> None:
+    """Contact state of each spring at flow.z."""
     n = plan.direction.shape[1]
-    for j in range(state.shape[0]):
+    for j in range(flow.state.shape[0]):
         y = 0.0
         v = 0.0
         for i in range(n):
-            y += plan.direction[j, i] * z[i]
-            v += plan.direction[j, i] * z[n + i]
-        state[j] = OPEN
-        if y > plan.gap_plus[j] or (y == plan.gap_plus[j] and v > 0.0):
-            pushes = plan.stiffness[j] * (y - plan.gap_plus[j]) + plan.damping[j] * v >= 0.0
-            state[j] = PLUS if plan.clipped[j] == 0 or pushes else 2 * PLUS
-        elif y < -plan.gap_minus[j] or (y == -plan.gap_minus[j] and v < 0.0):
-            pushes = plan.stiffness[j] * (y + plan.gap_minus[j]) + plan.damping[j] * v <= 0.0
-            state[j] = MINUS if plan.clipped[j] == 0 or pushes else 2 * MINUS
+            y += plan.direction[j, i] * flow.z[i]
+            v += plan.direction[j, i] * flow.z[n + i]
+        flow.state[j] = contact_state(flow.contact, j, y, v)
 
 
-@kernel
+@kernel(inline=True)
 def prepare_drive(plan: Plan, flow: Flow, slot: int, omega: float) -> None:
     """drive = (i omega - A)^-1 (0, M^-1 F(omega)) by modes, and its derivative in omega.
 
@@ -122,7 +129,7 @@ def prepare_drive(plan: Plan, flow: Flow, slot: int, omega: float) -> None:
     flow.driven_at[slot] = omega
 
 
-@kernel
+@kernel(inline=True)
 def begin_segment(plan: Plan, flow: Flow, e: int, slot: int, omega: float, t: float) -> None:
     """Write the segment that starts at time t from flow.z: its modes and the motion at the gaps."""
     size = flow.z.shape[0]
@@ -156,7 +163,7 @@ def begin_segment(plan: Plan, flow: Flow, e: int, slot: int, omega: float, t: fl
         flow.motion.amplitude[j, count] = driven * turn
 
 
-@kernel
+@kernel(inline=True)
 def segment_state(
     plan: Plan, flow: Flow, e: int, omega: float, elapsed: float, z: Real, rate: Real
 ) -> None:
@@ -176,7 +183,7 @@ def segment_state(
             rate[k] += v.real * slope.real - v.imag * slope.imag
 
 
-@kernel
+@kernel(inline=True)
 def kick_sign(before: int, after: int) -> float:
     """Sign of c M^-1 d d^T in the saltation of a change of contact.
 
@@ -194,7 +201,7 @@ def kick_sign(before: int, after: int) -> float:
 def run_flow(plan: Plan, flow: Flow, omega: float, t: float, duration: float, rate: Real) -> int:
     """Carry flow.z over ``duration`` from time t, recording segments; ``rate`` is z' at the end."""
     capacity = flow.start.shape[0]
-    set_contact_state(plan, flow.z, flow.state)
+    set_contact_state(plan, flow)
     end = t + duration
     fired = -1
     for e in range(capacity):
@@ -222,7 +229,7 @@ def run_flow(plan: Plan, flow: Flow, omega: float, t: float, duration: float, ra
     return status.TOO_MANY_EVENTS
 
 
-@kernel
+@kernel(inline=True)
 def contact_number(flow: Flow) -> int:
     """A number that changes when the contacts of the record change: how often each spring does."""
     total = 0
@@ -232,10 +239,8 @@ def contact_number(flow: Flow) -> int:
 
 
 @kernel
-def carry_tangent(
-    plan: Plan, flow: Flow, omega: float, until: float, U: Real, work: Complex
-) -> None:
-    """Carry columns of U, (2 N, 2 N) or (2 N, 2 N + 1), over the recorded contacts up to ``until``.
+def carry_tangent(plan: Plan, flow: Flow, omega: float, U: Real, work: Complex) -> None:
+    """Carry columns of U, (2 N, 2 N) or (2 N, 2 N + 1), over the recorded flow.
 
     The first 2 N columns are the tangent of the state. One more is dz/d omega at fixed time: it
     follows the same linear equation around the derivative of the driven motion,
@@ -245,19 +250,17 @@ def carry_tangent(
     driven = U.shape[1] > size
     for e in range(flow.segments[0]):
         slot = flow.slot[e]
-        length = min(flow.length[e], until - flow.start[e])
-        if length < 0.0:
-            break
+        length = flow.length[e]
         if driven:
             _add_driven_slope(flow, slot, omega, flow.start[e], -1.0, U)
         _carry_free(plan, slot, length, U, work)
         if driven:
             _add_driven_slope(flow, slot, omega, flow.start[e] + length, 1.0, U)
-        if flow.kick[e] != 0.0 and length == flow.length[e]:
+        if flow.kick[e] != 0.0:
             saltation(plan, flow.spring[e], flow.kick[e], U, size)
 
 
-@kernel
+@kernel(inline=True)
 def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, sign: float, U: Real) -> None:
     turn = exponential(1j * (omega * t))
     last = U.shape[1] - 1
@@ -266,7 +269,7 @@ def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, sign: float
         U[k, last] += sign * slope.real
 
 
-@kernel
+@kernel(inline=True)
 def _carry_free(plan: Plan, slot: int, length: float, U: Real, work: Complex) -> None:
     """U = exp(A length) U by the modes of the configuration."""
     size, columns = U.shape
@@ -287,7 +290,7 @@ def _carry_free(plan: Plan, slot: int, length: float, U: Real, work: Complex) ->
             U[k, c] = total
 
 
-@kernel
+@kernel(inline=True)
 def saltation(plan: Plan, spring: int, sign: float, U: Real, size: int) -> None:
     """U = S U with S = I + sign (0, M^-1 d c) (d, 0)^T.
 

@@ -41,6 +41,8 @@ class GapMotion(NamedTuple):
     curve: Complex  # (m, r) amplitude rate^2, filled by ``prepare_search``
     bound: Real  # (m, r) its size
     size: Real  # (r,) |rate|
+    turn: Complex  # (r,) terms of one gap, carried from sample to sample by ``extremes``
+    ratio: Complex  # (r,) what carries them
     spacing: Int  # (1,) 0: any rates; s > 0: rates are i (r_0, r_0 + s, r_0 + 2 s, ...)
 
 
@@ -54,27 +56,27 @@ class Contact(NamedTuple):
     clipped: Int
 
 
-@kernel
+@kernel(inline=True)
 def exponential(x: complex) -> complex:
     """exp(x) without the special cases of infinite arguments."""
     size = math.exp(x.real)
     return complex(size * math.cos(x.imag), size * math.sin(x.imag))
 
 
-@kernel
+@kernel(inline=True)
 def modulus(x: complex) -> float:
     """|x| without the care for overflow that makes abs() slow."""
     return math.sqrt(x.real * x.real + x.imag * x.imag)
 
 
-@kernel
+@kernel(inline=True)
 def reciprocal(x: complex) -> complex:
     """1 / x without the care for overflow that makes complex division slow."""
     square = x.real * x.real + x.imag * x.imag
     return complex(x.real / square, -x.imag / square)
 
 
-@kernel
+@kernel(inline=True)
 def prepare_search(motion: GapMotion, count: int) -> None:
     """Fill what the search needs beside the amplitudes."""
     for i in range(count):
@@ -85,7 +87,7 @@ def prepare_search(motion: GapMotion, count: int) -> None:
             motion.bound[j, i] = modulus(motion.amplitude[j, i]) * motion.size[i] * motion.size[i]
 
 
-@kernel
+@kernel(inline=True)
 def exponentials(motion: GapMotion, count: int, t: float) -> None:
     """factor_i = exp(rate_i t) and its size, by powers where the rates are equally spaced."""
     if motion.spacing[0] > 0:
@@ -103,7 +105,7 @@ def exponentials(motion: GapMotion, count: int, t: float) -> None:
             motion.decay[i] = size
 
 
-@kernel
+@kernel(inline=True)
 def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float]:
     """y and y' at the time of the last ``exponentials``."""
     y = motion.offset[j]
@@ -115,7 +117,7 @@ def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float]:
     return y, v
 
 
-@kernel
+@kernel(inline=True)
 def gap_bounds(motion: GapMotion, count: int, j: int) -> tuple[float, float, float]:
     """y'', and bounds on the second and third derivative from now on."""
     curvature = 0.0
@@ -130,7 +132,7 @@ def gap_bounds(motion: GapMotion, count: int, j: int) -> tuple[float, float, flo
     return curvature, second, third
 
 
-@kernel
+@kernel(inline=True)
 def push_state(
     motion: GapMotion, contact: Contact, count: int, j: int, gap: float
 ) -> tuple[float, float, float, float, float]:
@@ -154,7 +156,7 @@ def push_state(
     return force, slope, curvature, second, third
 
 
-@kernel
+@kernel(inline=True)
 def root_of_bound(h: float, slope: float, bound: float) -> float:
     """Least s > 0 with h + slope s - bound s^2 / 2 = 0, infinite where there is none."""
     inside = slope * slope + 2.0 * bound * h
@@ -166,7 +168,7 @@ def root_of_bound(h: float, slope: float, bound: float) -> float:
     return (slope + root) / bound if bound > 0.0 else math.inf
 
 
-@kernel
+@kernel(inline=True)
 def safe_step(h: float, slope: float, curvature: float, second: float, third: float) -> float:
     """No zero of h comes before this time; second and third bound its derivatives from now on."""
     h = max(h, 0.0)
@@ -177,7 +179,7 @@ def safe_step(h: float, slope: float, curvature: float, second: float, third: fl
     return max(certain, min(reach, root_of_bound(h, slope, third * reach - curvature)))
 
 
-@kernel
+@kernel(inline=True)
 def next_change(
     motion: GapMotion,
     contact: Contact,
@@ -210,7 +212,7 @@ def next_change(
     return math.nan, -1, 0
 
 
-@kernel
+@kernel(inline=True)
 def spring_change(
     motion: GapMotion, contact: Contact, state: int, count: int, j: int
 ) -> tuple[float, int]:
@@ -241,7 +243,7 @@ def spring_change(
     return _sooner(leave, again)
 
 
-@kernel
+@kernel(inline=True)
 def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]:
     """Whichever changes now, else whichever cannot change for the shorter time."""
     if one[1] != NOTHING or (two[1] == NOTHING and one[0] <= two[0]):
@@ -249,7 +251,7 @@ def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]
     return two
 
 
-@kernel
+@kernel(inline=True)
 def _approach(
     h: float, slope: float, curvature: float, second: float, third: float, scale: float, target: int
 ) -> tuple[float, int]:
@@ -274,27 +276,34 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
     exponentials(motion, count, 0.0)
     _, second, _ = gap_bounds(motion, count, j)
     frequency = math.sqrt(second / weight) if weight > 0.0 else 0.0
-    samples = min(4 + int(3.0 * frequency * duration), 4000)
+    samples = min(1 + int(3.0 * frequency * duration), 4000)
+    step = duration / samples
+    for i in range(count):
+        motion.turn[i] = motion.amplitude[j, i]
+        motion.ratio[i] = exponential(motion.rate[i] * step)
     low, high = math.inf, -math.inf
-    t_before, v_before = 0.0, 0.0
+    v_before = 0.0
     for k in range(samples + 1):
-        t = duration * k / samples
-        exponentials(motion, count, t)
-        y, v = gap_state(motion, count, j)
+        y, v = motion.offset[j], 0.0
+        for i in range(count):
+            term = motion.turn[i]
+            y += term.real
+            v += term.real * motion.rate[i].real - term.imag * motion.rate[i].imag
+            motion.turn[i] = term * motion.ratio[i]
         low, high = min(low, y), max(high, y)
         if k > 0 and v * v_before < 0.0:
-            y = _stationary_value(motion, count, j, t_before, t, v_before)
+            y = _stationary_value(motion, count, j, (k - 1) * step, k * step, v_before, v)
             low, high = min(low, y), max(high, y)
-        t_before, v_before = t, v
+        v_before = v
     return low, high
 
 
-@kernel
+@kernel(inline=True)
 def _stationary_value(
-    motion: GapMotion, count: int, j: int, a: float, b: float, v_a: float
+    motion: GapMotion, count: int, j: int, a: float, b: float, v_a: float, v_b: float
 ) -> float:
-    """y where y' = 0 in [a, b]: Newton, kept inside the bracket."""
-    t = 0.5 * (a + b)
+    """y where y' = 0 in [a, b]: Newton from the chord's zero, kept inside the bracket."""
+    t = a + (b - a) * v_a / (v_a - v_b)
     y = 0.0
     for _ in range(60):
         exponentials(motion, count, t)

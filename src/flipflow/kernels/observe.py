@@ -15,10 +15,10 @@ from flipflow.kernels.balance import (
 )
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_solve
-from flipflow.kernels.flow import carry_tangent, run_flow, segment_state
+from flipflow.kernels.flow import run_flow, segment_state
 from flipflow.kernels.gapmotion import GapMotion, exponential, extremes, prepare_search
 from flipflow.kernels.plan import Complex, Int, Real
-from flipflow.kernels.shooting import Shooting, shooting_residual
+from flipflow.kernels.shooting import Shooting, shoot
 
 ROUNDING = 1e-9
 
@@ -145,23 +145,8 @@ def observe_series(
 
 
 @kernel(entry=True)
-def describe_balance(
-    problem: Balance,
-    until: float,
-    u: Real,
-    omega: Real,
-    tangent: Real,
-    work: Complex,
-    series: Complex,
-    monodromy: Real,
-    code: Int,
-) -> None:
-    """Displacement harmonics (P, n_h, N) and tangent over ``until`` turns (P, 2 N, 2 N) of points.
-
-    The contacts of the series split the turn; within each piece the tangent is closed form.
-    """
-    plan = problem.plan
-    size = tangent.shape[0]
+def describe_balance(problem: Balance, u: Real, omega: Real, series: Complex, code: Int) -> None:
+    """Displacement harmonics (P, n_h, N) of points; the last one's contacts stay recorded."""
     for p in range(omega.shape[0]):
         set_series(problem, u[p])
         prepare_receptance(problem, omega[p])
@@ -171,14 +156,6 @@ def describe_balance(
         contact_integrals(problem, omega[p])
         contact_forces(problem, omega[p])
         _displacements(problem, omega[p], series[p])
-        for k in range(size):
-            for c in range(size):
-                tangent[k, c] = 1.0 if k == c else 0.0
-        duration = until * 2.0 * math.pi / omega[p]
-        carry_tangent(plan, problem.flow, omega[p], duration, tangent, work)
-        for k in range(size):
-            for c in range(size):
-                monodromy[p, k, c] = tangent[k, c]
 
 
 @kernel
@@ -211,7 +188,6 @@ def corrected(
     omega: Real,
     harmonics: Int,
     series: Complex,
-    J: Real,
     A: Real,
     pivot: Int,
     delta: Real,
@@ -229,7 +205,7 @@ def corrected(
     """
     for p in range(omega.shape[0]):
         code[p], first, last = _correct_state(
-            problem, states[p], omega[p], J, A, pivot, delta, maps[p]
+            problem, states[p], omega[p], A, pivot, delta, maps[p]
         )
         if code[p] == status.MISSING_CONFIGURATION:
             break
@@ -240,60 +216,68 @@ def corrected(
 
 @kernel
 def _correct_state(
-    problem: Shooting, z: Real, omega: float, J: Real, A: Real, pivot: Int, delta: Real, out: Real
+    problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real, out: Real
 ) -> tuple[int, float, float]:
     """One Newton step of z in place, and the length of it and of the next, infinite when longer."""
     size = delta.shape[0]
+    n = size // 2
     for k in range(size):
         for c in range(size):
             out[k, c] = math.nan
-    code = shooting_residual(problem, z, omega, delta, J)
+    code, first = _newton_step(problem, z, omega, A, pivot, delta)
     if code != status.OK:
         return code, math.inf, math.inf
-    _store_map(J, out)
-    first = _newton_step(J, A, pivot, delta, omega)
+    _store_map(problem, out)
     if not math.isfinite(first):
         return code, math.inf, math.inf
     for k in range(size):
         z[k] += delta[k]
-    code = shooting_residual(problem, z, omega, delta, J)
+    code, last = _newton_step(problem, z, omega, A, pivot, delta)
     if code != status.OK:
         return code, first, math.inf
-    last = _newton_step(J, A, pivot, delta, omega)
     # Steps within the rounding of the flow do not shrink; relative to the motion they are nothing.
     size_of_motion = 0.0
-    for k in range(size // 2):
-        size_of_motion = max(size_of_motion, abs(z[k]), abs(z[size // 2 + k]) / omega)
+    for k in range(n):
+        size_of_motion = max(size_of_motion, abs(z[k]), abs(z[n + k]) / omega)
     if not last <= max(0.5 * first, ROUNDING * size_of_motion):
         return code, first, math.inf
-    _store_map(J, out)
+    _store_map(problem, out)
     return code, first, last
 
 
 @kernel
-def _store_map(J: Real, out: Real) -> None:
-    """The return map J + I."""
+def _store_map(problem: Shooting, out: Real) -> None:
+    """The return map that was carried last."""
     for k in range(out.shape[0]):
         for c in range(out.shape[0]):
-            out[k, c] = J[k, c]
-        out[k, k] += 1.0
+            out[k, c] = problem.sign * problem.map[k, c]
 
 
 @kernel
-def _newton_step(J: Real, A: Real, pivot: Int, delta: Real, omega: float) -> float:
-    """delta = -J^-1 delta; returns its largest displacement, infinite when J is singular."""
+def _newton_step(
+    problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real
+) -> tuple[int, float]:
+    """delta = (I - M)^-1 (flow(z) - z); its largest displacement, infinite when I - M is singular.
+
+    The map M stays in problem.map, without the problem's sign.
+    """
     size = A.shape[0]
+    n = size // 2
+    code = shoot(problem, z, omega, problem.map)
+    if code != status.OK:
+        return code, math.inf
     for i in range(size):
-        delta[i] = -delta[i]
+        delta[i] = problem.sign * problem.flow.z[i] - z[i]
         for j in range(size):
-            A[i, j] = J[i, j]
+            A[i, j] = -problem.sign * problem.map[i, j]
+        A[i, i] += 1.0
     if not lu_factor(A, pivot):
-        return math.inf
+        return code, math.inf
     lu_solve(A, pivot, delta)
     length = 0.0
-    for k in range(size // 2):
-        length = max(length, abs(delta[k]), abs(delta[size // 2 + k]) / omega)
-    return length
+    for k in range(n):
+        length = max(length, abs(delta[k]), abs(delta[n + k]) / omega)
+    return code, length
 
 
 @kernel

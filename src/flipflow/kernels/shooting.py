@@ -20,7 +20,8 @@ class Shooting(NamedTuple):
 
     plan: Plan
     flow: Flow
-    tangent: Real  # (2 N, 2 N + 1)
+    tangent: Real  # (2 N, 2 N + 1) with the derivative in omega
+    map: Real  # (2 N, 2 N) without it
     work: Complex  # (R, 2 N + 1)
     rate: Real  # (2 N,)
     fraction: float
@@ -29,31 +30,42 @@ class Shooting(NamedTuple):
 
 
 @kernel
+def shoot(problem: Shooting, z: Real, omega: float, U: Real) -> int:
+    """Carry z and its tangent over the problem's part of a turn: flow.z, and U as it takes columns.
+
+    U is (2 N, 2 N), or (2 N, 2 N + 1) with the derivative in omega at fixed time.
+    """
+    flow = problem.flow
+    for k in range(U.shape[0]):
+        flow.z[k] = z[k]
+        for c in range(U.shape[1]):
+            U[k, c] = 1.0 if k == c else 0.0
+    duration = problem.fraction * 2.0 * math.pi / omega
+    code = run_flow(problem.plan, flow, omega, 0.0, duration, problem.rate)
+    if code == status.OK:
+        carry_tangent(problem.plan, flow, omega, U, problem.work)
+        for k in range(U.shape[0]):
+            if not math.isfinite(flow.z[k]):
+                return status.NOT_FINITE
+    return code
+
+
+@kernel
 def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real) -> int:
     """r = sign flow(z) - z and J = [dr/dz, dr/d omega], shapes (2 N,) and (2 N, 2 N + 1)."""
-    flow = problem.flow
     size = r.shape[0]
-    duration = problem.fraction * 2.0 * math.pi / omega
-    for k in range(size):
-        flow.z[k] = z[k]
-    code = run_flow(problem.plan, flow, omega, 0.0, duration, problem.rate)
+    U = problem.tangent
+    code = shoot(problem, z, omega, U)
     if code != status.OK:
         return code
-    U = problem.tangent
     for k in range(size):
-        for c in range(size + 1):
-            U[k, c] = 1.0 if k == c else 0.0
-    carry_tangent(problem.plan, flow, omega, math.inf, U, problem.work)
-    for k in range(size):
-        r[k] = problem.sign * flow.z[k] - z[k]
+        r[k] = problem.sign * problem.flow.z[k] - z[k]
         for c in range(size):
             J[k, c] = problem.sign * U[k, c]
         J[k, k] -= 1.0
         # The last column is taken at fixed time; the end of the flow moves with omega as well.
-        J[k, size] = problem.sign * (U[k, size] - problem.rate[k] * duration / omega)
-    for k in range(size):
-        if not math.isfinite(r[k]):
-            return status.NOT_FINITE
+        end = problem.fraction * 2.0 * math.pi / omega
+        J[k, size] = problem.sign * (U[k, size] - problem.rate[k] * end / omega)
     return status.OK
 
 

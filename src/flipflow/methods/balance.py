@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.kernels import status
+from flipflow.kernels.balance import Balance
 from flipflow.kernels.observe import describe_balance, observe_series
 from flipflow.methods.motion import Motion, Pieces, SeriesMotion
 from flipflow.methods.scratch import new_balance, new_gap_motion
@@ -31,64 +32,39 @@ class BalanceSolver(Solver):
         self.unknowns = kept * len(self.builder.springs)
         self._new_work()
         empty = np.zeros(0)
-        self._last: tuple[Real, Real, tuple[Complex, Real]] = (
-            empty,
-            empty,
-            (empty.astype(np.complex128), empty),
-        )
+        self._last = empty, empty, empty.astype(np.complex128)
 
-    def _describe(self, u: Real, omega: Real) -> tuple[Complex, Real]:
-        """Displacement harmonics (P, n_h, N) and the series' own return maps (P, 2 N, 2 N).
+    def _describe(self, u: Real, omega: Real) -> Complex:
+        """Displacement harmonics (P, n_h, N).
 
         The last answer is kept: amplitudes and multipliers of the same points are asked for
         one after the other.
         """
-        kept_u, kept_omega, answer = self._last
-        if np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega):
-            return answer
-        n = self.system.size
-        series = np.empty((omega.size, self.harmonics.size, n), np.complex128)
-        maps = np.empty((omega.size, 2 * n, 2 * n))
-        code = np.zeros(omega.size, np.int64)
-        describe_balance(
-            self.problem, 0.5 if self.half_turn else 1.0, np.ascontiguousarray(u), omega,
-            np.empty((2 * n, 2 * n)), np.empty((2 * n, 2 * n), np.complex128), series, maps, code,
-        )  # fmt: skip
-        bad = code != status.OK
-        series[bad], maps[bad] = np.nan, np.nan
-        maps = -maps if self.half_turn else maps
-        self._last = (u.copy(), omega.copy(), (series, maps))
-        return series, maps
+        kept_u, kept_omega, series = self._last
+        if not (np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega)):
+            series = self._read_off(self.problem, np.ascontiguousarray(u), omega)
+            self._last = u.copy(), omega.copy(), series
+        return series
 
-    def _exact_maps(self, series: Complex, omega: Real, own: Real) -> Real:
-        """Maps of the exact flow beside the series; the series' own where the flow fails.
+    def _read_off(self, problem: Balance, u: Real, omega: Real) -> Complex:
+        series = np.empty((omega.size, self.harmonics.size, self.system.size), np.complex128)
+        code = np.zeros(omega.size, np.int64)
+        describe_balance(problem, u, omega, series, code)
+        series[code != status.OK] = np.nan
+        return series
+
+    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
+        """Maps of the exact flow beside the series.
 
         A truncated series blurs the instants of contact, to which the multipliers of a stiff
         stop are far more sensitive than its amplitudes are.
         """
-        maps = own.copy()
-        near = self._may_touch(series)
-        if not near.any():
-            return maps
-        none = np.zeros(0, np.int64), np.zeros((int(near.sum()), 0, self.system.size), complex)
-        states = _states(series[near], self.harmonics, omega[near])
-        exact, _ = self.corrected(states, omega[near], *none, half_turn=self.half_turn)
-        maps[near] = np.where(np.isnan(exact), own[near], exact)
-        return maps
-
-    def _may_touch(self, series: Complex) -> NDArray[np.bool_]:
-        """Where the sum of all harmonics reaches a gap; elsewhere the motion is the linear one."""
-        touching = np.zeros(series.shape[0], dtype=bool)
-        for spring in self.builder.springs:
-            touching |= np.abs(series @ spring.direction).sum(axis=1) > min(spring.gaps)
-        return touching
-
-    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
-        series, own = self._describe(u, omega)
-        return self._exact_maps(series, omega, own)
+        nothing = np.zeros(0, np.int64), np.zeros((omega.size, 0, self.system.size), np.complex128)
+        states = self.states(u, omega)
+        return self.corrected(states, omega, *nothing, half_turn=self.half_turn)[0]
 
     def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
-        return self.harmonics, self._describe(u, omega)[0]
+        return self.harmonics, self._describe(u, omega)
 
     def states(self, u: Real, omega: Real) -> Real:
         return _states(self.series(u, omega)[1], self.harmonics, omega)
@@ -105,8 +81,8 @@ class BalanceSolver(Solver):
         return low, high, seen[:, :, self.harmonics == 1][:, :, 0]
 
     def motion(self, u: Real, omega: float) -> Motion:
-        self._last = (np.zeros(0), *self._last[1:])  # the record of contacts is wanted too
-        series, _ = self._describe(u[None], np.array([omega]))
+        whole = self.problem._replace(walk=2.0 * np.pi)
+        series = self._read_off(whole, u[None], np.array([omega]))
         flow = self.problem.flow
         pieces = Pieces.recorded(flow, np.zeros((flow.start.size, 0), np.complex128))
         return SeriesMotion(

@@ -9,7 +9,7 @@ from flipflow.errors import IncompleteError
 from flipflow.kernels import status
 from flipflow.kernels.observe import observe_flow
 from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
-from flipflow.methods.scratch import new_gap_motion, new_shooting
+from flipflow.methods.scratch import new_gap_motion
 from flipflow.methods.solver import Complex, Real, Solver
 
 
@@ -20,10 +20,9 @@ class ExactSolver(Solver):
 
     def _prepare(self) -> None:
         self.unknowns = 2 * self.system.size
-        plan = self.builder.plan
-        self.problem = new_shooting(plan, half_turn=self.half_turn, length=self.length)
-        self.turn = new_shooting(plan, half_turn=False, length=self.length)
         self._new_work()
+        self.problem = self.shooting(half_turn=self.half_turn)
+        self.turn = self.shooting(half_turn=False)
 
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
         return np.asarray(jacobian + np.eye(self.unknowns))
@@ -35,17 +34,23 @@ class ExactSolver(Solver):
         return np.zeros(0, np.int64), np.zeros((omega.size, 0, u.shape[1] // 2), np.complex128)
 
     def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
-        return self._observe(np.array(u), omega, coordinates, 0)
+        low, high, first = self._observe(np.array(u), omega, coordinates)
+        if self.half_turn:
+            high = np.maximum(high, -low)
+            low = -high
+        return low, high, first
 
     def settled(self, z: Real, omega: float, turns: int) -> Real:
         """State in which the machine is after a number of turns from the state z."""
         states = np.array(z)[None]
-        self._observe(states, np.array([omega]), np.zeros((0, self.system.size)), turns)
+        none = np.zeros((0, self.system.size))
+        self._observe(states, np.array([omega]), none, whole_turn=True, waiting=turns)
         return np.asarray(states[0])
 
     def motion(self, u: Real, omega: float) -> Motion:
         states = np.array(u)[None]
-        low, _, _ = self._observe(states, np.array([omega]), np.eye(self.system.size), 0)
+        every = np.eye(self.system.size)
+        low, _, _ = self._observe(states, np.array([omega]), every, whole_turn=True)
         if np.isnan(low).any():
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
         flow = self.turn.flow
@@ -56,9 +61,18 @@ class ExactSolver(Solver):
         )
 
     def _observe(
-        self, states: Real, omega: Real, coordinates: Real, waiting: int
+        self,
+        states: Real,
+        omega: Real,
+        coordinates: Real,
+        *,
+        whole_turn: bool = False,
+        waiting: int = 0,
     ) -> tuple[Real, Real, Complex]:
-        """Flow over a turn from each state, which becomes the one after ``waiting`` turns."""
+        """Flow over a turn from each state, which becomes the one after ``waiting`` turns.
+
+        Half a turn tells all of a motion that is its own mirror image after it.
+        """
         # A read-only array is another type to the compiler, and would be compiled for anew.
         coordinates, omega = np.array(coordinates), np.array(omega)
         count = coordinates.shape[0]
@@ -67,14 +81,15 @@ class ExactSolver(Solver):
         code = np.zeros(omega.size, np.int64)
         begin = states.copy()
         while True:
+            problem = self.turn if whole_turn else self.problem
             modes = self.builder.plan.rate.shape[1] + 1
             scratch = new_gap_motion(count, np.zeros(modes, np.complex128))
             observe_flow(
-                self.turn, states, omega, waiting, coordinates, scratch, low, high, first, code
+                problem, states, omega, waiting, coordinates, scratch, low, high, first, code
             )
             if not np.any(code == status.MISSING_CONFIGURATION):
                 break
-            self._add_configuration(self.turn.flow)
+            self._add_configuration(problem.flow)
             states[:] = begin
         bad = code != status.OK
         low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan

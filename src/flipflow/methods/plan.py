@@ -52,6 +52,9 @@ class PlanBuilder:
                 "a spring",
             )
         self._rows: dict[int, _Configuration] = {}
+        self._solved: dict[
+            tuple[bool, ...], tuple[Complex, Complex, Complex, NDArray[np.float64]]
+        ] = {}
         everything = 3 ** len(self.springs) <= PREPARED_AT_ONCE
         self.add(range(3 ** len(self.springs)) if everything else [0])
 
@@ -73,20 +76,42 @@ class PlanBuilder:
 
     def _configuration(self, code: int) -> _Configuration:
         """Modes of one configuration."""
-        system, n = self.system, self.system.size
-        C, K = system.C.copy(), system.K.copy()
+        n = self.system.size
+        digits = self._digits(code)
         preload = np.zeros(n)
-        for digit, spring in zip(self._digits(code), self.springs, strict=True):
+        for digit, spring in zip(digits, self.springs, strict=True):
             if digit:
-                outer = np.outer(spring.direction, spring.direction)
-                C, K = C + spring.damping * outer, K + spring.stiffness * outer
                 offset = spring.gaps[0] if digit == 1 else -spring.gaps[1]
                 preload += spring.stiffness * offset * spring.direction
-        rate, right = _eigen(system.M, C, K)
-        left = np.linalg.inv(right)
-        keep = rate.imag >= 0.0
+        rate, right, left, K = self._modes(tuple(digit > 0 for digit in digits))
         rest = np.concatenate([np.linalg.solve(K, preload), np.zeros(n)])
-        return _Configuration(rate[keep], right[:, keep], np.asarray(left)[keep], rest)
+        return _Configuration(rate, right, left, rest)
+
+    def _modes(
+        self, engaged: tuple[bool, ...]
+    ) -> tuple[Complex, Complex, Complex, NDArray[np.float64]]:
+        """Rates, right and left vectors, and stiffness; the same for either side of a spring."""
+        if engaged not in self._solved:
+            C, K = self.system.C.copy(), self.system.K.copy()
+            for acts, spring in zip(engaged, self.springs, strict=True):
+                if acts:
+                    outer = np.outer(spring.direction, spring.direction)
+                    C, K = C + spring.damping * outer, K + spring.stiffness * outer
+            rate, right = _eigen(self.system.M, C, K)
+            keep = rate.imag >= 0.0
+            left = np.asarray(np.linalg.inv(right))
+            self._solved[engaged] = rate[keep], right[:, keep], left[keep], K
+        return self._solved[engaged]
+
+    def contact_free(self, omega: NDArray[np.float64]) -> Complex:
+        """X in x = Re(X exp(i omega t)) without contact, (n, N), by the open machine's modes."""
+        plan, n = self.plan, self.system.size
+        rate, pair = plan.rate[0], plan.weight[0] == 2.0
+        shape = plan.right[0, :n]
+        s = 1j * omega[:, None]
+        answer = (plan.force[0] / (s - rate)) @ shape.T
+        answer += (pair * plan.force_conj[0] / (s - rate.conj())) @ shape.conj().T
+        return np.asarray(answer * omega[:, None] ** plan.power)
 
     def _directions(self) -> NDArray[np.float64]:
         return np.array([s.direction for s in self.springs]).reshape(-1, self.system.size)
@@ -102,14 +127,14 @@ class PlanBuilder:
         push = np.concatenate(
             [np.zeros(n), np.linalg.solve(self.system.M, self.system.excitation.vector)]
         )
-        right = _stacked([_padded(row.right, modes, 1) for row in rows.values()])
-        left = _stacked([_padded(row.left, modes, 0) for row in rows.values()])
+        right = _padded([row.right for row in rows.values()], (modes, modes))
+        left = _padded([row.left for row in rows.values()], (modes, modes))
         damping = np.array([s.damping for s in self.springs], dtype=float)
         return Plan(
             slot=slot,
             mode_count=np.array([row.rate.size for row in rows.values()], dtype=np.int64),
-            rate=_stacked([_padded(row.rate, modes, 0) for row in rows.values()]),
-            weight=np.array([_padded(row.weight, modes, 0).real for row in rows.values()]),
+            rate=_padded([row.rate for row in rows.values()], (modes,)),
+            weight=_padded([row.weight for row in rows.values()], (modes,)).real.copy(),
             right=right,
             left=left,
             rest=np.array([row.rest for row in rows.values()], dtype=float),
@@ -143,15 +168,12 @@ class _Configuration:
         return np.where(self.rate.imag > 0.0, 2.0, 1.0).astype(np.complex128)
 
 
-def _padded(array: Complex, modes: int, axis: int) -> Complex:
-    """Zeros behind the last mode, up to the most a configuration can have."""
-    width = [(0, 0)] * array.ndim
-    width[axis] = (0, modes - array.shape[axis])
-    return np.pad(array, width)
-
-
-def _stacked(arrays: list[Complex]) -> Complex:
-    return np.ascontiguousarray(np.stack(arrays))
+def _padded(arrays: list[Complex], shape: tuple[int, ...]) -> Complex:
+    """Arrays of up to ``shape`` as rows of one, with zeros behind the last mode of each."""
+    rows = np.zeros((len(arrays), *shape), np.complex128)
+    for row, array in zip(rows, arrays, strict=True):
+        row[tuple(slice(size) for size in array.shape)] = array
+    return rows
 
 
 def _eigen(

@@ -32,6 +32,8 @@ def new_gap_motion(gaps: int, rates: NDArray[np.complex128], spacing: int = 0) -
         curve=np.zeros(shape, np.complex128),
         bound=np.zeros(shape),
         size=np.zeros(rates.size),
+        turn=np.zeros(rates.size, np.complex128),
+        ratio=np.zeros(rates.size, np.complex128),
         spacing=np.array([spacing], np.int64),
     )
 
@@ -68,6 +70,7 @@ def new_shooting(plan: Plan, *, half_turn: bool, length: float, turns: int = 1) 
         plan=plan,
         flow=new_flow(plan),
         tangent=np.zeros((size, size + 1)),
+        map=np.zeros((size, size)),
         work=np.zeros((plan.rate.shape[1], size + 1), np.complex128),
         rate=np.zeros(size),
         fraction=0.5 if half_turn else float(turns),
@@ -137,5 +140,6 @@ def new_balance(plan: Plan, harmonics: int, *, half_turn: bool, length: float) -
         edge_depth=np.zeros((m, most), np.complex128),
         force=np.zeros((kept.size, m), np.complex128),
         force_slope=np.zeros((kept.size, m), np.complex128),
+        walk=np.pi if half_turn else 2.0 * np.pi,
         length=length,
     )

@@ -14,6 +14,7 @@ from flipflow.errors import IncompleteError
 from flipflow.kernels import arclength, status
 from flipflow.kernels.flow import Flow
 from flipflow.kernels.observe import corrected
+from flipflow.kernels.shooting import Shooting
 from flipflow.methods.motion import Motion
 from flipflow.methods.plan import PlanBuilder
 from flipflow.methods.scratch import new_branch, new_corrector, new_shooting
@@ -80,7 +81,7 @@ class Point:
     @property
     def eigenvalues(self) -> Complex:
         """Eigenvalues of the return map, (2 N,)."""
-        return np.linalg.eigvals(self.return_map).astype(np.complex128)
+        return eigenvalues_of(self.return_map)
 
 
 class Solver(ABC):
@@ -217,18 +218,37 @@ class Solver(ABC):
         maps, error = np.empty((points, size, size)), np.empty(points)
         code = np.zeros(points, np.int64)
         while True:
-            problem = new_shooting(self.builder.plan, half_turn=half_turn, length=self.length)
+            problem = self.shooting(half_turn=half_turn)
             square, pivot = np.empty((size, size)), np.zeros(size, np.int64)
             corrected(
-                problem, states.copy(), omega, harmonics, series, np.empty((size, size + 1)),
-                square, pivot, np.empty(size), maps, error, code,
+                problem, states.copy(), omega, harmonics, series, square, pivot, np.empty(size),
+                maps, error, code,
             )  # fmt: skip
             if not np.any(code == status.MISSING_CONFIGURATION):
                 return maps, error
             self._add_configuration(problem.flow)
 
+    def shooting(self, *, half_turn: bool) -> Shooting:
+        """The shooting problem of the present plan, made once."""
+        if half_turn not in self._shooting:
+            self._shooting[half_turn] = new_shooting(
+                self.builder.plan, half_turn=half_turn, length=self.length
+            )
+        return self._shooting[half_turn]
+
     def _new_work(self) -> None:
         self.work = new_corrector(self.unknowns)
+        self._shooting: dict[bool, Shooting] = {}
+
+
+def eigenvalues_of(maps: Real) -> Complex:
+    """Eigenvalues (..., 2 N) of return maps; NaN where the flow failed and there is none."""
+    known = np.isfinite(maps).all(axis=(-2, -1))
+    if known.all():
+        return np.linalg.eigvals(maps).astype(np.complex128)
+    found = np.full(maps.shape[:-1], np.nan, np.complex128)
+    found[known] = np.linalg.eigvals(maps[known])
+    return found
 
 
 def characteristic_length(builder: PlanBuilder) -> float:

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.errors import IncompleteError
-from flipflow.methods.linear import complex_amplitudes
 from flipflow.methods.solver import Point, Real, Solver, Traced
 from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker
 
@@ -94,7 +93,7 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
     if not springs:
         return []
     directions = np.array([spring.direction for spring in springs])
-    low, high = _reach(solver, traced, directions)
+    low, high, _ = solver.extremes(traced.u, traced.omega, directions)
     tests = []
     for j, spring in enumerate(springs):
         for side, gap in zip((1, -1), spring.gaps, strict=True):
@@ -110,18 +109,6 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
 
             tests.append(_Test(CONTACT_BEGIN, depth, evaluate, j, side))
     return tests
-
-
-def _reach(solver: Solver, traced: Traced, directions: Real) -> tuple[Real, Real]:
-    """Least and greatest gap coordinates (P, m); in closed form where nothing is touched."""
-    touched = traced.signature != 0
-    X = complex_amplitudes(solver.system, traced.omega)
-    high = np.abs(X @ directions.T)
-    low = -high
-    low[touched], high[touched], _ = solver.extremes(
-        traced.u[touched], traced.omega[touched], directions
-    )
-    return low, high
 
 
 def _brackets(

@@ -139,6 +139,8 @@ class MechanicalSystem:
 
     def with_bonded(self) -> MechanicalSystem:
         """Return the same machine with springs that always act moved into C and K."""
+        if all(spring.acts and not spring.bonded for spring in self.springs):
+            return self
         C, K = self.C.copy(), self.K.copy()
         kept = []
         for spring in self.springs:

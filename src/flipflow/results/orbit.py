@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
 from flipflow.methods.motion import ContactInterval, Motion
-from flipflow.methods.solver import Solver
+from flipflow.methods.solver import Solver, eigenvalues_of
 from flipflow.methods.stability import STABLE, full_turn, stability_words
 from flipflow.model.system import Coordinate, MechanicalSystem
 
@@ -83,7 +83,7 @@ class Orbit:
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers of the full period, largest modulus first, (2 N,)."""
-        eigenvalues = np.linalg.eigvals(self.return_map).astype(np.complex128)
+        eigenvalues = eigenvalues_of(self.return_map)
         return full_turn(eigenvalues, half_turn=self.solver.half_turn)
 
     @cached_property
@@ -97,7 +97,7 @@ class Orbit:
         """Whether it returns after a small disturbance: "stable", "unstable", "undetermined"."""
         if self.word is not None:
             return self.word
-        eigenvalues = np.linalg.eigvals(self.return_map).astype(np.complex128)
+        eigenvalues = eigenvalues_of(self.return_map)
         return str(stability_words(eigenvalues[None], None)[0])
 
     @property
