@@ -26,10 +26,11 @@ from flipflow.methods.exact import ExactSolver
 HERE = Path(__file__).parent
 ORBIT_SPEED, EXACT_AMPLITUDE = 120.0, 9.969835637e-3
 TURNS = 20_000
+POINTS = 240  # the longest step is 1 rad/s; where the branch bends or a contact begins more follow
 METHODS = {
-    "H=3": (ff.HarmonicBalance(3), 8e-3),
-    "H=9": (ff.HarmonicBalance(9), 20e-3),
-    "exact": (ff.PiecewiseExact(), 8e-3),
+    "H=3": (ff.HarmonicBalance(3, points=POINTS), 8e-3),
+    "H=9": (ff.HarmonicBalance(9, points=POINTS), 20e-3),
+    "exact": (ff.PiecewiseExact(points=POINTS), 8e-3),
 }
 PEERS = {"pyHarm-os": ("pyharm", "run_pyharm.py"), "mousai": ("mousai", "run_mousai.py")}
 

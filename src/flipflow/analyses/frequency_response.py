@@ -184,7 +184,7 @@ def _finished(
     special = tuple(
         SpecialPoint(
             one.kind,
-            Orbit(solver, one.point.u, one.point.omega, one.point.return_map, _word(one.kind)),
+            Orbit(one.point, _word(one.kind)),
             one.index + one.share,
             one.spring,
             one.side,

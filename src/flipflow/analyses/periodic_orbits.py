@@ -71,7 +71,7 @@ def periodic_orbits(
             _keep(found, point, solver)
             if solver.system.symmetric:
                 _keep(found, _mirrored(solver, point), solver)
-    orbits = [Orbit(solver, point.u, omega, point.return_map) for point in found]
+    orbits = [Orbit(point) for point in found]
     which = _first_gap(solver.system)
     return tuple(sorted(orbits, key=lambda o: (-_reach(o, which), -o.state @ which)))
 
@@ -124,7 +124,7 @@ def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:
 def _reach(orbit: Orbit, which: Real) -> float:
     """Half peak-to-peak at the first gap, in m, in steps that hide rounding between mirrors."""
     vector = which[: orbit.system.size]
-    low, high, _ = orbit.solver.extremes(
+    low, high, _ = orbit.point.solver.extremes(
         orbit.unknowns[None], np.array([orbit.omega]), vector[None]
     )
     return round(float(high[0, 0] - low[0, 0]) / 2.0, 9)

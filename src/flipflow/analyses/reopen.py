@@ -11,7 +11,7 @@ from flipflow.analyses.frequency_response import solver_for
 from flipflow.errors import StoreError
 from flipflow.kernels import arclength
 from flipflow.methods.scratch import new_branch
-from flipflow.methods.solver import Traced
+from flipflow.methods.solver import Point, Traced
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.document import BRANCH, machine_from, method_from
 from flipflow.results.orbit import Orbit
@@ -46,7 +46,14 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
     special = tuple(
         SpecialPoint(
             one["kind"],
-            Orbit(solver, np.asarray(one["unknowns"]), one["omega"], np.asarray(one["return_map"])),
+            Orbit(
+                Point(
+                    solver,
+                    np.asarray(one["unknowns"]),
+                    one["omega"],
+                    known_map=np.asarray(one["return_map"]),
+                )
+            ),
             one["position"],
             one["spring"],
             one["side"],

@@ -64,7 +64,7 @@ def observe_flow(
                 first[p, g] += 2.0 * share / turn
 
 
-@kernel
+@kernel(inline=True)
 def _turn_after(problem: Shooting, z: Real, omega: float, turn: float, waiting: int) -> int:
     """Record a turn after ``waiting`` turns from z, which becomes the state at its start."""
     flow = problem.flow
@@ -79,7 +79,7 @@ def _turn_after(problem: Shooting, z: Real, omega: float, turn: float, waiting: 
     return run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
 
 
-@kernel
+@kernel(inline=True)
 def _coordinate_segment(
     problem: Shooting, e: int, omega: float, coordinate: Real, motion: GapMotion
 ) -> None:
@@ -106,7 +106,7 @@ def _coordinate_segment(
             motion.amplitude[g, i] = plan.weight[slot, i] * shape * flow.modes[e, i]
 
 
-@kernel
+@kernel(inline=True)
 def first_harmonic(
     motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
 ) -> complex:
@@ -158,7 +158,7 @@ def describe_balance(problem: Balance, u: Real, omega: Real, series: Complex, co
         _displacements(problem, omega[p], series[p])
 
 
-@kernel
+@kernel(inline=True)
 def _displacements(problem: Balance, omega: float, series: Complex) -> None:
     """X_h = delta_h1 X_linear - (K - h^2 omega^2 M + i h omega C)^-1 D^T Lambda_h by modes."""
     plan = problem.plan
@@ -214,7 +214,7 @@ def corrected(
             error[p] = _distance(problem, omega[p], harmonics, series[p], last)
 
 
-@kernel
+@kernel(inline=True)
 def _correct_state(
     problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real, out: Real
 ) -> tuple[int, float, float]:
@@ -245,7 +245,7 @@ def _correct_state(
     return code, first, last
 
 
-@kernel
+@kernel(inline=True)
 def _store_map(problem: Shooting, out: Real) -> None:
     """The return map that was carried last."""
     for k in range(out.shape[0]):
@@ -253,7 +253,7 @@ def _store_map(problem: Shooting, out: Real) -> None:
             out[k, c] = problem.sign * problem.map[k, c]
 
 
-@kernel
+@kernel(inline=True)
 def _newton_step(
     problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real
 ) -> tuple[int, float]:
@@ -280,7 +280,7 @@ def _newton_step(
     return code, length
 
 
-@kernel
+@kernel(inline=True)
 def _distance(
     problem: Shooting, omega: float, harmonics: Int, series: Complex, rest: float
 ) -> float:

@@ -29,7 +29,7 @@ class Shooting(NamedTuple):
     length: float  # length in m below which displacements count as small
 
 
-@kernel
+@kernel(inline=True)
 def shoot(problem: Shooting, z: Real, omega: float, U: Real) -> int:
     """Carry z and its tangent over the problem's part of a turn: flow.z, and U as it takes columns.
 
@@ -50,7 +50,7 @@ def shoot(problem: Shooting, z: Real, omega: float, U: Real) -> int:
     return code
 
 
-@kernel
+@kernel(inline=True)
 def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real) -> int:
     """r = sign flow(z) - z and J = [dr/dz, dr/d omega], shapes (2 N,) and (2 N, 2 N + 1)."""
     size = r.shape[0]

@@ -71,7 +71,18 @@ class BalanceSolver(Solver):
 
     def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
         _, series = self.series(u, omega)
-        seen = np.einsum("gn,phn->pgh", coordinates, series)
+        return self._extremes(np.einsum("gn,phn->pgh", coordinates, series))
+
+    def gap_extremes(self, u: Real, omega: Real) -> tuple[Real, Real]:  # noqa: ARG002
+        means = int(self.harmonics[0] == 0) * len(self.builder.springs)
+        pairs = u[:, means:].reshape(u.shape[0], -1, len(self.builder.springs), 2)
+        moving = (pairs[..., 0] + 1j * pairs[..., 1]).transpose(0, 2, 1)
+        seen = np.concatenate([u[:, :means, None], moving], axis=2) if means else moving
+        low, high, _ = self._extremes(seen)
+        return low, high
+
+    def _extremes(self, seen: Complex) -> tuple[Real, Real, Complex]:
+        """Least and greatest value and first harmonic (P, G) of series (P, G, n_h)."""
         moving = self.harmonics > 0
         rate = 1j * self.harmonics[moving].astype(np.complex128)
         scratch = new_gap_motion(1, rate, spacing=int(self.problem.motion.spacing[0]))

@@ -102,13 +102,13 @@ def new_branch(unknowns: int, points: int, *, with_jacobian: bool = True) -> Bra
     """Record of a branch of up to ``points`` points."""
     n = unknowns
     return Branch(
-        u=np.zeros((points, n)),
-        omega=np.zeros(points),
-        tangent=np.zeros((points, n + 1)),
-        jacobian=np.zeros((points, n, n) if with_jacobian else (points, 0, 0)),
-        side=np.zeros(points),
-        signature=np.zeros(points, np.int64),
-        iterations=np.zeros(points, np.int64),
+        u=np.empty((points, n)),
+        omega=np.empty(points),
+        tangent=np.empty((points, n + 1)),
+        jacobian=np.empty((points, n, n) if with_jacobian else (points, 0, 0)),
+        side=np.empty(points),
+        signature=np.empty(points, np.int64),
+        iterations=np.empty(points, np.int64),
         rejected=np.zeros(points, np.int64),
         reason=np.zeros(points, np.int64),
     )

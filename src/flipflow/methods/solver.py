@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
@@ -64,19 +65,23 @@ class Traced:
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One corrected point of a branch: unknowns, Jacobian, tangent's share in omega."""
+    """A solved motion: unknowns, tangent's share in omega, and return map or Jacobian."""
 
     solver: Solver
     u: Real
     omega: float
-    omega_tangent: float
-    jacobian: Real
+    omega_tangent: float = math.nan
+    jacobian: Real | None = None
+    known_map: Real | None = None
 
     @cached_property
     def return_map(self) -> Real:
-        """Return map (2 N, 2 N); only the tests of stability ask for it."""
+        """Return map (2 N, 2 N) of a turn, or of half a turn with sign; worked out when asked."""
+        if self.known_map is not None:
+            return self.known_map
+        jacobian = np.zeros((0, 0)) if self.jacobian is None else self.jacobian
         u, omega = self.u[None], np.array([self.omega])
-        return np.asarray(self.solver.return_maps(u, omega, self.jacobian[None])[0])
+        return np.asarray(self.solver.return_maps(u, omega, jacobian[None])[0])
 
     @property
     def eigenvalues(self) -> Complex:
@@ -119,6 +124,11 @@ class Solver(ABC):
     @abstractmethod
     def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
         """Least and greatest value and first harmonic (P, G) of coordinates (G, N)."""
+
+    def gap_extremes(self, u: Real, omega: Real) -> tuple[Real, Real]:
+        """Least and greatest position at each gap, (P, m)."""
+        low, high, _ = self.extremes(u, omega, self.builder.plan.direction)
+        return low, high
 
     @abstractmethod
     def states(self, u: Real, omega: Real) -> Real:

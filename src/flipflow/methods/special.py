@@ -92,8 +92,7 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
     springs = solver.builder.springs
     if not springs:
         return []
-    directions = np.array([spring.direction for spring in springs])
-    low, high, _ = solver.extremes(traced.u, traced.omega, directions)
+    low, high = solver.gap_extremes(traced.u, traced.omega)
     tests = []
     for j, spring in enumerate(springs):
         for side, gap in zip((1, -1), spring.gaps, strict=True):
@@ -102,10 +101,8 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
             depth = (high[:, j] if side > 0 else -low[:, j]) - gap
 
             def evaluate(point: Point, j: int = j, side: int = side, gap: float = gap) -> float:
-                least, most, _ = solver.extremes(
-                    point.u[None], np.array([point.omega]), directions[j : j + 1]
-                )
-                return float((most[0, 0] if side > 0 else -least[0, 0]) - gap)
+                least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
+                return float((most[0, j] if side > 0 else -least[0, j]) - gap)
 
             tests.append(_Test(CONTACT_BEGIN, depth, evaluate, j, side))
     return tests

@@ -160,6 +160,6 @@ def _square(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float6
         raise InputError(name, array.shape, f"give a {size} x {size} matrix, as M is")
     if not np.all(np.isfinite(array)):
         raise InputError(name, "not finite", "give finite numbers")
-    if not np.allclose(array, array.T, rtol=1e-12, atol=0.0):
+    if np.any(np.abs(array - array.T) > 1e-12 * np.abs(array)):
         raise InputError(name, "not symmetric", "give a symmetric matrix")
     return array

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
 from flipflow.methods.motion import ContactInterval, Motion
-from flipflow.methods.solver import Solver, eigenvalues_of
+from flipflow.methods.solver import Point
 from flipflow.methods.stability import STABLE, full_turn, stability_words
 from flipflow.model.system import Coordinate, MechanicalSystem
 
@@ -29,31 +29,37 @@ class Orbit:
 
     Parameters
     ----------
-    solver
-        The solver that found the motion.
-    unknowns
-        The solver's unknowns at the motion.
-    omega
-        Forcing frequency in rad/s.
-    return_map
-        Linearised return map of the state over a turn, or over half a turn with sign.
+    point
+        The motion as its solver left it.
     word
         Stability where the branch knows it better than the multipliers do.
     """
 
-    solver: Solver
-    unknowns: Real
-    omega: float
-    return_map: Real
+    point: Point
     word: str | None = None
 
     def __repr__(self) -> str:
         return f"Orbit({self.omega:.6g} rad/s, {self.stability})"
 
     @property
+    def unknowns(self) -> Real:
+        """The solver's unknowns at the motion."""
+        return self.point.u
+
+    @property
+    def omega(self) -> float:
+        """Forcing frequency in rad/s."""
+        return self.point.omega
+
+    @property
+    def return_map(self) -> Real:
+        """Linearised return map of the state over a turn, or over half a turn with sign."""
+        return self.point.return_map
+
+    @property
     def system(self) -> MechanicalSystem:
         """The machine."""
-        return self.solver.system
+        return self.point.solver.system
 
     @property
     def periods(self) -> int:
@@ -68,7 +74,7 @@ class Orbit:
     @cached_property
     def motion(self) -> Motion:
         """The motion as a function of time, with its record of contacts."""
-        return self.solver.motion(self.unknowns, self.omega)
+        return self.point.solver.motion(self.unknowns, self.omega)
 
     @cached_property
     def t(self) -> Real:
@@ -78,27 +84,25 @@ class Orbit:
     @cached_property
     def state(self) -> Real:
         """State (x, x') at t = 0, shape (2 N,)."""
-        return np.asarray(self.solver.states(self.unknowns[None], np.array([self.omega]))[0])
+        return np.asarray(self.point.solver.states(self.unknowns[None], np.array([self.omega]))[0])
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers of the full period, largest modulus first, (2 N,)."""
-        eigenvalues = eigenvalues_of(self.return_map)
-        return full_turn(eigenvalues, half_turn=self.solver.half_turn)
+        return full_turn(self.point.eigenvalues, half_turn=self.point.solver.half_turn)
 
     @cached_property
     def monodromy(self) -> Real:
         """Linearised flow over the full period, (2 N, 2 N), saltation included."""
         M = self.return_map
-        return np.asarray(M @ M if self.solver.half_turn else M)
+        return np.asarray(M @ M if self.point.solver.half_turn else M)
 
     @cached_property
     def stability(self) -> str:
         """Whether it returns after a small disturbance: "stable", "unstable", "undetermined"."""
         if self.word is not None:
             return self.word
-        eigenvalues = eigenvalues_of(self.return_map)
-        return str(stability_words(eigenvalues[None], None)[0])
+        return str(stability_words(self.point.eigenvalues[None], None)[0])
 
     @property
     def stable(self) -> bool:
@@ -108,7 +112,7 @@ class Orbit:
     @cached_property
     def error(self) -> float:
         """Estimated distance in m from the exact motion; infinite where nothing is promised."""
-        return float(self.solver.errors(self.unknowns[None], np.array([self.omega]))[0])
+        return float(self.point.solver.errors(self.unknowns[None], np.array([self.omega]))[0])
 
     def displacement(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
         """Displacement of a coordinate in m at times t (default: :attr:`t`)."""
@@ -188,7 +192,7 @@ class Orbit:
         """Mean power that the excitation feeds in, W: only the first harmonic takes part in it."""
         force = self.system.excitation
         F = force.vector * self.omega**force.power
-        _, _, first = self.solver.extremes(
+        _, _, first = self.point.solver.extremes(
             self.unknowns[None], np.array([self.omega]), np.eye(self.system.size)
         )
         return float(0.5 * (F.conj() @ (1j * self.omega * first[0])).real)
@@ -221,13 +225,13 @@ class Orbit:
     def touches(self) -> bool:
         """Whether any stop carries a force during the period; one without gap always does."""
         always = any(
-            spring.bonded and spring.acts for spring in self.solver.builder.original.springs
+            spring.bonded and spring.acts for spring in self.point.solver.builder.original.springs
         )
         return always or bool(self.contact_intervals)
 
     def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
         """Force of a spring of the machine as it was given; springs that never act carry none."""
-        springs = self.solver.builder.original.springs
+        springs = self.point.solver.builder.original.springs
         if not 0 <= spring < len(springs):
             raise InputError("spring", spring, f"the machine has {len(springs)} springs, from 0 on")
         stop = springs[spring]
@@ -245,7 +249,7 @@ class Orbit:
 
     def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
         vector = self.system.coordinate(which)[None]
-        low, high, first = self.solver.extremes(self.unknowns[None], np.array([self.omega]), vector)
+        low, high, first = self.point.solver.extremes(self.unknowns[None], np.array([self.omega]), vector)
         return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
 
 
