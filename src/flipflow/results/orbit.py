@@ -249,7 +249,9 @@ class Orbit:
 
     def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
         vector = self.system.coordinate(which)[None]
-        low, high, first = self.point.solver.extremes(self.unknowns[None], np.array([self.omega]), vector)
+        low, high, first = self.point.solver.extremes(
+            self.unknowns[None], np.array([self.omega]), vector
+        )
         return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
 
 
