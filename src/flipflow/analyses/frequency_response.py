@@ -70,6 +70,11 @@ def frequency_response(
 def followed(machine: Machine, method: Method, solver: Solver, course: arclength.Course) -> Branch:
     """The branch over ``course`` with stability and special points."""
     traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
+    return described(machine, method, solver, traced)
+
+
+def described(machine: Machine, method: Method, solver: Solver, traced: Traced) -> Branch:
+    """Stability and special points of traced motions."""
     if traced.omega.size == 0:
         return _finished(machine, method, solver, traced, np.zeros((0, 0, 0)), [], [])
     maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
@@ -184,7 +189,7 @@ def _finished(
     special = tuple(
         SpecialPoint(
             one.kind,
-            Orbit(one.point, _word(one.kind)),
+            Orbit(machine, one.point, _word(one.kind)),
             one.index + one.share,
             one.spring,
             one.side,

@@ -71,7 +71,7 @@ def periodic_orbits(
             _keep(found, point, solver)
             if solver.system.symmetric:
                 _keep(found, _mirrored(solver, point), solver)
-    orbits = [Orbit(point) for point in found]
+    orbits = [Orbit(machine, point) for point in found]
     which = _first_gap(solver.system)
     return tuple(sorted(orbits, key=lambda o: (-_reach(o, which), -o.state @ which)))
 

@@ -47,12 +47,13 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
         SpecialPoint(
             one["kind"],
             Orbit(
+                machine,
                 Point(
                     solver,
                     np.asarray(one["unknowns"]),
                     one["omega"],
                     known_map=np.asarray(one["return_map"]),
-                )
+                ),
             ),
             one["position"],
             one["spring"],

@@ -21,6 +21,7 @@ QUICK, SHARP = 1e-6, 1e-10
 GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
 LONGEST, SHORTEST = 1.0, 1e-7
 TURN_MOST, ASTRAY_MOST = 0.90, 0.2
+AWAY, BACK = 3.0, 0.9
 CONTACT_STEP, STRAND_STEP, LABOURED_STEP = 0.03, 1e-4, 1e-3
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
@@ -249,12 +250,33 @@ def judge(
 
 
 @kernel
+def from_start(work: Corrector, branch: Branch) -> float:
+    """Distance of the corrected point from the first one, in steps."""
+    n = work.r.shape[0]
+    square = ((work.w[n] - branch.omega[0]) / work.scale[n]) ** 2
+    for k in range(n):
+        square += ((work.w[k] - branch.u[0, k]) / work.scale[k]) ** 2
+    return math.sqrt(square)
+
+
+@kernel
+def arrival(branch: Branch, course: Course, p: int, ends: bool, back: bool) -> int:
+    """How the branch ends with point p; OK when it goes on."""
+    if back:
+        return status.CLOSED
+    if not ends:
+        return status.OK
+    return status.REACHED_UPPER if branch.omega[p] == course.upper else status.REACHED_LOWER
+
+
+@kernel
 def trace(
     problem: Any, work: Corrector, branch: Branch, u: Real, omega: float, course: Course
 ) -> tuple[int, int]:
     """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
 
-    The first point is corrected at fixed omega, the last stands exactly on the bound. A step is
+    The first point is corrected at fixed omega, the last stands exactly on the bound; a branch
+    that comes back to its first point is closed there. A step is
     refused and halved when Newton fails, when the tangent turns too far, and, down to a small
     length, when the contacts of a turn change: points then gather where a contact begins, for
     what is narrow hides there.
@@ -268,7 +290,7 @@ def trace(
     work.border[n] = 1.0
     work.before[n] = course.direction
     set_scale(problem, work, work.guess, omega, course)
-    p, step, length = 0, 0.0, 0.1
+    p, step, length, travelled = 0, 0.0, 0.1, 0.0
     ends = False
     while p < branch.omega.shape[0]:
         if p > 0:
@@ -287,9 +309,11 @@ def trace(
             continue
         store(problem, work, branch, p)
         branch.iterations[p] = iterations
-        if ends:
-            at_upper = branch.omega[p] == course.upper
-            return status.REACHED_UPPER if at_upper else status.REACHED_LOWER, p + 1
+        distance = from_start(work, branch)
+        travelled = max(travelled, distance)
+        ended = arrival(branch, course, p, ends, travelled > AWAY and distance < BACK * step)
+        if ended != status.OK:
+            return ended, p + 1
         if p > 0 and iterations <= NEWTON_FEW:
             length = min(step * GROW, LONGEST)
         elif p > 0 and iterations >= NEWTON_MANY:

@@ -11,12 +11,20 @@ from flipflow.kernels.observe import observe_flow
 from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
 from flipflow.methods.scratch import new_gap_motion
 from flipflow.methods.solver import Complex, Real, Solver
+from flipflow.model.system import MechanicalSystem
 
 
 class ExactSolver(Solver):
-    """Unknown: the state (x, x') at t = 0, where the unbalance points along +x."""
+    """Unknown: the state (x, x') at t = 0, where the unbalance points along +x.
+
+    ``turns`` forcing periods pass before the motion repeats; with ``half_turn`` it is 1.
+    """
 
     reads_jacobian = True
+
+    def __init__(self, system: MechanicalSystem, *, half_turn: bool, turns: int = 1) -> None:
+        self.turns = turns
+        super().__init__(system, half_turn=half_turn)
 
     def _prepare(self) -> None:
         self.unknowns = 2 * self.system.size

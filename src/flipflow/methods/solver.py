@@ -62,6 +62,33 @@ class Traced:
             record,
         )
 
+    def reversed_into(self, ahead: Traced) -> Traced:
+        """Read the branch backwards, then ``ahead``, which starts from the same point."""
+        back = self.omega.size - 1
+        turned = slice(back, 0, -1)
+        points = back + ahead.omega.size
+        ends = (status.REACHED_UPPER, status.REACHED_LOWER)
+        code = self.code if self.code not in ends else ahead.code
+        # What is told of a step stands at its end, which is its other point when read backwards.
+        none = np.zeros(1, np.int64)
+        rejected, reason = (
+            np.concatenate([none, mine[turned], its[1:]])
+            for mine, its in ((self.rejected, ahead.rejected), (self.reason, ahead.reason))
+        )
+        record = arclength.Branch(
+            u=np.concatenate([self.u[turned], ahead.u]),
+            omega=np.concatenate([self.omega[turned], ahead.omega]),
+            tangent=np.concatenate([-self.tangent[turned], ahead.tangent]),
+            jacobian=np.concatenate([self.jacobian[turned], ahead.jacobian]),
+            side=np.concatenate([-self.record.side[turned], ahead.record.side[: ahead.omega.size]]),
+            signature=np.concatenate([self.signature[turned], ahead.signature]),
+            iterations=np.concatenate([self.iterations[turned], ahead.iterations]),
+            rejected=rejected,
+            reason=reason,
+        )
+        code = status.REACHED_UPPER if code in ends else code
+        return Traced.recorded(record, points, code, ahead.course)
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -105,6 +132,7 @@ class Solver(ABC):
     unknowns: int
     problem: Any
     reads_jacobian: bool
+    turns: int = 1
 
     def __init__(self, system: MechanicalSystem, *, half_turn: bool) -> None:
         self.builder = PlanBuilder(system)
@@ -172,6 +200,13 @@ class Solver(ABC):
                 break
             self.add_missing_configuration()
         return Traced.recorded(record, points, code, course)
+
+    def trace_through(self, u: Real, omega: float, course: arclength.Course) -> Traced:
+        """Follow the branch from (u, omega) both ways, in rising omega at the start."""
+        ahead = self.trace(u, omega, course._replace(direction=1.0))
+        if ahead.code == status.CLOSED or ahead.omega.size == 0:
+            return ahead
+        return self.trace(u, omega, course._replace(direction=-1.0)).reversed_into(ahead)
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
@@ -242,7 +277,7 @@ class Solver(ABC):
         """The shooting problem of the present plan, made once."""
         if half_turn not in self._shooting:
             self._shooting[half_turn] = new_shooting(
-                self.builder.plan, half_turn=half_turn, length=self.length
+                self.builder.plan, half_turn=half_turn, length=self.length, turns=self.turns
             )
         return self._shooting[half_turn]
 

@@ -176,7 +176,7 @@ class Branch:
             raise InputError("i", i, f"the branch has points 0 to {self.omega.size - 1}")
         u, omega = self.traced.u[i], float(self.omega[i])
         point = Point(self.solver, u, omega, known_map=self.return_maps[i])
-        return Orbit(point, str(self.stability[i]))
+        return Orbit(self.machine, point, str(self.stability[i]))
 
     def orbits_at(self, omega: float) -> tuple[Orbit, ...]:
         """The motions of this branch at exactly ``omega``, in branch order, each solved for.
@@ -252,7 +252,7 @@ class Branch:
         """A motion solved for on a part of the branch that rises or falls in omega."""
         side = np.array([self.saddle_side_at_start ^ (not rises)])
         word = stability_words(point.eigenvalues[None], side)[0]
-        return Orbit(point, str(word))
+        return Orbit(self.machine, point, str(word))
 
     def peak(self, which: Coordinate) -> SpecialPoint:
         """The motion of largest amplitude on the branch, refined between its points."""

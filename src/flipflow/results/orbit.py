@@ -13,7 +13,7 @@ from flipflow.errors import InputError
 from flipflow.methods.motion import ContactInterval, Motion
 from flipflow.methods.solver import Point
 from flipflow.methods.stability import STABLE, full_turn, stability_words
-from flipflow.model.system import Coordinate, MechanicalSystem
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 
 Real = NDArray[np.float64]
 GAUSS_POINTS = 24
@@ -29,12 +29,15 @@ class Orbit:
 
     Parameters
     ----------
+    machine
+        What moves so.
     point
         The motion as its solver left it.
     word
         Stability where the branch knows it better than the multipliers do.
     """
 
+    machine: Machine
     point: Point
     word: str | None = None
 
@@ -64,7 +67,7 @@ class Orbit:
     @property
     def periods(self) -> int:
         """Number of forcing periods after which the motion repeats."""
-        return 1
+        return self.point.solver.turns
 
     @property
     def period(self) -> float:

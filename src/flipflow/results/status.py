@@ -19,6 +19,7 @@ class BranchStatus(Enum):
     """How a branch ended."""
 
     COMPLETE = "The branch reached the end of the interval."
+    CLOSED = "The branch is closed: it came back to where it started."
     TURNED_BACK = (
         "The branch turned back and left the interval at its lower end; widen the interval to "
         "follow it."
@@ -38,8 +39,8 @@ class BranchStatus(Enum):
 
     @property
     def complete(self) -> bool:
-        """Whether the whole interval was covered."""
-        return self is BranchStatus.COMPLETE
+        """Whether the branch was followed to both its ends, or all round."""
+        return self in (BranchStatus.COMPLETE, BranchStatus.CLOSED)
 
     @classmethod
     def from_code(cls, code: int) -> Self:
@@ -50,6 +51,7 @@ class BranchStatus(Enum):
 _SENTENCE = {
     status.REACHED_UPPER: BranchStatus.COMPLETE.value,
     status.REACHED_LOWER: BranchStatus.TURNED_BACK.value,
+    status.CLOSED: BranchStatus.CLOSED.value,
     status.STEP_TOO_SMALL: BranchStatus.STEP_TOO_SMALL.value,
     status.POINT_LIMIT: BranchStatus.POINT_LIMIT.value,
     status.TOO_MANY_EVENTS: BranchStatus.TOO_MANY_CONTACTS.value,
