@@ -1,0 +1,139 @@
+"""A motion in time, from rest or any other state: what the machine and its shaft did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow import __version__
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.system import Coordinate, MechanicalSystem
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContactChange:
+    """A stop touched or left: time in s, spring, and its side then (+1, -1, 0 without force)."""
+
+    t: float
+    spring: int
+    side: int
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """A motion over time in SI units; n rows, N degrees of freedom, m springs.
+
+    Where a contact changes the same time may stand twice: once before, once after.
+
+    Parameters
+    ----------
+    system
+        The machine.
+    t
+        Times in s, rising, (n,).
+    x, v, a
+        Displacement in m, velocity in m/s, acceleration in m/s^2 of each degree of freedom, (n, N).
+    force
+        Force H of each stop in N, positive against +d, (n, m).
+    omega, angle
+        Shaft speed in rad/s and shaft angle in rad, (n,).
+    torque
+        Torque of the motor at the shaft in N m, (n,); None where the speed is prescribed.
+    normal
+        Displacement, velocity, acceleration normal to the surface, (n, 3); None where not known.
+    energy
+        Over the whole time in J: ``"input"`` + ``"impulses"`` + ``"loads"`` = ``"dissipated"`` +
+        ``"stored"`` (the change of what springs and masses hold).
+    settled
+        Whether the motion is periodic at the end; None where nobody asked.
+    distance
+        How far it then is from the settled motion, in m.
+    events
+        Every change of contact.
+    status
+        How the calculation ended, a sentence.
+    notes
+        What was assumed or left out.
+    method
+        How the motion was calculated.
+    counters
+        Work done: ``"steps"``, ``"events"``, ``"rejected"``.
+    version
+        Version of flipflow.
+    """
+
+    system: MechanicalSystem
+    t: Real
+    x: Real
+    v: Real
+    a: Real
+    force: Real
+    omega: Real
+    angle: Real
+    torque: Real | None = None
+    normal: Real | None = None
+    energy: Mapping[str, float] = field(default_factory=dict)
+    settled: bool | None = None
+    distance: float | None = None
+    events: tuple[ContactChange, ...] = ()
+    status: str = ""
+    notes: tuple[str, ...] = ()
+    method: str = ""
+    counters: Mapping[str, int] = field(default_factory=dict)
+    version: str = __version__
+
+    def __post_init__(self) -> None:
+        for name in ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal"):
+            values = getattr(self, name)
+            if values is not None:
+                # A view, so that the owner of the data keeps an array it can write to.
+                kept = np.asarray(values, float).view()
+                kept.setflags(write=False)
+                object.__setattr__(self, name, kept)
+        object.__setattr__(self, "energy", MappingProxyType(dict(self.energy)))
+        object.__setattr__(self, "counters", MappingProxyType(dict(self.counters)))
+
+    def __repr__(self) -> str:
+        return f"History({self.t.size} times, {self.t[0]:.6g} to {self.t[-1]:.6g} s)"
+
+    def displacement(self, which: Coordinate) -> Real:
+        """Displacement of a coordinate in m, (n,)."""
+        return np.asarray(self.x @ self.system.coordinate(which))
+
+    def velocity(self, which: Coordinate) -> Real:
+        """Velocity of a coordinate in m/s, (n,)."""
+        return np.asarray(self.v @ self.system.coordinate(which))
+
+    def acceleration(self, which: Coordinate) -> Real:
+        """Acceleration of a coordinate in m/s^2, (n,)."""
+        return np.asarray(self.a @ self.system.coordinate(which))
+
+    def stop_force(self, spring: int = 0) -> Real:
+        """Force H of a stop in N, positive against +d, (n,)."""
+        count = self.force.shape[1]
+        if not 0 <= spring < count:
+            raise InputError("spring", spring, f"the machine has {count} springs, from 0 on")
+        return self.force[:, spring]
+
+    @property
+    def normal_displacement(self) -> Real:
+        """Displacement y normal to the surface in m, (n,); with x1 it is the orbit."""
+        if self.normal is None:
+            raise IncompleteError(
+                "The motion normal to the surface is not known: give the machine's "
+                "normal_stiffness and normal_damping."
+            )
+        return np.asarray(self.normal[:, 0])
+
+    @property
+    def motor_power(self) -> Real:
+        """Power that the motor gives to the shaft in W, (n,)."""
+        if self.torque is None:
+            raise IncompleteError("The speed is prescribed here: there is no motor and no power.")
+        return np.asarray(self.torque * self.omega)
