@@ -181,9 +181,9 @@ class Solver(ABC):
 
     def add_missing_configuration(self) -> None:
         """Prepare the configuration a kernel stopped at, and the problem anew."""
-        self._add_configuration(self.flow)
+        self.add_configuration(self.flow)
 
-    def _add_configuration(self, flow: Flow) -> None:
+    def add_configuration(self, flow: Flow) -> None:
         """Prepare the configuration at which a flow stopped, and the problem anew."""
         digits = np.select([flow.state == 1, flow.state == -1], [1, 2], 0)
         self.builder.add([int(digits @ 3 ** np.arange(digits.size))])
@@ -271,7 +271,7 @@ class Solver(ABC):
             )  # fmt: skip
             if not np.any(code == status.MISSING_CONFIGURATION):
                 return maps, error
-            self._add_configuration(problem.flow)
+            self.add_configuration(problem.flow)
 
     def shooting(self, *, half_turn: bool) -> Shooting:
         """The shooting problem of the present plan, made once."""
