@@ -19,12 +19,18 @@ _HOME = {
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "assess": "flipflow.analyses.assessment",
+    "simulate": "flipflow.analyses.simulate",
+    "sweep": "flipflow.analyses.sweep",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
     "Unbalance": "flipflow.model.elements",
     "MechanicalSystem": "flipflow.model.system",
     "FlipFlowScreen": "flipflow.model.screen",
+    "Impulse": "flipflow.model.disturbance",
+    "LoadStep": "flipflow.model.disturbance",
+    "Lump": "flipflow.model.disturbance",
+    "InputError": "flipflow.errors",
     "Load": "flipflow.model.screen",
     "Limits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
@@ -43,6 +49,9 @@ if TYPE_CHECKING:
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.analyses.simulate import simulate as simulate
+    from flipflow.analyses.sweep import sweep as sweep
+    from flipflow.errors import InputError as InputError
     from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
@@ -50,6 +59,9 @@ if TYPE_CHECKING:
     from flipflow.io.results import save as save
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
     from flipflow.methods.options import PiecewiseExact as PiecewiseExact
+    from flipflow.model.disturbance import Impulse as Impulse
+    from flipflow.model.disturbance import LoadStep as LoadStep
+    from flipflow.model.disturbance import Lump as Lump
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.elements import HarmonicForce as HarmonicForce
     from flipflow.model.elements import Unbalance as Unbalance

@@ -19,7 +19,6 @@ from flipflow.results.orbit import Orbit
 
 STARTS = 64
 SETTLING_TURNS = 60
-SAME = 1e-6
 MOST_PERIODS = 6
 SWEEP_RATIO, SWEEP_STEPS = 1.3, 12
 
@@ -98,29 +97,17 @@ class _Search:
         for z in (start, settled):
             for periods in range(1, self.max_periods + 1):
                 point = self.settling.solver_of(periods).solve(z, self.omega)
-                if point is not None and self._shortest(point):
+                if point is not None and self.settling.shortest(point) is point:
                     self._keep(point)
                     if solver.system.symmetric:
                         self._keep(self._mirrored(point))
-
-    def _phases(self, point: Point) -> Real:
-        """States of a motion at the beginning of each forcing period."""
-        return self.settling.solver.section(point.u, self.omega, point.solver.turns)
-
-    def _shortest(self, point: Point) -> bool:
-        """Whether the motion does not repeat after fewer periods already."""
-        phases = self._phases(point)[:-1]
-        return not any(self._same(point.u, phase) for phase in phases)
-
-    def _same(self, z: Real, other: Real) -> bool:
-        size = self.settling.size(other[None], self.omega) + self.settling.solver.length
-        return self.settling.distance(z, other, self.omega) < SAME * size
 
     def _keep(self, point: Point) -> None:
         """Add a motion unless it is known, in whatever phase."""
         for known in self.found:
             if known.solver.turns == point.solver.turns and any(
-                self._same(point.u, phase) for phase in self._phases(known)
+                self.settling.same(point.u, phase, self.omega)
+                for phase in self.settling.phases(known)
             ):
                 return
         self.found.append(point)

@@ -90,9 +90,7 @@ def simulate(
     run = _Run(machine, system_of, speed, end, monitor)
     run.carry(Course(times, system.size, len(run.kept)), z, blows)
     settling = Settling(system_of(run.machine), MAX_PERIODS)
-    recent = np.concatenate([run.z[None], settling.solver.section(run.z, speed, 2 * MAX_PERIODS)])
-    point = settling.approached(recent, speed)
-    distance = None if point is None else settling.distance(recent[-1], point.u, speed)
+    distance = settling.distance_ahead(run.z, speed)
     return History(
         system=system,
         t=times,
@@ -104,7 +102,7 @@ def simulate(
         angle=speed * times,
         normal=_normal(machine, speed, times, initial, blows, end),
         energy=run.energy(),
-        settled=distance is not None and distance < SETTLED * settling.size(recent, speed),
+        settled=distance is not None and distance < SETTLED * settling.size(run.z[None], speed),
         distance=distance,
         events=run.events(),
         status="The motion was carried to its end.",

@@ -124,5 +124,5 @@ def _jumped(settling: Settling, before: Settled, after: Settled, omega: float) -
     if followed is None:
         return True
     share = JUMP_SHARE * settling.size(after.recent, omega)
-    images = settling.solver.section(followed.u, omega, followed.solver.turns)
+    images = settling.phases(followed)
     return all(settling.distance(image, after.state, omega) > share for image in images)

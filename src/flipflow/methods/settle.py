@@ -25,6 +25,7 @@ FIRST_CHUNK, LONGEST_CHUNK = 16, 256
 NEAR = 0.1
 SAME_PERIOD = 3.0
 RECENT = 64
+SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,35 @@ class Settling:
         point = self.solver_of(periods).solve(last, omega)
         if point is None or self.distance(last, point.u, omega) > NEAR * size:
             return None
+        # A spiral may come closer to itself after some turns than after one.
+        point = self.shortest(point)
         return point if is_stable(point) else None
+
+    def phases(self, point: Point) -> Real:
+        """States of a motion after 1, 2, ... all of its forcing periods, the last its own."""
+        return self.solver.section(point.u, point.omega, point.solver.turns)
+
+    def same(self, z: Real, other: Real, omega: float) -> bool:
+        """Whether two states differ by less than 1e-6 of the motion's size."""
+        size = self.size(other[None], omega) + self.solver.length
+        return self.distance(z, other, omega) < SAME * size
+
+    def shortest(self, point: Point) -> Point:
+        """The same motion with the least number of forcing periods after which it repeats."""
+        phases = self.phases(point)
+        repeats = (n for n, z in enumerate(phases, 1) if self.same(point.u, z, point.omega))
+        periods = next(repeats, point.solver.turns)
+        if periods == point.solver.turns:
+            return point
+        return self.solver_of(periods).solve(point.u, point.omega) or point
+
+    def distance_ahead(self, z: Real, omega: float) -> float | None:
+        """Distance in m of the state z from the periodic motion ahead; None where none is near."""
+        ahead = self.solver.section(z, omega, 2 * self.max_periods)
+        point = self.approached(np.concatenate([z[None], ahead]), omega)
+        if point is None:
+            return None
+        return min(self.distance(z, phase, omega) for phase in self.phases(point))
 
     def continued(self, point: Point, omega: float) -> Point | None:
         """The motion followed along its branch to another frequency; None where it turns back."""
