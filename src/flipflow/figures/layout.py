@@ -11,7 +11,7 @@ from flipflow.figures.parts import Figure, Line, Panel
 WIDTH = 690  # the width of an A4 page within its margins, 96 pixels an inch
 FONT = 11
 CHARACTER = 5.9
-LABEL_ROW, TITLE_ROW, LEGEND_ROW = 14, 17, 19
+LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
 BOTTOM, LEFT, RIGHT = 40, 58, 14
 BARE_GAP, ROW_GAP = 26, 48
 LEGEND_MARK = 42

@@ -29,6 +29,7 @@ KIND_SYMBOLS = {"fold": "diamond", "contact begin": "circle-open", "contact end"
 BAND_POINTS = 300
 NEAR = 0.35
 MOST_COORDINATES = CASES
+LEGEND_WITHIN = 2  # rows of the legend of all load cases that its height has room for
 READING = (
     "Solid: the motion returns after a small disturbance. Dashed: it does not, so the machine "
     "leaves it. Arrows: the amplitude jumps, as the speed rises or falls."
@@ -132,10 +133,11 @@ def cases_figure(assessment: Assessment) -> Figure:
         "a small disturbance. Arrows: jumps."
     )
     figure = Figure(
-        "Amplitude of the relative motion over speed", caption, panels, len(panels), 197,
+        "Amplitude of the relative motion over speed", caption, panels, len(panels), 216,
         shares=(0.56, 0.44) if len(panels) == 2 else (),
     )  # fmt: skip
-    return dataclasses.replace(figure, height=figure.height + LEGEND_ROW * legend_rows(figure))
+    beyond = max(legend_rows(figure) - LEGEND_WITHIN, 0)
+    return dataclasses.replace(figure, height=figure.height + LEGEND_ROW * beyond)
 
 
 def coordinates(system: MechanicalSystem) -> tuple[Coordinate, ...]:

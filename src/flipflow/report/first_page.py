@@ -7,12 +7,12 @@ import math
 from collections.abc import Iterator
 
 from flipflow.analyses.assessment import Assessment, CaseAssessment, LimitRow
-from flipflow.analyses.feasible import REGION, STABILITY, Bound
+from flipflow.analyses.feasible import REGION, STABILITY, Bound, missing_words
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.layout import legend_lines
 from flipflow.figures.motion import motions_figure
-from flipflow.figures.response import cases_figure
+from flipflow.figures.response import LEGEND_WITHIN, cases_figure
 from flipflow.report.blocks import (
     Block,
     Cell,
@@ -35,8 +35,9 @@ NO_NORMAL = (
     "the machine file."
 )
 NO_LIMIT = (-math.inf, math.inf)
-# Load cases, their legend and lines of notes together, beside all else that stands on an A4 page.
-MOST_LINES, NOTE_LINES, LINE_LENGTH = 6, 4, 105
+# What an A4 page has room for beside all that stands there always: rows of load cases, a line of
+# a note being as high as so many rows; lines of notes when the table of load cases is overleaf.
+MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 105
 MOST_NAMED = 4
 OVERLEAF, OVERLEAF_TITLE = 'under "Load cases and notes" on the next page', "Load cases and notes"
 CASE_COLUMNS = (
@@ -86,9 +87,11 @@ def verdict(assessment: Assessment) -> Iterator[Block]:
 @section(Assessment, Part.FIRST_PAGE, 25)
 def further_notes(assessment: Assessment) -> Iterator[Block]:
     """Where the other notes are."""
-    left = len(assessment.notes) - notes_that_fit(assessment)
+    shown = notes_that_fit(assessment)
+    left = len(assessment.notes) - shown
     if left:
-        yield Note(f"{left} more {'note stands' if left == 1 else 'notes stand'} {OVERLEAF}.")
+        more = f"{left} more" if shown else str(left)
+        yield Note(f"{more} {'note stands' if left == 1 else 'notes stand'} {OVERLEAF}.")
 
 
 @section(Assessment, Part.FIRST_PAGE, 30)
@@ -184,15 +187,25 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
 
 def crowded(assessment: Assessment) -> bool:
     """Whether the table of load cases goes overleaf, for the first page shall be one page."""
-    names = ["band of load cases", *(case.name for case in assessment.cases)]
-    lines = len(assessment.cases) + legend_lines(names) + sum(map(_note_lines, assessment.notes))
-    return lines > MOST_LINES
+    lines = sum(map(_note_lines, assessment.notes)) + _other_lines(assessment)
+    return len(assessment.cases) + NOTE_ROWS * lines > MOST_ROWS
 
 
 def notes_that_fit(assessment: Assessment) -> int:
-    """How many notes the first page has room for."""
-    heights = itertools.accumulate(_note_lines(note) for note in assessment.notes)
-    return sum(height <= NOTE_LINES for height in heights)
+    """How many notes the first page has room for; where not all fit, a line says so."""
+    room = NOTE_LINES - _other_lines(assessment)
+    ends = list(itertools.accumulate(_note_lines(note) for note in assessment.notes))
+    return len(ends) if not ends or ends[-1] <= room else sum(end < room for end in ends)
+
+
+def _other_lines(assessment: Assessment) -> int:
+    """Lines of the first page that not every machine needs."""
+    names = ["band of load cases", *(case.name for case in assessment.cases)]
+    return (
+        max(legend_lines(names) - LEGEND_WITHIN, 0)
+        + bool(contact_sentence(assessment.region))
+        + (not any(case.normal for case in assessment.cases))
+    )
 
 
 def _note_lines(note: str) -> int:
@@ -305,8 +318,9 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     first = names[0]
     found = [(v, c) for c in assessment.cases if (v := c.values.get(first)) is not None]
     if not found:
-        needs = ", ".join(QUANTITIES[first].needs)
-        return f"not checked, missing: {needs}" if needs else "not checked"
+        screen = assessment.project.screen
+        needs = tuple(name for name in QUANTITIES[first].needs if getattr(screen, name) is None)
+        return f"not checked, {missing_words(needs)}" if needs else "not checked"
     _, case = (min if lowest else max)(found, key=lambda one: one[0])
     if first == "stop_force" and not case.stop_reached:
         return "stop not reached" if case.screen.has_stop else "none fitted"
