@@ -100,9 +100,11 @@ def check_interval(omega: object) -> tuple[float, float]:
     except (TypeError, ValueError):
         raise InputError("omega", omega, "give an interval (low, high) in rad/s") from None
     if not (math.isfinite(low) and math.isfinite(high) and low > 0.0):
-        raise InputError("omega", omega, "give two finite frequencies above 0 rad/s")
+        raise InputError("omega", omega, "give two finite speeds above 0 rad/s")
     if high <= low:
-        raise InputError("omega", omega, "the interval is empty or reversed; give (low, high)")
+        raise InputError(
+            "omega", omega, "the interval is empty or reversed; give the lower end first"
+        )
     if high > OMEGA_MOST:
         raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
     return low, high

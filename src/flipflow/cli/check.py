@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.analyze import FILE_HELP
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -16,9 +18,7 @@ if TYPE_CHECKING:
 
 
 def check(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-    ],
+    file: Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)],
     json: Annotated[
         str | None,
         typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
@@ -104,14 +104,19 @@ def _cases(cases: Iterable[Case]) -> Table:
 
 def _sources(result: Check) -> Iterator[str]:
     """Group by source; a value without one stands last."""
-    named = [(value.source, value.key) for value in result.values]
-    named += [(case.source, f"load case {case.name!r}") for case in result.load_cases]
+    named = [(value.source, *value.key.split(".")) for value in result.values]
+    named += [(case.source, "load_cases", repr(case.name)) for case in result.load_cases]
     for source, rows in groupby(sorted(named, key=_no_source_last), key=lambda row: row[0]):
-        keys = ", ".join(_printable(key) for _, key in rows)
-        yield f"{_printable(source) or 'no source given'}: {keys}"
+        listed = tuple(rows)
+        sections = "; ".join(
+            f"{section} ({', '.join(_printable(key) for *_, key in group)})"
+            for section, group in groupby(listed, key=lambda row: row[1])
+        )
+        head = _printable(source) or f"no source given for {len(listed)} entries"
+        yield f"{head}: {sections}"
 
 
-def _no_source_last(row: tuple[str, str]) -> tuple[bool, str]:
+def _no_source_last(row: tuple[str, ...]) -> tuple[bool, str]:
     return not row[0], row[0]
 
 
