@@ -11,7 +11,10 @@ from flipflow import __version__
 from flipflow.cli.analyze import analyze
 from flipflow.cli.check import check
 from flipflow.cli.new import new
+from flipflow.cli.orbits import orbits
 from flipflow.cli.schema import schema
+from flipflow.cli.simulate import simulate
+from flipflow.cli.sweep import sweep
 from flipflow.errors import FlipflowError
 
 app = typer.Typer(
@@ -23,7 +26,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (analyze, check, new, schema):
+for command in (analyze, check, new, schema, simulate, sweep, orbits):
     app.command()(command)
 
 

@@ -9,11 +9,15 @@ from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.history import history_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.figures.sweep import sweep_figure
 from flipflow.results.branch import Branch
+from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.sweep import Sweep
 
 
 @singledispatch
@@ -23,7 +27,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a linear response, an operating region or an assessment.
+        A branch, an orbit, a motion over time, a sweep, a linear response, an operating region or
+        an assessment.
 
     Returns
     -------
@@ -63,3 +68,13 @@ def _(result: OperatingRegion) -> Figure:
 @figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@figure.register
+def _(result: Sweep) -> Figure:
+    return sweep_figure((result,))
+
+
+@figure.register
+def _(result: History) -> Figure:
+    return history_figure(result)

@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 from collections.abc import Mapping
+from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,10 @@ from flipflow.analyses.reopen import branch_from
 from flipflow.errors import InputError, StoreError
 from flipflow.results.branch import Branch
 from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
+from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.sweep import Sweep
+from flipflow.results.time_document import history_document, sweep_document
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +36,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit or Assessment.
+        A Branch, Orbit, History, Sweep or Assessment.
     path
         File to write; its ending decides the form.
 
@@ -83,17 +87,20 @@ def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
         raise StoreError(f"{path} is damaged: {error!r}") from None
 
 
+@singledispatch
 def document_of(result: object) -> dict[str, Any]:
     """The data document of a result."""
-    if isinstance(result, Branch):
-        return branch_document(result)
-    if isinstance(result, Orbit):
-        return orbit_document(result)
-    if isinstance(result, Assessment):
-        return assessment_document(result)
-    raise InputError("result", type(result).__name__, "give a Branch, an Orbit or an Assessment")
+    known = ", ".join(sorted(kind.__name__ for kind in document_of.registry if kind is not object))
+    raise InputError("result", type(result).__name__, f"a document can be made of {known}")
 
 
+document_of.register(Branch, branch_document)
+document_of.register(Orbit, orbit_document)
+document_of.register(History, history_document)
+document_of.register(Sweep, sweep_document)
+
+
+@document_of.register(Assessment)
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
     """Verdict, limits, region and cases of an assessment."""
     region = assessment.region
