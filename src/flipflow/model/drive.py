@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow.errors import InputError
 
 BREAKDOWN_RATIO, BREAKDOWN_SLIP = 2.5, 0.2
+SYNCHRONOUS_SPEED = 50.0 * math.pi
+UNBALANCE_RADIUS, FRICTION_SHARE = 0.1, 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +167,8 @@ class Drive:
 
     def switched_off(self) -> Self:
         """Return the same shaft without motor."""
-        return replace(self, motor=None)
+        left = tuple(word for word in self.assumed if word.startswith(("inertia", "friction")))
+        return replace(self, motor=None, assumed=left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,3 +218,56 @@ class SpeedProfile:
 def _positive(name: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(name, value, "give a finite number above 0")
+
+
+def assumed_drive(
+    eccentric_moment: float, speed: float, power: float, given: Mapping[str, float] | None = None
+) -> Drive:
+    """A drive of known power; what ``given`` leaves out is assumed, and said in ``assumed``.
+
+    Parameters
+    ----------
+    eccentric_moment
+        m0 r of the screen in kg m.
+    speed
+        Working speed in rad/s.
+    power
+        Rated power of the motor in W.
+    given
+        Any of ``synchronous_speed``, ``breakdown_ratio``, ``breakdown_slip``, ``ratio``,
+        ``inertia``, ``friction``, ``viscous_friction``, in SI.
+    """
+    known = dict(given or {})
+    words = []
+
+    def take(name: str, value: float, sentence: str) -> float:
+        if name not in known:
+            words.append(sentence)
+        return known.get(name, value)
+
+    motor = Motor(
+        rated_power=power,
+        synchronous_speed=take(
+            "synchronous_speed", SYNCHRONOUS_SPEED, "motor of 4 poles at 50 Hz, 1500 rpm"
+        ),
+        breakdown_ratio=take(
+            "breakdown_ratio", BREAKDOWN_RATIO, f"breakdown torque {BREAKDOWN_RATIO:g} times rated"
+        ),
+        breakdown_slip=take("breakdown_slip", BREAKDOWN_SLIP, f"breakdown slip {BREAKDOWN_SLIP:g}"),
+    )
+    inertia = 2.0 * eccentric_moment * UNBALANCE_RADIUS
+    return Drive(
+        motor=motor,
+        ratio=take(
+            "ratio", motor.rated_speed / speed, "belt ratio for rated speed at working speed"
+        ),
+        inertia=take(
+            "inertia", inertia,
+            f"inertia {inertia:.3g} kg m^2, twice that of the unbalance at {UNBALANCE_RADIUS:g} m",
+        ),
+        friction=take(
+            "friction", FRICTION_SHARE * power / speed, f"friction {FRICTION_SHARE:.0%} of rated"
+        ),
+        viscous_friction=known.get("viscous_friction", 0.0),
+        assumed=tuple(words),
+    )  # fmt: skip
