@@ -18,6 +18,8 @@ _HOME = {
     "linear_response": "flipflow.analyses.linear",
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
+    "start_up": "flipflow.analyses.startup",
+    "coast_down": "flipflow.analyses.startup",
     "assess": "flipflow.analyses.assessment",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
@@ -26,6 +28,9 @@ _HOME = {
     "MechanicalSystem": "flipflow.model.system",
     "FlipFlowScreen": "flipflow.model.screen",
     "Load": "flipflow.model.screen",
+    "Motor": "flipflow.model.drive",
+    "Drive": "flipflow.model.drive",
+    "SpeedProfile": "flipflow.model.drive",
     "Limits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
@@ -43,6 +48,8 @@ if TYPE_CHECKING:
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.analyses.startup import coast_down as coast_down
+    from flipflow.analyses.startup import start_up as start_up
     from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
@@ -50,6 +57,9 @@ if TYPE_CHECKING:
     from flipflow.io.results import save as save
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
     from flipflow.methods.options import PiecewiseExact as PiecewiseExact
+    from flipflow.model.drive import Drive as Drive
+    from flipflow.model.drive import Motor as Motor
+    from flipflow.model.drive import SpeedProfile as SpeedProfile
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.elements import HarmonicForce as HarmonicForce
     from flipflow.model.elements import Unbalance as Unbalance

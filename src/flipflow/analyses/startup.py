@@ -33,7 +33,9 @@ from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.results.history import History
 
 Real = NDArray[np.float64]
-Outcome = Literal["reached", "captured", "short", "not started", "unfinished", "stopped", "followed"]
+Outcome = Literal[
+    "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
+]
 POWER_FACTOR = 4.0
 START_SECONDS, COAST_SECONDS = 60.0, 600.0
 MOST_SECONDS = 3600.0
@@ -251,9 +253,7 @@ def coast_down(
     return _judged(machine, shaft, omega, history)
 
 
-def default_drive(
-    machine: Machine, speed: float | None, method: RungeKutta | None = None
-) -> Drive:
+def default_drive(machine: Machine, speed: float | None, method: RungeKutta | None = None) -> Drive:
     """A plausible drive for a screen whose drive is not known; what it assumes stands in it.
 
     The rated power is four times what the dampers take at working speed: starting asks for more
@@ -303,12 +303,11 @@ def _steady(done: list[Stretch]) -> bool:
     return bool(abs(spans[0] / spans[1] - 1.0) < STEADY)
 
 
-def _judged(
-    machine: Machine, drive: Drive | SpeedProfile, speed: float, history: History
-) -> RunUp:
+def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history: History) -> RunUp:
     frequencies = _natural_frequencies(machine)
     final = turn_means(history, history.angle, LAST_TURNS)
-    final = float(history.omega[-1]) if math.isnan(final) else final
+    if math.isnan(final) or isinstance(drive, SpeedProfile):
+        final = float(history.omega[-1])
     outcome, near = _outcome(drive, speed, final, history, frequencies)
     steady = outcome in {"reached", "captured", "short"}
     return RunUp(

@@ -153,8 +153,10 @@ def turn_means(history: History, values: Real, turns: int) -> float:
     if begin < history.angle[0]:
         return float("nan")
     row = int(np.searchsorted(history.angle, begin))
-    t, total = (float(np.interp(begin, history.angle[row - 1 : row + 1], y[row - 1 : row + 1]))
-                for y in (history.t, values))
+    t, total = (
+        float(np.interp(begin, history.angle[row - 1 : row + 1], y[row - 1 : row + 1]))
+        for y in (history.t, values)
+    )
     return float((values[-1] - total) / (history.t[-1] - t))
 
 

@@ -7,11 +7,13 @@ from functools import singledispatch
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
+from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.figures.transient import run_up_figure
 from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
 
@@ -23,7 +25,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a linear response, an operating region or an assessment.
+        A branch, an orbit, a linear response, an operating region, an assessment, a start or
+        a coast-down.
 
     Returns
     -------
@@ -63,3 +66,8 @@ def _(result: OperatingRegion) -> Figure:
 @figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@figure.register
+def _(result: RunUp) -> Figure:
+    return run_up_figure(result)

@@ -14,7 +14,9 @@ import numpy as np
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import branch_from
+from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError, StoreError
+from flipflow.io.run_up import run_up_document
 from flipflow.results.branch import Branch
 from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
 from flipflow.results.orbit import Orbit
@@ -32,7 +34,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit or Assessment.
+        A Branch, Orbit, Assessment or RunUp.
     path
         File to write; its ending decides the form.
 
@@ -91,7 +93,10 @@ def document_of(result: object) -> dict[str, Any]:
         return orbit_document(result)
     if isinstance(result, Assessment):
         return assessment_document(result)
-    raise InputError("result", type(result).__name__, "give a Branch, an Orbit or an Assessment")
+    if isinstance(result, RunUp):
+        return run_up_document(result)
+    remedy = "give a Branch, an Orbit, an Assessment or a RunUp"
+    raise InputError("result", type(result).__name__, remedy)
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:

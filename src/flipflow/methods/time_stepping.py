@@ -279,9 +279,7 @@ def _contact(system: MechanicalSystem) -> Contact:
     )
 
 
-def _shaft(
-    drive: Drive | None, end_speeds: tuple[float, float], acceleration: Real
-) -> Shaft:
+def _shaft(drive: Drive | None, end_speeds: tuple[float, float], acceleration: Real) -> Shaft:
     motor = None if drive is None else drive.motor
     return Shaft(
         free=int(drive is not None),

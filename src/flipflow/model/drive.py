@@ -12,10 +12,61 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
+from flipflow.model.fields import Field
 
 BREAKDOWN_RATIO, BREAKDOWN_SLIP = 2.5, 0.2
 SYNCHRONOUS_SPEED = 50.0 * math.pi
 UNBALANCE_RADIUS, FRICTION_SHARE = 0.1, 0.05
+
+# A table reads as a table: one line for the names, one for the sentence, one for the numbers.
+# fmt: off
+DRIVE_FIELDS: tuple[Field, ...] = (
+    Field(
+        "rated_power", "P", "W", "kW", "drive.rated_power",
+        "Rated power of the motor, or of all motors together.",
+        lower_open=True, plausible=(100.0, 1e6),
+        example="5.5 kW",
+    ),
+    Field(
+        "synchronous_speed", "Omega_s", "rad/s", "rpm", "drive.synchronous_speed",
+        "Speed of the motor's field; left out, 1500 rpm is assumed.",
+        lower_open=True, default=None, plausible=(40.0, 400.0),
+        example="1500 rpm",
+    ),
+    Field(
+        "breakdown_ratio", "Tb/Tr", "", "", "drive.breakdown_torque_ratio",
+        "Largest torque of the motor over its rated torque; left out, 2.5 is assumed.",
+        lower=1.0, lower_open=True, default=None, plausible=(1.2, 6.0),
+        example=2.5,
+    ),
+    Field(
+        "breakdown_slip", "s_b", "", "%", "drive.breakdown_slip",
+        "Slip of the motor at its largest torque; left out, 20 % is assumed.",
+        lower_open=True, upper=0.99, default=None, plausible=(0.02, 0.6),
+        example="20 %",
+    ),
+    Field(
+        "ratio", "i", "", "", "drive.ratio",
+        "Speed of the motor over that of the shaft; left out, such that the motor has its rated "
+        "speed at working speed.",
+        lower_open=True, default=None, plausible=(0.2, 10.0),
+        example=1.7,
+    ),
+    Field(
+        "inertia", "J", "kg m^2", "kg m^2", "drive.inertia",
+        "Moment of inertia at the shaft: unbalances, shafts, pulleys, and the rotor times the "
+        "ratio squared; left out, twice that of the unbalance at 100 mm is assumed.",
+        lower_open=True, default=None, plausible=(1e-4, 1e3),
+        example="0.9 kg m^2",
+    ),
+    Field(
+        "friction", "T_f", "N m", "N m", "drive.friction",
+        "Friction torque at the shaft; left out, 5 % of the rated torque is assumed.",
+        default=None, plausible=(0.0, 1e3),
+        example="3 N m",
+    ),
+)
+# fmt: on
 
 
 @dataclass(frozen=True, kw_only=True)
