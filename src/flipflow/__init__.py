@@ -18,6 +18,8 @@ _HOME = {
     "linear_response": "flipflow.analyses.linear",
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
+    "start_up": "flipflow.analyses.startup",
+    "coast_down": "flipflow.analyses.startup",
     "assess": "flipflow.analyses.assessment",
     "simulate": "flipflow.analyses.simulate",
     "sweep": "flipflow.analyses.sweep",
@@ -32,6 +34,9 @@ _HOME = {
     "Lump": "flipflow.model.disturbance",
     "InputError": "flipflow.errors",
     "Load": "flipflow.model.screen",
+    "Motor": "flipflow.model.drive",
+    "Drive": "flipflow.model.drive",
+    "SpeedProfile": "flipflow.model.drive",
     "Limits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
@@ -50,6 +55,8 @@ if TYPE_CHECKING:
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.analyses.simulate import simulate as simulate
+    from flipflow.analyses.startup import coast_down as coast_down
+    from flipflow.analyses.startup import start_up as start_up
     from flipflow.analyses.sweep import sweep as sweep
     from flipflow.errors import InputError as InputError
     from flipflow.figures.dispatch import figure as figure
@@ -62,6 +69,9 @@ if TYPE_CHECKING:
     from flipflow.model.disturbance import Impulse as Impulse
     from flipflow.model.disturbance import LoadStep as LoadStep
     from flipflow.model.disturbance import Lump as Lump
+    from flipflow.model.drive import Drive as Drive
+    from flipflow.model.drive import Motor as Motor
+    from flipflow.model.drive import SpeedProfile as SpeedProfile
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.elements import HarmonicForce as HarmonicForce
     from flipflow.model.elements import Unbalance as Unbalance

@@ -14,6 +14,7 @@ from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
 from flipflow.cli.schema import schema
 from flipflow.cli.simulate import simulate
+from flipflow.cli.startup import startup
 from flipflow.cli.sweep import sweep
 from flipflow.errors import FlipflowError
 
@@ -26,7 +27,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (analyze, check, new, schema, simulate, sweep, orbits):
+COMMANDS = (analyze, check, new, schema, simulate, sweep, orbits, startup)
+for command in COMMANDS:
     app.command()(command)
 
 

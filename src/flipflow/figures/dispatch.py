@@ -7,6 +7,7 @@ from functools import singledispatch
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
+from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
 from flipflow.figures.history import history_figure
@@ -14,6 +15,7 @@ from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
 from flipflow.figures.sweep import sweep_figure
+from flipflow.figures.transient import run_up_figure
 from flipflow.results.branch import Branch
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
@@ -27,8 +29,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a motion over time, a sweep, a linear response, an operating region or
-        an assessment.
+        A branch, an orbit, a motion over time, a sweep, a start or coast-down, a linear response,
+        an operating region or an assessment.
 
     Returns
     -------
@@ -78,3 +80,8 @@ def _(result: Sweep) -> Figure:
 @figure.register
 def _(result: History) -> Figure:
     return history_figure(result)
+
+
+@figure.register
+def _(result: RunUp) -> Figure:
+    return run_up_figure(result)

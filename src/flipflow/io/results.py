@@ -15,7 +15,9 @@ import numpy as np
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import branch_from
+from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError, StoreError
+from flipflow.io.run_up import run_up_document
 from flipflow.results.branch import Branch
 from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
 from flipflow.results.history import History
@@ -36,7 +38,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit, History, Sweep or Assessment.
+        A Branch, Orbit, History, Sweep, RunUp or Assessment.
     path
         File to write; its ending decides the form.
 
@@ -98,6 +100,7 @@ document_of.register(Branch, branch_document)
 document_of.register(Orbit, orbit_document)
 document_of.register(History, history_document)
 document_of.register(Sweep, sweep_document)
+document_of.register(RunUp, run_up_document)
 
 
 @document_of.register(Assessment)
