@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flipflow.errors import InputError
 from flipflow.figures.curves import Curve
-from flipflow.figures.palette import case_colour, case_symbol
+from flipflow.figures.palette import case_colour
 from flipflow.figures.parts import Axis, Figure, Panel, Trace
 from flipflow.figures.response import coordinates, curve_traces, label, speed_axis
 from flipflow.figures.scales import HZ, MM, RPM
@@ -17,6 +17,7 @@ from flipflow.model.system import Coordinate
 from flipflow.results.branch import Branch
 from flipflow.results.sweep import Sweep
 
+SYMBOLS = ("circle-open", "square-open", "cross", "diamond", "triangle")
 Real = NDArray[np.float64]
 
 
@@ -75,6 +76,6 @@ def _swept(sweep: Sweep, which: Coordinate, k: int) -> Iterator[Trace]:
         omega = sweep.omega[rows]
         yield Trace(
             f"speed {way}" + (f", {word}" if word else ""), omega * RPM, amplitude[rows], "point",
-            case_colour(k), symbol=case_symbol(k + int(count) - 1),
+            case_colour(k), symbol=SYMBOLS[(2 * (k - 1) + max(int(count) - 1, 0)) % len(SYMBOLS)],
             x_also=(("Hz", omega * HZ), ("rad/s", omega)),
         )  # fmt: skip
