@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.errors import IncompleteError
+from flipflow.methods.balance import BalanceSolver
+from flipflow.methods.confirm import ExactBeside, unconfirmed_note
 from flipflow.methods.solver import Point, Real, Solver, Traced
-from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker
+from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
 SHARE_TOLERANCE = 1e-10
 DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
@@ -65,8 +67,48 @@ def find_special_points(
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
-    kept = [one for one in found if _is_real(one)]
-    return sorted(kept, key=lambda one: (one.index, one.share)), notes
+    kept = sorted(
+        (one for one in found if _is_real(one)), key=lambda one: (one.index, one.share)
+    )
+    if isinstance(solver, BalanceSolver):
+        side = saddle_side(traced.tangent[:, -1], eigenvalues)
+        return _confirmed(ExactBeside(solver, traced), kept, notes, side)
+    return kept, notes
+
+
+def _confirmed(
+    beside: ExactBeside, found: list[Found], notes: list[str], side: NDArray[np.bool_]
+) -> tuple[list[Found], list[str]]:
+    """Special points of a series that the exact motions beside it show; notes of the others."""
+    positions = [one.index + one.share for one in found]
+    shown = [True] * len(found)
+    for kind, test in _TEST.items():
+        ours = [i for i, one in enumerate(found) if one.kind == kind]
+        ends = np.array([-1.0, *(positions[i] for i in ours), beside.traced.omega.size])
+        for i, room in zip(ours, np.minimum(ends[1:-1] - ends[:-2], ends[2:] - ends[1:-1]), strict=True):
+            shown[i] = beside.crosses(positions[i], float(room), test)
+    folds = [i for i, one in enumerate(found) if one.kind == FOLD]
+    for i, is_shown in zip(folds, beside.folds_shown([positions[i] for i in folds], side), strict=True):
+        shown[i] = is_shown
+    for kind in STABILITY_CHANGES:
+        omegas = [one.point.omega for i, one in enumerate(found) if one.kind == kind and not shown[i]]
+        notes += [unconfirmed_note(kind, omegas)] if omegas else []
+    return [one for i, one in enumerate(found) if shown[i]], notes
+
+
+def _minus_one_test(point: Point) -> float:
+    return float(determinant_plus(point.return_map))
+
+
+def _neimark_sacker_test(point: Point) -> float:
+    return float(neimark_sacker(point.eigenvalues))
+
+
+_TEST: dict[str, Callable[[Point], float]] = {
+    SYMMETRY: _minus_one_test,
+    DOUBLING: _minus_one_test,
+    NEIMARK_SACKER: _neimark_sacker_test,
+}
 
 
 def _map_tests(
@@ -76,14 +118,8 @@ def _map_tests(
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
         _Test(FOLD, fold, lambda point: point.omega_tangent),
-        _Test(
-            kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))
-        ),
-        _Test(
-            NEIMARK_SACKER,
-            neimark_sacker(eigenvalues),
-            lambda point: float(neimark_sacker(point.eigenvalues)),
-        ),
+        _Test(kind, determinant_plus(maps), _minus_one_test),
+        _Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
     ]
 
 
