@@ -61,8 +61,9 @@ def find_special_points(
     """All special points in branch order, and a sentence for each that could not be refined."""
     found: list[Found] = []
     notes: list[str] = []
+    arc = _arc(traced)
     for test in [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]:
-        for p, low, high in _brackets(solver, traced, test, notes):
+        for p, low, high in _brackets(solver, traced, test, arc, notes):
             try:
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
@@ -145,23 +146,52 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
 
 
 def _brackets(
-    solver: Solver, traced: Traced, test: _Test, notes: list[str]
+    solver: Solver, traced: Traced, test: _Test, arc: Real, notes: list[str]
 ) -> list[tuple[int, float, float]]:
     """Steps (p, low share, high share) within which the test changes sign."""
     values = test.values
     sign = np.sign(values)
     brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
-    for p in _dips(values):
-        for start in (p - 1, p):
+    suspects = [(p - 1, p) for p in _dips(values)]
+    if test.kind in (FOLD, SYMMETRY, DOUBLING):
+        suspects += [(p,) for p in _plunges(values, arc, traced.signature)]
+    settled: set[int] = set()
+    for steps in suspects:
+        for start in steps:
+            if start in settled:
+                break
             try:
-                bottom = _bottom(solver, traced, test, start, float(sign[p]))
+                bottom = _bottom(solver, traced, test, start, plunges=len(steps) == 1)
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
                 continue
             if bottom is not None:
                 brackets += [(start, 0.0, bottom), (start, bottom, 1.0)]
+                settled.add(start)
                 break
     return brackets
+
+
+def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> list[int]:
+    """Steps with contact and no change of sign which the slope at one end carries the test across.
+
+    A motion without contact has the eigenvalues of the linear machine, all within the circle.
+    """
+    slope = np.diff(values) / np.diff(arc)
+    step = np.diff(arc)[1:-1]
+    first, last = values[1:-2], values[2:-1]
+    ahead, behind = first + slope[:-2] * step, last - slope[2:] * step
+    over = (first * last > 0.0) & ((ahead * first < 0.0) | (behind * last < 0.0))
+    touches = (signature[1:-2] != 0) | (signature[2:-1] != 0)
+    return [int(p) + 1 for p in np.flatnonzero(over & touches)]
+
+
+def _arc(traced: Traced) -> Real:
+    """Length along the branch at its points, in steps."""
+    size = np.abs(traced.u).max(axis=0, initial=0.0) * traced.course.u_step
+    shape = traced.u / np.where(size > 0.0, size, 1.0)
+    scaled = np.column_stack([shape, traced.omega / traced.course.omega_step])
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1))])
 
 
 def _dips(values: Real) -> list[int]:
@@ -181,12 +211,21 @@ def _dips(values: Real) -> list[int]:
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
-def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) -> float | None:
-    """Share in step p where the test has the other sign, None when it never has."""
+def _bottom(
+    solver: Solver, traced: Traced, test: _Test, p: int, *, plunges: bool
+) -> float | None:
+    """Share in step p where the test has the other sign, None when it never has.
+
+    A plunge that has ended halfway, no lower than the ends, goes no further.
+    """
+    ends = np.abs(test.values[p : p + 2])
+    sign = float(np.sign(test.values[p]))
 
     def height(share: float) -> float:
         return sign * test.evaluate(solver.between(traced, p, share))
 
+    if plunges and height(0.5) > ends.min():
+        return None
     best = minimize_scalar(
         height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": BOTTOM_STEPS}
     )
