@@ -5,7 +5,8 @@ back where the exact motion does not, and the exact motion that Newton reaches f
 now another. A fold of the series is one of the machine when the exact motions before and after it,
 up to the next folds of the series, lie on opposite sides of an eigenvalue +1, and on the sides
 that the number of folds passed tells. Any other special point is one when the exact branch, taken
-between exact motions on both sides of it, has a zero of the test function.
+between exact motions on both sides of it, has a zero of the test function. Beside a fold, where
+there is no exact motion at the speed of the series, the exact branch is followed past it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +25,12 @@ from flipflow.kernels import status
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.scratch import new_branch
-from flipflow.methods.solver import Point, Traced
+from flipflow.methods.solver import Point, Real, Traced
 
 BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
-REACH = 16
+FEW = 4
+FOLLOWED = (1.0, 4.0)
+EDGE = 1e-6
 ZERO = 1e-3
 LISTED = 8
 
@@ -58,11 +62,35 @@ class ExactBeside:
     def crosses(self, position: float, room: float, test: Callable[[Point], float]) -> bool:
         """Whether the exact branch has a zero of a test less than ``room`` steps off a position."""
         for share in BESIDE:
-            sides = [
-                self.at(position + sign * share) for sign in (-1.0, 1.0) if share < 0.5 * room
-            ]
+            sides = [self.at(position + sign * share) for sign in (-1.0, 1.0) if share < 0.5 * room]
             ends = [side for side in sides if side is not None]
-            if len(ends) == 2 and self._zero_between(ends[0], ends[1], test):  # noqa: PLR2004
+            if len(ends) == 2 and self._zero_between(ends[0], ends[1], test):
+                return True
+        return False
+
+    def passes(self, position: float, room: float, test: Callable[[Traced, Real], Real]) -> bool:
+        """Whether the exact branch, followed past a position, has a zero of a test there.
+
+        It is followed by its own arc length from an exact motion behind the position over the
+        speeds of the series up to as far ahead: past folds, where no exact motion has the speed
+        of the series.
+        """
+        omega, course = self.traced.omega, self.traced.course
+        for steps in FOLLOWED:
+            begin = self.at(position - min(steps, 0.5 * room))
+            if begin is None:
+                continue
+            first, last = max(int(position - steps), 0), int(position + steps) + 2
+            speeds = np.append(omega[first:last], begin.omega)
+            low, high = float(speeds.min()), float(speeds.max())
+            direction = float(np.sign(self.traced.tangent[int(position - steps), -1]))
+            window = course._replace(
+                lower=low - EDGE * low, upper=high + EDGE * high, direction=direction
+            )
+            followed = self.exact.trace(begin.u, begin.omega, window)
+            maps = self.exact.return_maps(followed.u, followed.omega, followed.jacobian)
+            values = test(followed, maps)
+            if np.any(values[1:] * values[:-1] < 0.0):
                 return True
         return False
 
@@ -88,32 +116,31 @@ class ExactBeside:
         except IncompleteError:
             return False
 
-    def folds_shown(self, positions: Sequence[float], side: NDArray[np.bool_]) -> list[bool]:
+    def folds_shown(self, positions: Real, side: NDArray[np.bool_]) -> list[bool]:
         """Which folds of the series at given positions the exact motions show.
 
         ``side`` tells for each point of the branch whether an odd number of eigenvalues should
         lie beyond +1.
         """
         ends = [0, *(int(position) + 1 for position in positions), side.size]
-        shown = [
-            self._is_on_side(first, last, side)
-            for first, last in zip(ends[:-1], ends[1:], strict=True)
-        ]
-        return [before and after for before, after in zip(shown[:-1], shown[1:], strict=True)]
+        shown = [self._is_on_side(first, last, side) for first, last in pairwise(ends)]
+        return [before and after for before, after in pairwise(shown)]
 
     def _is_on_side(self, first: int, last: int, side: NDArray[np.bool_]) -> bool:
         """Whether an exact motion beside points first ... last - 1 has the parity it should."""
         points = np.arange(first, last)
-        near = np.minimum(points - first, last - 1 - points)
-        order = np.argsort(near, kind="stable")
-        for begin in range(0, points.size, 2 * REACH):
-            some = np.sort(points[order[begin : begin + 2 * REACH]])
+        ends = np.minimum(points - first, last - 1 - points)
+        inmost = points[np.argsort(-ends, kind="stable")]
+        begin, count = 0, FEW
+        while begin < points.size:
+            some = np.sort(inmost[begin : begin + count])
             u, omega = self.traced.u[some], self.traced.omega[some]
             maps, distance = self.solver.corrected_maps(u, omega)
             known = np.isfinite(distance)
             beyond = np.linalg.det(np.eye(maps.shape[-1]) - maps[known]) < 0.0
             if np.any(beyond == side[some][known]):
                 return True
+            begin, count = begin + count, 4 * count
         return False
 
 

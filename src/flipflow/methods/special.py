@@ -19,7 +19,7 @@ from scipy.optimize import brentq, minimize_scalar
 from flipflow.errors import IncompleteError
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.confirm import ExactBeside, unconfirmed_note
-from flipflow.methods.solver import Point, Real, Solver, Traced
+from flipflow.methods.solver import Point, Real, Solver, Traced, eigenvalues_of
 from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
 SHARE_TOLERANCE = 1e-10
@@ -68,9 +68,7 @@ def find_special_points(
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
-    kept = sorted(
-        (one for one in found if _is_real(one)), key=lambda one: (one.index, one.share)
-    )
+    kept = sorted((one for one in found if _is_real(one)), key=lambda one: (one.index, one.share))
     if isinstance(solver, BalanceSolver):
         side = saddle_side(traced.tangent[:, -1], eigenvalues)
         return _confirmed(ExactBeside(solver, traced), kept, notes, side)
@@ -81,20 +79,27 @@ def _confirmed(
     beside: ExactBeside, found: list[Found], notes: list[str], side: NDArray[np.bool_]
 ) -> tuple[list[Found], list[str]]:
     """Special points of a series that the exact motions beside it show; notes of the others."""
-    positions = [one.index + one.share for one in found]
-    shown = [True] * len(found)
-    for kind, test in _TEST.items():
-        ours = [i for i, one in enumerate(found) if one.kind == kind]
-        ends = np.array([-1.0, *(positions[i] for i in ours), beside.traced.omega.size])
-        for i, room in zip(ours, np.minimum(ends[1:-1] - ends[:-2], ends[2:] - ends[1:-1]), strict=True):
-            shown[i] = beside.crosses(positions[i], float(room), test)
-    folds = [i for i, one in enumerate(found) if one.kind == FOLD]
-    for i, is_shown in zip(folds, beside.folds_shown([positions[i] for i in folds], side), strict=True):
-        shown[i] = is_shown
+    positions = np.array([one.index + one.share for one in found])
+    shown = np.ones(len(found), dtype=bool)
     for kind in STABILITY_CHANGES:
-        omegas = [one.point.omega for i, one in enumerate(found) if one.kind == kind and not shown[i]]
+        ours = np.flatnonzero([one.kind == kind for one in found])
+        if not ours.size:
+            continue
+        ends = np.array([-1.0, *positions[ours], beside.traced.omega.size])
+        room = np.minimum(ends[1:-1] - ends[:-2], ends[2:] - ends[1:-1])
+        shown[ours] = (
+            beside.folds_shown(positions[ours], side)
+            if kind == FOLD
+            else [
+                beside.crosses(*at, _TEST[kind]) for at in zip(positions[ours], room, strict=True)
+            ]
+        )
+        if kind in _ALONG:
+            for i, steps in zip(ours, room, strict=True):
+                shown[i] = shown[i] or beside.passes(positions[i], steps, _ALONG[kind])
+        omegas = [found[i].point.omega for i in ours if not shown[i]]
         notes += [unconfirmed_note(kind, omegas)] if omegas else []
-    return [one for i, one in enumerate(found) if shown[i]], notes
+    return [one for one, kept in zip(found, shown, strict=True) if kept], notes
 
 
 def _minus_one_test(point: Point) -> float:
@@ -105,6 +110,19 @@ def _neimark_sacker_test(point: Point) -> float:
     return float(neimark_sacker(point.eigenvalues))
 
 
+def _fold_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
+    return traced.tangent[:, -1]
+
+
+def _neimark_sacker_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
+    return neimark_sacker(eigenvalues_of(maps))
+
+
+# Both stand where a branch turns, and where no exact motion has the speed of the series.
+_ALONG: dict[str, Callable[[Traced, Real], Real]] = {
+    FOLD: _fold_along,
+    NEIMARK_SACKER: _neimark_sacker_along,
+}
 _TEST: dict[str, Callable[[Point], float]] = {
     SYMMETRY: _minus_one_test,
     DOUBLING: _minus_one_test,
@@ -152,7 +170,7 @@ def _brackets(
     values = test.values
     sign = np.sign(values)
     brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
-    suspects = [(p - 1, p) for p in _dips(values)]
+    suspects: list[tuple[int, ...]] = [(p - 1, p) for p in _dips(values)]
     if test.kind in (FOLD, SYMMETRY, DOUBLING):
         suspects += [(p,) for p in _plunges(values, arc, traced.signature)]
     settled: set[int] = set()
@@ -211,9 +229,7 @@ def _dips(values: Real) -> list[int]:
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
-def _bottom(
-    solver: Solver, traced: Traced, test: _Test, p: int, *, plunges: bool
-) -> float | None:
+def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, *, plunges: bool) -> float | None:
     """Share in step p where the test has the other sign, None when it never has.
 
     A plunge that has ended halfway, no lower than the ends, goes no further.
