@@ -23,6 +23,7 @@ _HOME = {
     "assess": "flipflow.analyses.assessment",
     "simulate": "flipflow.analyses.simulate",
     "sweep": "flipflow.analyses.sweep",
+    "ramp": "flipflow.analyses.ramp",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.analyses.ramp import ramp as ramp
     from flipflow.analyses.simulate import simulate as simulate
     from flipflow.analyses.startup import coast_down as coast_down
     from flipflow.analyses.startup import start_up as start_up

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -94,3 +96,30 @@ def test_without_damping_nothing_settles(screen) -> None:
     bare = screen.replace(isolation_damping=0.0, shear_damping=0.0)
     with pytest.raises(ff.InputError, match="damping"):
         ff.sweep(bare, [100.0])
+
+
+def test_a_gliding_speed_jumps_late_by_the_two_thirds_power_of_its_rate(screen) -> None:
+    """Passing a saddle-node at rate r loses the motion about r^(2/3) late (Jung et al. 1990)."""
+    rates = (0.5, 2.0, 8.0)
+    late = []
+    for rate in rates:
+        glide = ff.ramp(screen, (195.0, 218.0), rate)
+        assert [jump.fold for jump in glide.jumps] == pytest.approx([FOLD_UP], abs=1e-5)
+        late.append(glide.jumps[0].late)
+    power = np.polyfit(np.log(rates), np.log(late), 1)[0]
+    assert power == pytest.approx(2.0 / 3.0, abs=0.08), late
+
+
+def test_a_falling_speed_jumps_late_beyond_the_other_fold(screen) -> None:
+    glide = ff.ramp(screen, (215.0, 190.0), 2.0)
+    assert [jump.fold for jump in glide.jumps] == pytest.approx([FOLD_DOWN], abs=1e-5)
+    assert glide.jumps[0].omega < FOLD_DOWN
+
+
+@pytest.mark.parametrize(
+    ("omega", "rate", "field"),
+    [((100.0, 200.0), 0.0, "rate"), ((100.0, 200.0), math.nan, "rate"), ((0.0, 9.0), 1.0, "omega")],
+)
+def test_bad_glides_are_refused(screen, omega, rate, field) -> None:
+    with pytest.raises(ff.InputError, match=field):
+        ff.ramp(screen, omega, rate)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.console import Console
 
+    from flipflow.analyses.ramp import Ramp
     from flipflow.figures.parts import Figure
     from flipflow.model.project import Project
     from flipflow.results.sweep import Sweep
@@ -27,6 +28,10 @@ def sweep(
         typer.Option("--speeds", metavar="LOW HIGH", help='From and to: "300 rpm" "40 Hz".'),
     ],
     steps: Annotated[int, typer.Option("--steps", metavar="N", help="Speeds to settle at.")] = 100,
+    rate: Annotated[
+        float | None,
+        typer.Option("--rate", metavar="RPM/S", help="Glide at this rate, too: how late it jumps."),
+    ] = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
@@ -42,13 +47,19 @@ def sweep(
     if output is not None:
         prepare_folder(output)
     up, down = _swept(project, omega)
+    glides = () if rate is None else _glides(project, omega, rate)
     if json is not None:
         both = {"up": sweep_document(up), "down": sweep_document(down)}
-        write_json({"schema": "flipflow/sweeps/1", "name": project.name, **both}, json)
+        late = [vars(jump) for glide in glides for jump in glide.jumps]
+        document = {"schema": "flipflow/sweeps/1", "name": project.name, **both, "late": late}
+        write_json(document, json)
     if output is not None:
         _figure(project, up, down).write(output / "sweep.html")
     if json != "-":
-        _show(project, up, down, console())
+        out = console()
+        _show(project, up, down, out)
+        for glide in glides:
+            _show_glide(glide, out)
 
 
 def _grid(speeds: tuple[str, str], steps: int) -> np.ndarray:
@@ -76,6 +87,30 @@ def _swept(project: Project, omega: np.ndarray) -> tuple[Sweep, Sweep]:
             monitor=lambda s, share: tell(s, 0.5 + 0.5 * share),
         )  # fmt: skip
     return up, down
+
+
+def _glides(project: Project, omega: np.ndarray, rate: float) -> tuple[Ramp, Ramp]:
+    from flipflow.analyses.ramp import ramp  # noqa: PLC0415  keeps --help quick
+
+    ends = float(omega[0]), float(omega[-1])
+    with progress("gliding; the first run of a version compiles") as tell:
+        up = ramp(project.screen, ends, rate / RPM, lambda s, share: tell(s, 0.5 * share))
+        down = ramp(
+            project.screen, ends[::-1], rate / RPM, lambda s, share: tell(s, 0.5 + 0.5 * share)
+        )
+    return up, down
+
+
+def _show_glide(glide: Ramp, out: Console) -> None:
+    word = "rising" if glide.rate > 0.0 else "falling"
+    out.print(f"Speed {word} by {abs(glide.rate) * RPM:.4g} rpm/s:")
+    for jump in glide.jumps:
+        out.print(
+            f"  jumps at {jump.omega * RPM:.5g} rpm, {jump.late * RPM:.3g} rpm beyond the speed "
+            f"at which the motion ends ({jump.fold * RPM:.5g} rpm)"
+        )
+    if not glide.jumps:
+        out.print("  no jump")
 
 
 def _figure(project: Project, up: Sweep, down: Sweep) -> Figure:
