@@ -19,6 +19,9 @@ _HOME = {
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "assess": "flipflow.analyses.assessment",
+    "sensitivity": "flipflow.analyses.sensitivity",
+    "Choice": "flipflow.model.vary",
+    "Normal": "flipflow.model.vary",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.analyses.sensitivity import sensitivity as sensitivity
     from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
@@ -58,6 +62,8 @@ if TYPE_CHECKING:
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
+    from flipflow.model.vary import Choice as Choice
+    from flipflow.model.vary import Normal as Normal
 
 
 def __getattr__(name: str) -> object:

@@ -15,7 +15,9 @@ from flipflow.methods.sobol import saltelli_sample, sobol_indices
 def ishigami(u):
     """Ishigami's function with a = 7, b = 0.1 at points of the unit cube, (..., 3)."""
     x = np.pi * (2.0 * u - 1.0)
-    return np.sin(x[..., 0]) + 7.0 * np.sin(x[..., 1]) ** 2 + 0.1 * x[..., 2] ** 4 * np.sin(x[..., 0])
+    return (
+        np.sin(x[..., 0]) + 7.0 * np.sin(x[..., 1]) ** 2 + 0.1 * x[..., 2] ** 4 * np.sin(x[..., 0])
+    )
 
 
 @pytest.fixture(scope="module")

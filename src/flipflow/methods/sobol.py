@@ -95,12 +95,11 @@ def sobol_indices(values: Real, rng: np.random.Generator) -> SobolIndices:
     """
     n, rows, outputs = values.shape
     whole = np.isfinite(values).all(axis=1)
-    found = SobolIndices(
-        *(np.full((outputs, rows - 2), np.nan) for _ in range(4)),
-        *(np.full(outputs, np.nan) for _ in range(2)),
-        groups=whole.sum(axis=0),
-        constant=np.zeros(outputs, dtype=bool),
-    )
+    first, total, first_width, total_width = np.full((4, outputs, rows - 2), np.nan)
+    mean, variance = np.full((2, outputs), np.nan)
+    still = np.zeros(outputs, dtype=bool)
+    groups = whole.sum(axis=0)
+    found = SobolIndices(first, total, first_width, total_width, mean, variance, groups, still)
     drawn = rng.integers(n, size=(n, RESAMPLES))
     counts = np.stack([np.bincount(column, minlength=n) for column in drawn.T])
     masks, owner = np.unique(whole, axis=1, return_inverse=True)

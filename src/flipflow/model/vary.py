@@ -180,14 +180,6 @@ def variations(vary: Vary, screen: FlipFlowScreen) -> tuple[Variation, ...]:
     return tuple(_variation(name, given, screen) for name, given in vary.items())
 
 
-def changed(screen: FlipFlowScreen, names: tuple[str, ...], row: tuple[object, ...]) -> object:
-    """The screen with a row of drawn values, None where physics forbids one of them."""
-    try:
-        return screen.replace(**dict(zip(names, row, strict=True)))
-    except InputError:
-        return None
-
-
 def _variation(name: str, given: object, screen: FlipFlowScreen) -> Variation:
     if name not in FIELD and name != LAW:
         raise InputError("vary", name, f"choose fields of {', '.join([*FIELD, LAW])}")
@@ -209,7 +201,7 @@ def _distribution(name: str, given: object) -> Distribution:
     if isinstance(given, np.ndarray):
         if given.ndim != 1 or given.size < 2 or given.dtype.kind not in "iuf":
             raise InputError(field, given, "give an array of at least two numbers, shape (n,)")
-        return Choice(tuple(float(value) for value in given))
+        return Choice(tuple(sorted(float(value) for value in given)))
     if not isinstance(given, (tuple, list)) or len(given) != 2 or not all(map(_is_number, given)):
         raise InputError(field, given, REMEDY)
     low, high = (float(value) for value in given)
