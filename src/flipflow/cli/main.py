@@ -12,6 +12,7 @@ from flipflow.cli.analyze import analyze
 from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.schema import schema
+from flipflow.cli.sensitivity import sensitivity
 from flipflow.errors import FlipflowError
 
 app = typer.Typer(
@@ -23,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (analyze, check, new, schema):
+for command in (analyze, check, new, schema, sensitivity):
     app.command()(command)
 
 

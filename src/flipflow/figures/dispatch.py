@@ -12,8 +12,10 @@ from flipflow.figures.bars import region_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.figures.sensitivity import sensitivity_figure
 from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
+from flipflow.results.sensitivity import Sensitivity
 
 
 @singledispatch
@@ -23,7 +25,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a linear response, an operating region or an assessment.
+        A branch, an orbit, a linear response, an operating region, an assessment or a
+        sensitivity.
 
     Returns
     -------
@@ -63,3 +66,8 @@ def _(result: OperatingRegion) -> Figure:
 @figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@figure.register
+def _(result: Sensitivity) -> Figure:
+    return sensitivity_figure(result)

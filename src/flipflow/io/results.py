@@ -18,6 +18,12 @@ from flipflow.errors import InputError, StoreError
 from flipflow.results.branch import Branch
 from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
 from flipflow.results.orbit import Orbit
+from flipflow.results.sensitivity import (
+    SENSITIVITY,
+    Sensitivity,
+    sensitivity_document,
+    sensitivity_from,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -32,7 +38,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit or Assessment.
+        A Branch, Orbit, Assessment or Sensitivity.
     path
         File to write; its ending decides the form.
 
@@ -55,8 +61,8 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         )  # fmt: skip
 
 
-def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
-    """Open what :func:`save` wrote as JSON: a branch as a Branch, other documents as they are.
+def open_result(path: str | os.PathLike[str]) -> Branch | Sensitivity | dict[str, Any]:
+    """Open what :func:`save` wrote as JSON: branches and sensitivities as such, others as they are.
 
     Raises
     ------
@@ -78,6 +84,8 @@ def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
     if not isinstance(document, dict) or not str(document.get("schema")).startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
+        if document["schema"] == SENSITIVITY:
+            return sensitivity_from(document)
         return branch_from(document) if document["schema"] == BRANCH else document
     except (KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path} is damaged: {error!r}") from None
@@ -91,7 +99,10 @@ def document_of(result: object) -> dict[str, Any]:
         return orbit_document(result)
     if isinstance(result, Assessment):
         return assessment_document(result)
-    raise InputError("result", type(result).__name__, "give a Branch, an Orbit or an Assessment")
+    if isinstance(result, Sensitivity):
+        return sensitivity_document(result)
+    known = "give a Branch, an Orbit, an Assessment or a Sensitivity"
+    raise InputError("result", type(result).__name__, known)
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
