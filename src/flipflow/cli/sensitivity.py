@@ -60,6 +60,8 @@ def sensitivity(
     from flipflow.io.vary import read_vary  # noqa: PLC0415
 
     project = load_project(file, force=force)
+    for warning in project.warnings:
+        typer.echo(f"Warning: {warning}", err=True)
     ranges = read_vary(vary or [], project.screen)
     omega = _omega(project, quantity, speed, speeds)
     if output is not None:
