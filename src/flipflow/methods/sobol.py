@@ -102,6 +102,9 @@ def sobol_indices(values: Real, rng: np.random.Generator) -> SobolIndices:
     found = SobolIndices(first, total, first_width, total_width, mean, variance, groups, still)
     drawn = rng.integers(n, size=(n, RESAMPLES))
     counts = np.stack([np.bincount(column, minlength=n) for column in drawn.T])
+    if whole.all():
+        _fill(found, np.arange(outputs), values, counts.astype(float))
+        return found
     masks, owner = np.unique(whole, axis=1, return_inverse=True)
     for k, mask in enumerate(masks.T):
         if mask.sum() >= LEAST_GROUPS:
@@ -122,7 +125,8 @@ def _fill(found: SobolIndices, columns: NDArray[np.int64], values: Real, counts:
     moving = columns[~still]
     if moving.size == 0:
         return
-    values = values[:, :, ~still]
+    if still.any():
+        values = values[:, :, ~still]
     values = (values - values.mean(axis=(0, 1))) / values.std(axis=(0, 1))
     estimators = _salib("SALib.analyze.sobol")
     A, B = values[:, 0], values[:, -1]
