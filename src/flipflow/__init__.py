@@ -24,6 +24,9 @@ _HOME = {
     "simulate": "flipflow.analyses.simulate",
     "sweep": "flipflow.analyses.sweep",
     "ramp": "flipflow.analyses.ramp",
+    "sensitivity": "flipflow.analyses.sensitivity",
+    "Choice": "flipflow.model.vary",
+    "Normal": "flipflow.model.vary",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
@@ -56,6 +59,7 @@ if TYPE_CHECKING:
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.analyses.ramp import ramp as ramp
+    from flipflow.analyses.sensitivity import sensitivity as sensitivity
     from flipflow.analyses.simulate import simulate as simulate
     from flipflow.analyses.startup import coast_down as coast_down
     from flipflow.analyses.startup import start_up as start_up
@@ -82,6 +86,8 @@ if TYPE_CHECKING:
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
+    from flipflow.model.vary import Choice as Choice
+    from flipflow.model.vary import Normal as Normal
 
 
 def __getattr__(name: str) -> object:

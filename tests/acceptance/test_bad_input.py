@@ -12,8 +12,12 @@ import pytest
 
 from flipflow.cli.main import main
 
-# Commands that read a machine file as their first argument.
-COMMANDS = ("check", "analyze")
+# Commands that read a machine file as their first argument, and what else they must be told.
+COMMANDS = {
+    "check": (),
+    "analyze": (),
+    "sensitivity": ("--vary", "floating_mass=+-5 %", "--n", "2"),
+}
 
 GOOD = (
     (Path(__file__).parents[2] / "src/flipflow/io/machines/ffs0827.toml")
@@ -26,9 +30,10 @@ GOOD = (
 def run(request, capsys, monkeypatch, tmp_path):
     """Run a command in a folder of its own; return exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
+    needed = COMMANDS[request.param]
 
     def call(file, *options):
-        monkeypatch.setattr(sys, "argv", ["flipflow", request.param, str(file), *options])
+        monkeypatch.setattr(sys, "argv", ["flipflow", request.param, str(file), *needed, *options])
         with pytest.raises(SystemExit) as ended:
             main()
         captured = capsys.readouterr()

@@ -13,6 +13,7 @@ from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
 from flipflow.cli.schema import schema
+from flipflow.cli.sensitivity import sensitivity
 from flipflow.cli.simulate import simulate
 from flipflow.cli.startup import startup
 from flipflow.cli.sweep import sweep
@@ -27,7 +28,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-COMMANDS = (analyze, check, new, schema, simulate, sweep, orbits, startup)
+COMMANDS = (analyze, check, new, schema, simulate, sweep, orbits, startup, sensitivity)
 for command in COMMANDS:
     app.command()(command)
 

@@ -14,11 +14,13 @@ from flipflow.figures.history import history_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.figures.sensitivity import sensitivity_figure
 from flipflow.figures.sweep import sweep_figure
 from flipflow.figures.transient import run_up_figure
 from flipflow.results.branch import Branch
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.sensitivity import Sensitivity
 from flipflow.results.sweep import Sweep
 
 
@@ -29,8 +31,7 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a motion over time, a sweep, a start or coast-down, a linear response,
-        an operating region or an assessment.
+        What an analysis returns: a branch, an orbit, a sweep, an assessment, ...
 
     Returns
     -------
@@ -85,3 +86,8 @@ def _(result: History) -> Figure:
 @figure.register
 def _(result: RunUp) -> Figure:
     return run_up_figure(result)
+
+
+@figure.register
+def _(result: Sensitivity) -> Figure:
+    return sensitivity_figure(result)

@@ -22,6 +22,12 @@ from flipflow.results.branch import Branch
 from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.sensitivity import (
+    SENSITIVITY,
+    Sensitivity,
+    sensitivity_document,
+    sensitivity_from,
+)
 from flipflow.results.sweep import Sweep
 from flipflow.results.time_document import history_document, sweep_document
 
@@ -38,7 +44,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit, History, Sweep, RunUp or Assessment.
+        What an analysis returns.
     path
         File to write; its ending decides the form.
 
@@ -61,8 +67,8 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         )  # fmt: skip
 
 
-def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
-    """Open what :func:`save` wrote as JSON: a branch as a Branch, other documents as they are.
+def open_result(path: str | os.PathLike[str]) -> Branch | Sensitivity | dict[str, Any]:
+    """Open what :func:`save` wrote as JSON: branches and sensitivities as such, others as they are.
 
     Raises
     ------
@@ -84,6 +90,8 @@ def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
     if not isinstance(document, dict) or not str(document.get("schema")).startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
+        if document["schema"] == SENSITIVITY:
+            return sensitivity_from(document)
         return branch_from(document) if document["schema"] == BRANCH else document
     except (KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path} is damaged: {error!r}") from None
@@ -101,6 +109,7 @@ document_of.register(Orbit, orbit_document)
 document_of.register(History, history_document)
 document_of.register(Sweep, sweep_document)
 document_of.register(RunUp, run_up_document)
+document_of.register(Sensitivity, sensitivity_document)
 
 
 @document_of.register(Assessment)

@@ -1,6 +1,11 @@
 """Reports: blocks made from results, section by section, and their renderers."""
 
-from flipflow.report import appendix, details, first_page  # noqa: F401  they register sections
+from flipflow.report import (  # noqa: F401  they register sections
+    appendix,
+    details,
+    first_page,
+    sensitivity,
+)
 from flipflow.report.html import write_html
 from flipflow.report.terminal import summary
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
-from flipflow.analyses.assessment import Assessment
 from flipflow.report.blocks import Block, Cell, Column, Note, Table, Text, Values, Verdict
 from flipflow.report.registry import blocks_of
 
@@ -25,21 +24,19 @@ STYLES = {
 }
 
 
-def summary(
-    assessment: Assessment, console: Console, files: Mapping[str, str] | None = None
-) -> None:
-    """Print the verdict, the tables of limits and cases, the allowed speeds, where files are.
+def summary(result: object, console: Console, files: Mapping[str, str] | None = None) -> None:
+    """Print the brief blocks of a result: of an assessment verdict, limits, cases, allowed speeds.
 
     Parameters
     ----------
-    assessment
-        What :func:`flipflow.assess` returns.
+    result
+        An assessment, or another result with sections of its own.
     console
         Where to print.
     files
         Paths that were written, by what they are.
     """
-    for block in blocks_of(assessment, brief=True):
+    for block in blocks_of(result, brief=True):
         _show(block, console)
     if files:
         console.print()

@@ -1,0 +1,295 @@
+"""Which field of a machine matters most to a quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow import __version__
+from flipflow.analyses.feasible import missing_words
+from flipflow.analyses.frequency_response import check_interval
+from flipflow.analyses.operating_region import Monitor, analysed_range
+from flipflow.analyses.quantities import Quantity
+from flipflow.analyses.response_quantities import ResponseQuantity, quantity_named
+from flipflow.analyses.samples import (
+    BranchWord,
+    Columns,
+    Question,
+    closed_form_values,
+    motion_values,
+    values_of,
+)
+from flipflow.errors import IncompleteError, InputError
+from flipflow.methods.sobol import LEAST_GROUPS, SobolIndices, saltelli_sample, sobol_indices
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.vary import Variation, Vary, variations
+from flipflow.results.sensitivity import Sensitivity
+
+Real = NDArray[np.float64]
+N_MOST = 2**20
+# Values held at once: all samples at as many frequencies as fit.
+BLOCK_VALUES = 2_000_000
+
+
+def sensitivity(
+    machine: FlipFlowScreen,
+    vary: Vary,
+    quantity: str,
+    omega: ArrayLike | None = None,
+    *,
+    n: int = 4096,
+    rng: int | np.random.Generator = 0,
+    threads: int | None = None,
+    monitor: Monitor | None = None,
+    branch: BranchWord = "from-below",
+) -> Sensitivity:
+    r"""Sobol indices of a quantity on fields of a screen that vary independently.
+
+    The first-order index :math:`S_i = \mathrm{Var}(E(y | x_i)) / \mathrm{Var}(y)` is the share of
+    the variance that goes away when field i is known; the total index
+    :math:`S_{Ti} = 1 - \mathrm{Var}(E(y | x_{\sim i})) / \mathrm{Var}(y)` is what remains when all
+    others are. n (D + 2) samples are drawn from Sobol's scrambled sequence in Saltelli's scheme.
+    A screen without stop is evaluated in closed form; otherwise a motion is solved for in every
+    sample. A sample without a value does not end the work: its group of D + 2 is left out, and
+    ``failed`` says how many there were.
+
+    Parameters
+    ----------
+    machine
+        The screen about which the fields vary.
+    vary
+        Fields of the screen, each with an interval (low, high), an array that is sampled as it
+        stands, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
+    quantity
+        A quantity of a motion, such as ``"relative_amplitude"`` or ``"main_frame_acceleration"``,
+        or one of the whole response: ``"peak_amplitude"``, ``"peak_frequency"``, ``"omega_ea"``,
+        ``"omega_ar"``, ``"omega_cs"``, ``"omega_lb"``, ``"omega_ub"``.
+    omega
+        Frequency in rad/s, one or (n_omega,). For a quantity of the whole response the interval
+        (low, high) analysed; None: from well below the first natural frequency of the machine to
+        well above the last with the stop engaged.
+    n
+        Groups; best a power of two.
+    rng
+        Seed or generator.
+    threads
+        Threads over chunks of samples where motions are solved for; None: one, because most of
+        the work around a motion is not free to run beside itself.
+    monitor
+        Called with a sentence and the share done, 0 to 1. What it raises ends the work.
+    branch
+        The motion that is meant where several exist: ``"from-below"`` is met when the speed is
+        raised slowly, ``"upper"`` and ``"lower"`` are the largest and the smallest relative
+        amplitude of those motions of the branch that are not unstable.
+
+    Returns
+    -------
+    Sensitivity
+        Indices (D,) for one frequency, (n_omega, D) for several, with confidence intervals.
+
+    Raises
+    ------
+    InputError
+        For an unknown field or quantity, a range that physics forbids, and data that the quantity
+        needs and the screen does not have.
+    MissingExtra
+        When SALib is not installed.
+
+    References
+    ----------
+    Saltelli and others, Computer Physics Communications 181 (2010) 259-270, for the estimators.
+    """
+    question = _question(machine, quantity, omega, branch)
+    varied = variations(vary, machine)
+    workers = _whole("threads", 1 if threads is None else threads, 1, 256)
+    groups = _whole("n", n, LEAST_GROUPS, N_MOST)
+    generator = _generator(rng)
+    nominal = _nominal(question)
+    points = saltelli_sample(len(varied), groups, generator)
+    u = points.reshape(-1, len(varied))
+    columns = {one.name: one.distribution.quantile(u[:, i]) for i, one in enumerate(varied)}
+    draws = np.random.default_rng(generator.integers(2**63)).bit_generator.state
+    blocks = [
+        _analysed(values.reshape(*points.shape[:2], -1), draws)
+        for values in _values(question, columns, nominal, workers, monitor)
+    ]
+    found, failed = _joined(blocks)
+    rows = _ends(machine, varied)
+    ends = np.concatenate(list(_values(question, rows, nominal, workers, None)), axis=1)
+    return _result(question, varied, groups, found, failed, nominal, ends, omega)
+
+
+def _question(machine: object, name: str, omega: object, branch: BranchWord) -> Question:
+    if not isinstance(machine, FlipFlowScreen):
+        raise InputError("machine", type(machine).__name__, "give a FlipFlowScreen")
+    quantity = quantity_named(name)
+    if branch not in get_args(BranchWord):
+        raise InputError("branch", branch, f"choose one of {', '.join(get_args(BranchWord))}")
+    span = analysed_range(machine)
+    if isinstance(quantity, ResponseQuantity):
+        wanted = span if omega is None else check_interval(omega)
+        return Question(machine, quantity, np.array([np.nan]), wanted, branch)
+    _require_data(machine, quantity)
+    frequencies = _frequencies(omega, name)
+    low, high = float(frequencies.min()), float(frequencies.max())
+    wide = min(span[0], 0.9 * low), max(span[1], 1.1 * high)
+    return Question(machine, quantity, frequencies, wide, branch)
+
+
+def _nominal(question: Question) -> Real:
+    """The quantity of the machine itself, (1, K); a machine that cannot be solved at all raises."""
+    try:
+        values = [list(values_of(question, question.screen))]
+    except IncompleteError:
+        values = [[None] * question.omega.size]
+    return np.array(values, dtype=float)
+
+
+def _require_data(machine: FlipFlowScreen, quantity: Quantity) -> None:
+    absent = tuple(need for need in quantity.needs if getattr(machine, need) is None)
+    if absent:
+        raise InputError("quantity", quantity.name, missing_words(absent))
+
+
+def _frequencies(omega: object, name: str) -> Real:
+    """Frequencies in rad/s, (K,)."""
+    remedy = f"give frequencies above 0 rad/s at which {name} is meant, one or (n_omega,)"
+    try:
+        found = np.atleast_1d(np.asarray(omega, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, remedy) from None
+    if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found) & (found > 0.0)):
+        raise InputError("omega", omega, remedy)
+    return found
+
+
+def _whole(name: str, value: object, least: int, most: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise InputError(name, value, "give a whole number")
+    if not least <= value <= most:
+        raise InputError(name, value, f"give a whole number from {least} to {most}")
+    return int(value)
+
+
+def _generator(rng: object) -> np.random.Generator:
+    try:
+        return np.random.default_rng(rng)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError("rng", rng, "give a whole number of at least 0, or a Generator") from None
+
+
+def _values(
+    question: Question,
+    columns: Columns,
+    nominal: Real,
+    threads: int,
+    monitor: Monitor | None,
+) -> Iterator[Real]:
+    """Values (S, K) of all samples, a block of frequencies after the other."""
+    rows = len(next(iter(columns.values())))
+
+    def tell(share: float) -> None:
+        if monitor is not None:
+            monitor(f"{question.quantity.label}: {rows} samples", share)
+
+    if not question.in_closed_form(tuple(columns)):
+        yield _near(question, motion_values(question, columns, threads, tell), nominal)
+        return
+    step = max(BLOCK_VALUES // rows, 1)
+    for begin in range(0, question.omega.size, step):
+        part = slice(begin, begin + step)
+        values = closed_form_values(question, columns, question.omega[part])
+        yield _near(question, values, nominal[:, part])
+        tell(min((begin + step) / question.omega.size, 1.0))
+
+
+def _near(question: Question, values: Real, nominal: Real) -> Real:
+    """Angles within half a turn of the machine's own, so that +pi and -pi are no distance."""
+    if question.quantity.unit != "rad":
+        return values
+    about = np.where(np.isfinite(nominal), nominal, 0.0)
+    return np.asarray(about + np.angle(np.exp(1j * (values - about))))
+
+
+def _analysed(values: Real, draws: Any) -> tuple[SobolIndices, Real]:
+    """Indices and share of failed samples of a block; all blocks draw the same resamples."""
+    generator = np.random.default_rng()
+    generator.bit_generator.state = draws
+    return sobol_indices(values, generator), 1.0 - np.isfinite(values).mean(axis=(0, 1))
+
+
+def _joined(blocks: Sequence[tuple[SobolIndices, Real]]) -> tuple[SobolIndices, Real]:
+    names = SobolIndices.__dataclass_fields__
+    tables = [np.concatenate([getattr(one, name) for one, _ in blocks]) for name in names]
+    return SobolIndices(*tables), np.concatenate([failed for _, failed in blocks])
+
+
+def _ends(machine: FlipFlowScreen, varied: Sequence[Variation]) -> Columns:
+    """Rows that change one field at a time: all low ends, then all high ends."""
+    count = len(varied)
+    columns: dict[str, NDArray[Any]] = {}
+    for i, one in enumerate(varied):
+        column = np.full(2 * count, getattr(machine, one.name), dtype=object)
+        column[i], column[count + i] = one.distribution.ends
+        columns[one.name] = column
+    return columns
+
+
+def _result(
+    question: Question,
+    varied: Sequence[Variation],
+    n: int,
+    found: SobolIndices,
+    failed: Real,
+    nominal: Real,
+    ends: Real,
+    omega: object,
+) -> Sensitivity:
+    response = isinstance(question.quantity, ResponseQuantity)
+    one = response or np.ndim(omega) == 0  # type: ignore[arg-type]
+
+    def over(table: Real) -> Any:
+        picked = table[0] if one else table
+        return float(picked) if np.ndim(picked) == 0 else picked
+
+    count = len(varied)
+    return Sensitivity(
+        screen=question.screen,
+        quantity=question.quantity.name,
+        branch=question.branch,
+        names=tuple(variation.name for variation in varied),
+        distributions=tuple(variation.distribution for variation in varied),
+        omega=question.span if response else over(question.omega),
+        n=n,
+        first_order=over(found.first_order),
+        total=over(found.total),
+        first_order_confidence=over(found.first_order_confidence),
+        total_confidence=over(found.total_confidence),
+        mean=over(found.mean),
+        variance=over(found.variance),
+        failed=over(failed),
+        nominal=over(nominal[0]),
+        at_low=over(ends[:count].T),
+        at_high=over(ends[count:].T),
+        notes=tuple(_notes(n, found, failed)),
+        version=__version__,
+    )
+
+
+def _notes(n: int, found: SobolIndices, failed: Real) -> Iterator[str]:
+    if n & (n - 1):
+        yield f"n = {n} is no power of two: the samples cover the ranges less evenly."
+    if np.any(failed > 0.0):
+        least = int(found.groups.min())
+        yield (
+            f"Up to {100.0 * failed.max():.2g} % of the samples have no finite value; the whole "
+            f"group around each is left out, and at least {least} of {n} groups remain."
+        )
+    if np.any(found.groups < LEAST_GROUPS):
+        yield "Where fewer than two groups remain no index is given."
+    if np.any(found.constant):
+        at = "" if found.constant.size == 1 else f" at {found.constant.sum()} of the frequencies"
+        yield f"The quantity does not vary{at}: its indices are zero there."

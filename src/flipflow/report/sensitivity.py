@@ -1,0 +1,107 @@
+"""What a sensitivity becomes in a report and in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from flipflow.analyses.response_quantities import REGISTRY
+from flipflow.figures.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
+from flipflow.model.fields import FIELD
+from flipflow.report.blocks import Block, Column, FigureBlock, Note, Table, Values, cells
+from flipflow.report.numbers import NOTHING, number, quantity, rpm
+from flipflow.report.registry import Part, section
+from flipflow.results.sensitivity import Sensitivity
+
+
+@section(Sensitivity, Part.DETAILS, 10, brief=True)
+def summary_of_indices(result: Sensitivity) -> Iterator[Block]:
+    """What was asked, the table of indices, and what is to be kept in mind."""
+    one = REGISTRY[result.quantity]
+    rows = [("Quantity", one.label), ("Samples", f"{result.n * (len(result.names) + 2)}")]
+    if isinstance(result.omega, float):
+        rows.append(("Speed", f"{rpm(result.omega)} rpm"))
+    if not result.over_frequency:
+        rows.append(("Nominal", quantity(float(result.nominal), one.shown_unit, one.unit)))
+    yield Values(tuple(rows))
+    yield _over_frequency(result) if result.over_frequency else _at_one(result)
+    yield from (Note(text) for text in result.notes)
+
+
+@section(Sensitivity, Part.DETAILS, 20)
+def figures_of_indices(result: Sensitivity) -> Iterator[Block]:
+    """Indices over frequency, or as bars with the tornado chart."""
+    yield FigureBlock(sensitivity_figure(result))
+
+
+def tornado(result: Sensitivity, omega: float | None = None) -> Iterator[Block]:
+    """The tornado chart as a section of another report, with the notes that belong to it.
+
+    Parameters
+    ----------
+    result
+        A sensitivity.
+    omega
+        One of its frequencies in rad/s where there are several.
+    """
+    yield FigureBlock(tornado_figure(result, omega))
+    yield from (Note(text) for text in result.notes)
+
+
+def _at_one(result: Sensitivity) -> Table:
+    unit = REGISTRY[result.quantity].shown_unit
+    columns = (
+        Column("Field"), Column("Symbol", brief=False),
+        Column("First", "order", numeric=True), Column("+/-", "95 %", numeric=True),
+        Column("Total", "", numeric=True), Column("+/-", "95 %", numeric=True),
+        Column("Low end", unit, numeric=True), Column("High end", unit, numeric=True),
+    )  # fmt: skip
+    low, high = changes(result, None)
+    rows = tuple(
+        cells(
+            result.names[i], _symbol(result.names[i]),
+            _index(result.first_order[i]), _index(result.first_order_confidence[i]),
+            _index(result.total[i]), _index(result.total_confidence[i]),
+            _signed(low[i]), _signed(high[i]),
+        )
+        for i in index_order(result)
+    )  # fmt: skip
+    caption = "Ends: change of the quantity when that field alone moves to the end of its range."
+    return Table("Sobol indices", columns, rows, caption)
+
+
+def _over_frequency(result: Sensitivity) -> Table:
+    columns = (
+        Column("Field"), Column("Symbol"), Column("Greatest", "total", numeric=True),
+        Column("+/-", "95 %", numeric=True), Column("at", "rpm", numeric=True),
+        Column("Least", "total", numeric=True), Column("at", "rpm", numeric=True),
+    )  # fmt: skip
+    omega = np.asarray(result.omega)
+    rows = []
+    for i in index_order(result):
+        total = result.total[:, i]
+        if np.all(np.isnan(total)):
+            rows.append(cells(result.names[i], _symbol(result.names[i]), *[NOTHING] * 5))
+            continue
+        top, foot = int(np.nanargmax(total)), int(np.nanargmin(total))
+        rows.append(
+            cells(
+                result.names[i], _symbol(result.names[i]),
+                _index(total[top]), _index(result.total_confidence[top, i]), rpm(omega[top]),
+                _index(total[foot]), rpm(omega[foot]),
+            )
+        )  # fmt: skip
+    return Table("Sobol indices over frequency", columns, tuple(rows))
+
+
+def _symbol(field: str) -> str:
+    return FIELD[field].symbol if field in FIELD else NOTHING
+
+
+def _index(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else NOTHING
+
+
+def _signed(value: float) -> str:
+    return ("+" if value > 0.0 else "") + number(float(value)) if np.isfinite(value) else NOTHING
