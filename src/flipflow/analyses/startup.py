@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flipflow.analyses.linear import linear_response
 from flipflow.analyses.transient import (
+    STATUS,
     Monitor,
     at_rest,
     check_positive,
@@ -22,6 +23,7 @@ from flipflow.analyses.transient import (
     turn_means,
 )
 from flipflow.errors import InputError
+from flipflow.kernels import status
 from flipflow.kernels.unsteady import SHAFT_STATES
 from flipflow.methods.time_stepping import RungeKutta, Stretch
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
@@ -220,8 +222,13 @@ def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history
         machine, drive, speed, history, outcome, final, near, frequencies["w01"],
         _passing(history, frequencies["w01"]), _peaks(machine, history),
         _power(history) if steady and isinstance(drive, Drive) else {},
-        (*history.notes, *_notes(machine, drive)),
+        (*_ended_early(history), *_notes(machine, drive)),
     )  # fmt: skip
+
+
+def _ended_early(history: History) -> tuple[str, ...]:
+    usual = (STATUS[status.OK], STATUS[status.REACHED_LOWER])
+    return () if history.status in usual else (history.status,)
 
 
 def _outcome(
