@@ -139,6 +139,15 @@ def test_any_machine_starts(screen):
     assert any("Normal direction not checked" in note for note in bare.notes)
 
 
+def test_a_machine_that_nothing_holds(screen):
+    """No spring to the ground: no natural frequency can hold it, and none is named."""
+    system = ff.MechanicalSystem([[1000.0]], [[5e3]], [[0.0]], (), ff.Unbalance([4.0]))
+    run = ff.start_up(system, drive_of(screen, 5500.0))
+    assert run.outcome == "reached"
+    assert run.first_frequency == 0.0
+    assert run.passing is None
+
+
 def test_cancelling(screen):
     with pytest.raises(Cancelled):
         ff.start_up(screen, drive_of(screen, 1500.0), monitor=lambda _sentence, _share: False)

@@ -42,6 +42,7 @@ RECENT = 8  # stretches of the record that hold twice as many turns
 AT_REST, STOPPED = 0.02, 0.02
 NEAR = (0.8, 1.1)
 PASSING = (0.8, 1.25)
+FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
 GRAVITY = 9.80665
 
 
@@ -217,10 +218,11 @@ def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history
     if math.isnan(final) or isinstance(drive, SpeedProfile) or drive.motor is None:
         final = float(history.omega[-1])
     outcome, near = _outcome(drive, speed, final, history, frequencies)
+    first = frequencies.get("w01", 0.0)
     steady = outcome in {"reached", "captured", "short"}
     return RunUp(
-        machine, drive, speed, history, outcome, final, near, frequencies["w01"],
-        _passing(history, frequencies["w01"]), _peaks(machine, history),
+        machine, drive, speed, history, outcome, final, near, first,
+        _passing(history, first), _peaks(machine, history),
         _power(history) if steady and isinstance(drive, Drive) else {},
         (*_ended_early(history), *_notes(machine, drive)),
     )  # fmt: skip
@@ -256,6 +258,8 @@ def _steady_outcome(
 ) -> tuple[Outcome, tuple[str, float] | None]:
     if final >= AT_SPEED * speed:
         return "reached", None
+    if not frequencies:
+        return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
         return "captured", (name, frequencies[name])
@@ -268,9 +272,10 @@ def _is_steady(history: History) -> bool:
 
 
 def _natural_frequencies(machine: Machine) -> dict[str, float]:
-    """Those of the open machine, w01 first, and w0n normal to the surface."""
+    """Those of the open machine, w01 first, and w0n normal to the surface; none of a free body."""
     found = linear_response(machine, 1.0).natural_frequencies
-    named = {f"w0{k + 1}": float(omega) for k, omega in enumerate(found)}
+    vibrating = found[found > FREE * found[-1]]
+    named = {f"w0{k + 1}": float(omega) for k, omega in enumerate(vibrating)}
     normal = normal_direction(machine)
     if normal is not None:
         named["w0n"] = math.sqrt(normal.stiffness / normal.mass)

@@ -50,7 +50,7 @@ class RunUp:
     near
         Name and value in rad/s of the natural frequency at which it is captured, else None.
     first_frequency
-        w01 in rad/s.
+        w01 in rad/s; 0 for a machine that nothing holds.
     passing
         Time in s between 0.8 and 1.25 times w01; None where it is not passed.
     peaks
