@@ -171,7 +171,7 @@ def _reached(screen: FlipFlowScreen, omega: float) -> Working | None:
     solver = solver_for(system_of(screen), PiecewiseExact())
     solver.system.require_damping()
     point = solver.solve(first_unknowns(solver, omega), omega)
-    return None if point is None else Working(screen, Orbit(point))
+    return None if point is None else Working(screen, Orbit(screen, point))
 
 
 def _outermost(

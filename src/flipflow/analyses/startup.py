@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.linear import linear_response
 from flipflow.analyses.transient import (
+    STATUS,
     Monitor,
     at_rest,
     check_positive,
@@ -24,6 +23,7 @@ from flipflow.analyses.transient import (
     turn_means,
 )
 from flipflow.errors import InputError
+from flipflow.kernels import status
 from flipflow.kernels.unsteady import SHAFT_STATES
 from flipflow.methods.time_stepping import RungeKutta, Stretch
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
@@ -31,110 +31,19 @@ from flipflow.model.elements import Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.results.history import History
+from flipflow.results.run_up import AT_SPEED, Outcome, Peak, RunUp
 
 Real = NDArray[np.float64]
-Outcome = Literal[
-    "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
-]
 POWER_FACTOR = 4.0
 START_SECONDS, COAST_SECONDS = 60.0, 600.0
 MOST_SECONDS = 3600.0
 LAST_TURNS, STEADY = 20, 1e-5
 RECENT = 8  # stretches of the record that hold twice as many turns
-AT_SPEED, AT_REST, STOPPED = 0.95, 0.02, 0.02
+AT_REST, STOPPED = 0.02, 0.02
 NEAR = (0.8, 1.1)
 PASSING = (0.8, 1.25)
-RPM = 30.0 / math.pi
+FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
 GRAVITY = 9.80665
-
-
-@dataclass(frozen=True)
-class Peak:
-    """The greatest value of a quantity on the way, in SI, with the speed in rad/s and time in s."""
-
-    value: float
-    omega: float
-    t: float
-
-
-@dataclass(frozen=True, eq=False)
-class RunUp:
-    """A start or a coast-down, and what it does to the machine.
-
-    Parameters
-    ----------
-    machine, drive
-        What was run, and by what.
-    speed
-        Working speed in rad/s: where a start shall end, or where a coast-down began.
-    history
-        The motion in time.
-    outcome
-        "reached", "captured" (the speed stays near a natural frequency), "short" (it stays below
-        the working speed elsewhere), "not started", "unfinished" (still changing when the time was
-        up), "stopped" (coast-down), "followed" (a given speed over time).
-    final_speed
-        Mean speed over the last turns, rad/s.
-    near
-        Name and value in rad/s of the natural frequency at which it is captured, else None.
-    first_frequency
-        w01 in rad/s.
-    passing
-        Time in s between 0.8 and 1.25 times w01; None where it is not passed.
-    peaks
-        ``"main_amplitude"``, ``"relative_amplitude"`` (half the way from one turning point to the
-        next, m), ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has
-        them.
-    power
-        Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
-        the speed is given or changes.
-    notes
-        What was assumed or left out.
-    """
-
-    machine: Machine
-    drive: Drive | SpeedProfile
-    speed: float
-    history: History
-    outcome: Outcome
-    final_speed: float
-    near: tuple[str, float] | None
-    first_frequency: float
-    passing: float | None
-    peaks: Mapping[str, Peak]
-    power: Mapping[str, float]
-    notes: tuple[str, ...]
-
-    @property
-    def duration(self) -> float:
-        """Time calculated in s."""
-        return float(self.history.t[-1])
-
-    @property
-    def time_to_speed(self) -> float | None:
-        """Time in s at which the shaft first has the working speed, within five per cent."""
-        reached = np.flatnonzero(self.history.omega >= AT_SPEED * self.speed)
-        if self.outcome == "stopped" or reached.size == 0:
-            return None
-        return float(self.history.t[reached[0]])
-
-    @property
-    def verdict(self) -> str:
-        """The outcome as a sentence, rpm first."""
-        now, wanted = f"{self.final_speed * RPM:.0f} rpm", f"{self.speed * RPM:.0f} rpm"
-        seconds = f"{self.duration:.3g} s"
-        if self.outcome == "captured" and self.near is not None:
-            name, omega = self.near
-            return f"captured at {now}, near the natural frequency {name} = {omega * RPM:.0f} rpm"
-        sentences = {
-            "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
-            "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",
-            "not started": "does not start: the torque at rest does not turn the shaft",
-            "unfinished": f"at {now} after {seconds}, still changing; calculate a longer time",
-            "stopped": f"comes down from {wanted} in {seconds}",
-            "followed": f"follows the given speed for {seconds}, ending at {now}",
-        }
-        return sentences[self.outcome]
 
 
 def start_up(
@@ -245,10 +154,10 @@ def coast_down(
     else:
         shaft, longest = drive.switched_off(), COAST_SECONDS
     longest = longest if duration is None else _seconds(duration)
+    slowest = -math.inf if isinstance(shaft, SpeedProfile) else STOPPED * omega
     history = run_history(
-        machine, shaft, settled_start(machine, omega, method), longest, fastest=_fastest(shaft, omega),
-        slowest=-math.inf if isinstance(shaft, SpeedProfile) else STOPPED * omega, method=method,
-        monitor=monitor,
+        machine, shaft, settled_start(machine, omega, method), longest,
+        fastest=_fastest(shaft, omega), slowest=slowest, method=method, monitor=monitor,
     )  # fmt: skip
     return _judged(machine, shaft, omega, history)
 
@@ -306,16 +215,22 @@ def _steady(done: list[Stretch]) -> bool:
 def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history: History) -> RunUp:
     frequencies = _natural_frequencies(machine)
     final = turn_means(history, history.angle, LAST_TURNS)
-    if math.isnan(final) or isinstance(drive, SpeedProfile):
+    if math.isnan(final) or isinstance(drive, SpeedProfile) or drive.motor is None:
         final = float(history.omega[-1])
     outcome, near = _outcome(drive, speed, final, history, frequencies)
+    first = frequencies.get("w01", 0.0)
     steady = outcome in {"reached", "captured", "short"}
     return RunUp(
-        machine, drive, speed, history, outcome, final, near, frequencies["w01"],
-        _passing(history, frequencies["w01"]), _peaks(machine, history),
+        machine, drive, speed, history, outcome, final, near, first,
+        _passing(history, first), _peaks(machine, history),
         _power(history) if steady and isinstance(drive, Drive) else {},
-        (*history.notes, *_notes(machine, drive)),
+        (*_ended_early(history), *_notes(machine, drive)),
     )  # fmt: skip
+
+
+def _ended_early(history: History) -> tuple[str, ...]:
+    usual = (STATUS[status.OK], STATUS[status.REACHED_LOWER])
+    return () if history.status in usual else (history.status,)
 
 
 def _outcome(
@@ -335,8 +250,16 @@ def _outcome(
         return "not started", None
     if not _is_steady(history):
         return "unfinished", None
+    return _steady_outcome(speed, final, frequencies)
+
+
+def _steady_outcome(
+    speed: float, final: float, frequencies: Mapping[str, float]
+) -> tuple[Outcome, tuple[str, float] | None]:
     if final >= AT_SPEED * speed:
         return "reached", None
+    if not frequencies:
+        return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
         return "captured", (name, frequencies[name])
@@ -349,9 +272,10 @@ def _is_steady(history: History) -> bool:
 
 
 def _natural_frequencies(machine: Machine) -> dict[str, float]:
-    """Those of the open machine, w01 first, and w0n normal to the surface."""
+    """Those of the open machine, w01 first, and w0n normal to the surface; none of a free body."""
     found = linear_response(machine, 1.0).natural_frequencies
-    named = {f"w0{k + 1}": float(omega) for k, omega in enumerate(found)}
+    vibrating = found[found > FREE * found[-1]]
+    named = {f"w0{k + 1}": float(omega) for k, omega in enumerate(vibrating)}
     normal = normal_direction(machine)
     if normal is not None:
         named["w0n"] = math.sqrt(normal.stiffness / normal.mass)

@@ -136,14 +136,19 @@ def steady_power(machine: Machine, speed: float, method: RungeKutta | None = Non
 
 
 def swings(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
-    """Times of the turning points of x(t), and half the way from each to the one before."""
+    """Times of the turning points of x(t), and half the way from each to the one before.
+
+    A start at rest is a turning point; one in the midst of a motion is none.
+    """
     turning = np.flatnonzero(v[:-1] * v[1:] < 0.0)
     h = t[turning + 1] - t[turning]
     share = v[turning] / (v[turning] - v[turning + 1])
     # The velocity is close to a straight line at a turning point, its area is the way there.
     ends = x[turning] + 0.5 * share * h * v[turning]
-    ends = np.concatenate([x[:1], ends])
-    return t[turning] + share * h, np.abs(np.diff(ends)) / 2.0
+    times = t[turning] + share * h
+    if v[0] == 0.0:
+        times, ends = np.append(t[0], times), np.append(x[0], ends)
+    return times[1:], np.abs(np.diff(ends)) / 2.0
 
 
 def turn_means(history: History, values: Real, turns: int) -> float:
@@ -191,7 +196,7 @@ def _history(
         normal=None if across is None else np.column_stack(across),
         energy={
             "input": float(worked[-1]), "dissipated": float(damped[-1] + rubbed[-1]),
-            "impulses": 0.0, "loads": 0.0, "stored": stored[1] - stored[0],
+            "impulses": 0.0, "loads": 0.0, "stored": float(stored[1] - stored[0]),
             "friction": float(rubbed[-1]),
         },
         events=tuple(

@@ -15,9 +15,9 @@ from flipflow.cli.output import console, print_list, printable, write_json
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.analyses.startup import RunUp
     from flipflow.model.drive import Drive, SpeedProfile
     from flipflow.model.project import Project
+    from flipflow.results.run_up import RunUp
 
 RPM = 30.0 / math.pi
 WORDS = {
@@ -113,16 +113,17 @@ def _drive(
     if project.speed is None:
         raise InputError("operation.speed", "(left out)", "give it, or --speed '850 rpm'")
     drive = project.drive
-    if "rated_power" in given and (drive is None or drive.motor is None):
-        return assumed_drive(
-            project.screen.eccentric_moment, project.speed, given.pop("rated_power"), given
-        )
-    if drive is None and given:
-        raise InputError("--inertia", inertia, "give --motor-power with it")
-    if drive is not None and drive.motor is not None and "rated_power" in given:
-        motor = replace(drive.motor, rated_power=given.pop("rated_power"), breakdown_torque=None)
+    if drive is None or drive.motor is None:
+        if not given:
+            return None
+        if "rated_power" not in given:
+            raise InputError("--inertia", inertia, "give --motor-power with it")
+        moment = project.screen.eccentric_moment
+        return assumed_drive(moment, project.speed, given.pop("rated_power"), given)
+    if "rated_power" in given:
+        motor = replace(drive.motor, rated_power=given["rated_power"], breakdown_torque=None)
         drive = replace(drive, motor=motor)
-    return drive if drive is None else replace(drive, **given)
+    return replace(drive, inertia=given.get("inertia", drive.inertia))
 
 
 def _calculated(project: Project, drive: Drive | SpeedProfile | None) -> tuple[RunUp, RunUp | None]:

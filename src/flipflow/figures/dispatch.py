@@ -7,7 +7,6 @@ from functools import singledispatch
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
-from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
 from flipflow.figures.history import history_figure
@@ -20,6 +19,7 @@ from flipflow.figures.transient import run_up_figure
 from flipflow.results.branch import Branch
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.run_up import RunUp
 from flipflow.results.sensitivity import Sensitivity
 from flipflow.results.sweep import Sweep
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.startup import RunUp, foundation_force
+from flipflow.analyses.startup import foundation_force
 from flipflow.analyses.transient import swings
 from flipflow.figures.palette import case_colour, case_symbol
 from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
@@ -13,6 +13,7 @@ from flipflow.figures.response import LABELS, SYMBOLS, coordinates, label
 from flipflow.figures.scales import KN, MM, RPM
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate
+from flipflow.results.run_up import RunUp
 
 Real = NDArray[np.float64]
 MOST_POINTS = 1500
@@ -53,11 +54,13 @@ def _speed(run: RunUp, time: Axis) -> Panel:
         (run.first_frequency * RPM, "w01", "mark"),
         (run.speed * RPM, "working speed", "speed"),
     )
-    top = HEADROOM * max(float(omega.max()), *(at for at, _, _ in marks))
+    # The label of the working speed stands where the speed is not yet, or no longer, near it.
+    flush = 0.0 if run.history.omega[0] < run.history.omega[-1] else 1.0
+    top = 1.2 * max(float(omega.max()), *(at for at, _, _ in marks))
     return Panel(
         time, Axis("shaft speed", "rpm", (min(0.0, float(omega.min())), top)),
         traces=(Trace("shaft speed", t, omega, colour="relative", legend=False),),
-        lines=tuple(Line("y", at, text, colour) for at, text, colour in marks),
+        lines=tuple(Line("y", at, text, colour, text_at=flush) for at, text, colour in marks),
     )  # fmt: skip
 
 

@@ -15,13 +15,13 @@ import numpy as np
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import branch_from
-from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError, StoreError
 from flipflow.io.run_up import run_up_document
 from flipflow.results.branch import Branch
 from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.run_up import RunUp
 from flipflow.results.sensitivity import (
     SENSITIVITY,
     Sensitivity,

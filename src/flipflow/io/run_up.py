@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from flipflow.analyses.startup import RunUp
 from flipflow.model.drive import SpeedProfile
 from flipflow.results.document import machine_document, plain
 from flipflow.results.history import History
+from flipflow.results.run_up import RunUp
 
 MOST_ROWS = 2000
 

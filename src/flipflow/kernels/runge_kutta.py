@@ -22,7 +22,9 @@ MOST_TRIALS = 60
 LOCATED = 1e-15
 BISECTIONS = 40
 MOST_AT_ONCE = 100
-STEPS, EVENTS, REJECTED, TRIALS, ROWS, CHANGES = range(6)
+SLIVER = 1e-9
+STEPS, EVENTS, REJECTED, TRIALS, ROWS, CHANGES, AT_ONCE = range(7)
+SMALLEST = 1e-12
 
 
 class Walk(NamedTuple):
@@ -40,9 +42,8 @@ class Walk(NamedTuple):
     state: Int  # (m,) contact state of each spring
     s: Real  # (n,) running state
     end: Real  # (n,) state at the end of a trial step
-    point: Real  # (n,) scratch
     rows: Real  # (S + 1, n) slopes of the stages, and at the end
-    count: Int  # (6,) steps, events, rejected, trials to locate events, rows, changes recorded
+    tally: Int  # (7,) what the names above count
     t: Real  # (R,) record
     record: Real  # (R, n)
     rate: Real  # (R, n) slopes
@@ -78,8 +79,9 @@ def step_error(walk: Walk, h: float) -> float:
             total += walk.error[i] * walk.rows[i, k]
         size = max(abs(walk.s[k]), abs(walk.end[k]))
         share = abs(h * total) / (walk.absolute[k] + walk.relative * size)
-        if not share <= worst:
-            worst = min(math.inf, share)
+        if math.isnan(share):
+            return math.inf
+        worst = max(worst, share)
     return worst
 
 
@@ -157,7 +159,7 @@ def _locate(eq: Equations, walk: Walk, number: int, longest: float, guess: float
     # What stands above zero already, and rises, acts at once.
     h = 0.0 if g >= 0.0 and s > 0.0 else guess
     for _ in range(MOST_TRIALS):
-        walk.count[TRIALS] += 1
+        walk.tally[TRIALS] += 1
         attempt(eq, walk, h)
         if h == 0.0:
             break
@@ -199,8 +201,8 @@ def _event(eq: Equations, walk: Walk, h: float) -> tuple[float, int]:
 @kernel(inline=True)
 def _write(walk: Walk) -> None:
     """Append the running state to the record."""
-    row = walk.count[ROWS]
-    walk.count[ROWS] += 1
+    row = walk.tally[ROWS]
+    walk.tally[ROWS] += 1
     walk.t[row] = walk.time[0]
     for k in range(walk.s.shape[0]):
         walk.record[row, k] = walk.s[k]
@@ -219,7 +221,7 @@ def _accept(walk: Walk, h: float) -> bool:
         walk.rows[0, k] = walk.rows[last, k]
         finite = finite and math.isfinite(walk.s[k])
     walk.time[0] += h
-    walk.count[STEPS] += 1
+    walk.tally[STEPS] += 1
     _write(walk)
     return finite
 
@@ -229,12 +231,12 @@ def _change(eq: Equations, walk: Walk, number: int) -> None:
     """Carry out a change of contact and record it, with a second row at the same time."""
     switch(eq, walk.state, walk.s, number // 2, number % 2)
     slopes(eq, walk.state, walk.s, walk.rows, 0)
-    event = walk.count[CHANGES]
+    event = walk.tally[CHANGES]
     walk.change_time[event] = walk.time[0]
     walk.change[event, 0] = number // 2
     walk.change[event, 1] = walk.state[number // 2]
-    walk.count[CHANGES] += 1
-    walk.count[EVENTS] += 1
+    walk.tally[CHANGES] += 1
+    walk.tally[EVENTS] += 1
     _write(walk)
 
 
@@ -253,51 +255,63 @@ def begin(eq: Equations, walk: Walk) -> None:
     _write(walk)
 
 
+@kernel(inline=True)
+def _refused(walk: Walk, h: float) -> bool:
+    """Choose the next step by the error of the trial; whether the trial must be repeated."""
+    error = step_error(walk, h)
+    factor = MAX_FACTOR
+    if error > 0.0:
+        factor = min(max(SAFETY * error ** (-1.0 / walk.order), MIN_FACTOR), MAX_FACTOR)
+    if error > 1.0:
+        walk.tally[REJECTED] += 1
+        walk.step[0] = h * factor
+        return True
+    # A step cut short says nothing about a longer one.
+    if h == walk.step[0] or factor < 1.0:
+        walk.step[0] = min(h * factor, walk.longest)
+    return False
+
+
+@kernel(inline=True)
+def _finish(eq: Equations, walk: Walk, h: float, until: float) -> int:
+    """Cut the trial step at its first event, accept it, and carry the event out."""
+    last = until - walk.time[0]
+    length, number = _event(eq, walk, h)
+    if not _accept(walk, length):
+        return status.NOT_FINITE
+    if length == last:
+        walk.time[0] = until
+    if number < 0:
+        walk.tally[AT_ONCE] = 0
+        return status.OK
+    if number // 2 == walk.state.shape[0]:
+        return status.REACHED_UPPER if number % 2 == 0 else status.REACHED_LOWER
+    _change(eq, walk, number)
+    walk.tally[AT_ONCE] = walk.tally[AT_ONCE] + 1 if length <= SLIVER * h else 0
+    return status.TOO_MANY_EVENTS if walk.tally[AT_ONCE] > MOST_AT_ONCE else status.OK
+
+
 @kernel(entry=True)
 def advance(eq: Equations, walk: Walk, until: float) -> int:
     """Step to time ``until``; returns early when the record is full or the shaft's speed ends it.
 
-    The slopes at the running state stand in the first row of ``walk.rows``.
+    The slopes at the running state are written anew: what excites the machine may have changed.
     """
     adaptive = walk.relative > 0.0
-    at_once = 0
-    n = eq.vector.shape[0]
     slopes(eq, walk.state, walk.s, walk.rows, 0)
     while walk.time[0] < until:
-        if walk.count[ROWS] + 2 > walk.t.shape[0]:
+        if walk.tally[ROWS] + 2 > walk.t.shape[0]:
             return status.POINT_LIMIT
         left = until - walk.time[0]
         h = min(walk.step[0], left)
         # No sliver is left over by rounding: the last step takes it.
-        h = left if left - h < 1e-9 * h else h
+        h = left if left - h < SLIVER * h else h
         attempt(eq, walk, h)
-        if adaptive:
-            error = step_error(walk, h)
-            factor = MAX_FACTOR
-            if error > 0.0:
-                factor = min(max(SAFETY * error ** (-1.0 / walk.order), MIN_FACTOR), MAX_FACTOR)
-            if error > 1.0:
-                walk.step[0] = h * factor
-                walk.count[REJECTED] += 1
-                if walk.step[0] < 1e-12 * walk.longest:
-                    return status.STEP_TOO_SMALL
-                continue
-            if h == walk.step[0] or factor < 1.0:
-                walk.step[0] = min(h * factor, walk.longest)
-        length, number = _event(eq, walk, h)
-        if not _accept(walk, length):
-            return status.NOT_FINITE
-        if left == length:
-            walk.time[0] = until
-        if number < 0:
-            at_once = 0
+        if adaptive and _refused(walk, h):
+            if walk.step[0] < SMALLEST * walk.longest:
+                return status.STEP_TOO_SMALL
             continue
-        if number // 2 == walk.state.shape[0]:
-            return status.REACHED_UPPER if number % 2 == 0 else status.REACHED_LOWER
-        _change(eq, walk, number)
-        at_once = at_once + 1 if length <= 1e-9 * h else 0
-        if at_once > MOST_AT_ONCE:
-            return status.TOO_MANY_EVENTS
-        if not math.isfinite(walk.s[2 * n]):
-            return status.NOT_FINITE
+        code = _finish(eq, walk, h, until)
+        if code != status.OK:
+            return code
     return status.OK

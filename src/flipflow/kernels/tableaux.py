@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction as F
+from fractions import Fraction
+
+Fractions = tuple[Fraction, ...]
 
 
 @dataclass(frozen=True)
@@ -15,35 +17,37 @@ class Tableau:
     """
 
     order: int
-    a: tuple[tuple[F, ...], ...]
-    b: tuple[F, ...]
-    c: tuple[F, ...]
-    error: tuple[F, ...]
+    a: tuple[Fractions, ...]
+    b: Fractions
+    c: Fractions
+    error: Fractions
 
 
-# Kutta 1901.
+def _row(text: str) -> Fractions:
+    return tuple(map(Fraction, text.split()))
+
+
+# Kutta, Z. Math. Phys. 46 (1901) 435-453.
 RK4 = Tableau(
-    4,
-    ((), (F(1, 2),), (F(0), F(1, 2)), (F(0), F(0), F(1))),
-    (F(1, 6), F(1, 3), F(1, 3), F(1, 6)),
-    (F(0), F(1, 2), F(1, 2), F(1)),
-    (F(0),) * 5,
+    order=4,
+    a=(_row(""), _row("1/2"), _row("0 1/2"), _row("0 0 1")),
+    b=_row("1/6 1/3 1/3 1/6"),
+    c=_row("0 1/2 1/2 1"),
+    error=_row("0 0 0 0 0"),
 )
 
 # Dormand and Prince, J. Comp. Appl. Math. 6 (1980) 19-26, the pair RK5(4)7M.
 DORMAND_PRINCE = Tableau(
-    5,
-    (
-        (),
-        (F(1, 5),),
-        (F(3, 40), F(9, 40)),
-        (F(44, 45), F(-56, 15), F(32, 9)),
-        (F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)),
-        (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
+    order=5,
+    a=(
+        _row(""),
+        _row("1/5"),
+        _row("3/40 9/40"),
+        _row("44/45 -56/15 32/9"),
+        _row("19372/6561 -25360/2187 64448/6561 -212/729"),
+        _row("9017/3168 -355/33 46732/5247 49/176 -5103/18656"),
     ),
-    (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
-    (F(0), F(1, 5), F(3, 10), F(4, 5), F(8, 9), F(1)),
-    (
-        F(71, 57600), F(0), F(-71, 16695), F(71, 1920), F(-17253, 339200), F(22, 525), F(-1, 40),
-    ),
-)  # fmt: skip
+    b=_row("35/384 0 500/1113 125/192 -2187/6784 11/84"),
+    c=_row("0 1/5 3/10 4/5 8/9 1"),
+    error=_row("71/57600 0 -71/16695 71/1920 -17253/339200 22/525 -1/40"),
+)

@@ -43,8 +43,9 @@ class Equations(NamedTuple):
     vector: Complex  # (N,) unbalance in kg m, or force in N
     unbalance: int  # 1: an unbalance, which reacts on the shaft; 0: a force of constant size
     shaft: Shaft
-    push: Real  # (N,) scratch: force at no angular acceleration
-    lever: Real  # (N,) scratch: force for one unit of it
+    pull: Real  # (N,) scratch: exciting force at no angular acceleration
+    lever: Real  # (N,) scratch: exciting force for one unit of it
+    push: Real  # (N,) scratch: force of exciter, springs and dampers
     answer: Real  # (N,) scratch: M^-1 lever
 
 
@@ -72,21 +73,9 @@ def slopes(eq: Equations, state: Int, point: Real, rows: Real, row: int) -> None
     J phi'' - q a = T - T_friction: phi'' follows after eliminating a.
     """
     n = eq.vector.shape[0]
-    angle, speed = point[2 * n], point[2 * n + 1]
-    cos, sin = math.cos(angle), math.sin(angle)
-    dissipated = 0.0
-    for i in range(n):
-        p = eq.vector[i].real * cos - eq.vector[i].imag * sin
-        q = eq.vector[i].real * sin + eq.vector[i].imag * cos
-        drag = 0.0
-        spring = 0.0
-        for k in range(n):
-            drag += eq.damping[i, k] * point[n + k]
-            spring += eq.stiffness[i, k] * point[k]
-        dissipated += drag * point[n + i]
-        eq.lever[i] = q if eq.unbalance == 1 else 0.0
-        eq.push[i] = (p * speed * speed if eq.unbalance == 1 else p) - drag - spring
-    dissipated += _press(eq, state, point)
+    speed = point[2 * n + 1]
+    _excite(eq, point)
+    dissipated = _carry(eq, point) + _press(eq, state, point)
     against = 0.0
     reach = 0.0
     for i in range(n):
@@ -109,14 +98,41 @@ def slopes(eq: Equations, state: Int, point: Real, rows: Real, row: int) -> None
         rows[row, i] = point[n + i]
         rows[row, n + i] += eq.answer[i] * alpha
         if eq.shaft.free == 0:
-            p = eq.vector[i].real * cos - eq.vector[i].imag * sin
-            force = p * speed * speed if eq.unbalance == 1 else p
-            work += (force + eq.lever[i] * alpha) * point[n + i]
+            work += (eq.pull[i] + eq.lever[i] * alpha) * point[n + i]
     rows[row, 2 * n] = speed
     rows[row, 2 * n + 1] = alpha
     rows[row, 2 * n + 2] = work
     rows[row, 2 * n + 3] = dissipated
     rows[row, 2 * n + 4] = friction * speed
+
+
+@kernel(inline=True)
+def _excite(eq: Equations, point: Real) -> None:
+    """Write the exciting force without angular acceleration, and for one unit of it."""
+    n = eq.vector.shape[0]
+    angle, speed = point[2 * n], point[2 * n + 1]
+    cos, sin = math.cos(angle), math.sin(angle)
+    for i in range(n):
+        p = eq.vector[i].real * cos - eq.vector[i].imag * sin
+        q = eq.vector[i].real * sin + eq.vector[i].imag * cos
+        eq.pull[i] = p * speed * speed if eq.unbalance == 1 else p
+        eq.lever[i] = q if eq.unbalance == 1 else 0.0
+
+
+@kernel(inline=True)
+def _carry(eq: Equations, point: Real) -> float:
+    """Write the force of exciter, springs and dampers to ``eq.push``; the dampers' power."""
+    n = eq.vector.shape[0]
+    power = 0.0
+    for i in range(n):
+        drag = 0.0
+        spring = 0.0
+        for k in range(n):
+            drag += eq.damping[i, k] * point[n + k]
+            spring += eq.stiffness[i, k] * point[k]
+        power += drag * point[n + i]
+        eq.push[i] = eq.pull[i] - drag - spring
+    return power
 
 
 @kernel(inline=True)

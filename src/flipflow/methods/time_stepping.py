@@ -120,7 +120,7 @@ class Stepper:
         self.springs = linear.springs
         drive = shaft if isinstance(shaft, Drive) else None
         unbalance = isinstance(system.excitation, Unbalance)
-        inverse = np.linalg.inv(self.M)
+        inverse = np.asarray(np.linalg.inv(self.M), dtype=np.float64)
         if drive is not None:
             _check_drive(drive, inverse, vector, unbalance=unbalance)
         self.vector, self.unbalance, self.drive = vector, unbalance, drive
@@ -128,11 +128,10 @@ class Stepper:
         self._acceleration = np.zeros(1)
         self.equations = Equations(
             inverse_mass=inverse, damping=C, stiffness=K,
-            direction=np.array([[*s.direction, *[0.0] * (self.size - system.size)]
-                                for s in self.springs]).reshape(len(self.springs), self.size),
-            contact=_contact(linear), vector=vector, unbalance=int(unbalance),
-            shaft=_shaft(drive, end_speeds, self._acceleration),
-            push=np.zeros(self.size), lever=np.zeros(self.size), answer=np.zeros(self.size),
+            direction=self._directions(), contact=_contact(linear), vector=vector,
+            unbalance=int(unbalance), shaft=_shaft(drive, end_speeds, self._acceleration),
+            pull=np.zeros(self.size), lever=np.zeros(self.size), push=np.zeros(self.size),
+            answer=np.zeros(self.size),
         )  # fmt: skip
         start = speed if self.profile is None else self.profile.speeds[0]
         s = np.concatenate([state, [angle, start], np.zeros(SHAFT_STATES - 2)])
@@ -153,7 +152,7 @@ class Stepper:
     @property
     def counters(self) -> dict[str, int]:
         """Steps, events, rejected steps."""
-        count = self.walk.count
+        count = self.walk.tally
         return {
             "steps": int(count[runge_kutta.STEPS]),
             "events": int(count[runge_kutta.EVENTS]),
@@ -175,8 +174,8 @@ class Stepper:
 
     def changes(self) -> list[tuple[float, int, int]]:
         """Changes of contact since the last call: time, spring, its state then."""
-        walk, count = self.walk, int(self.walk.count[runge_kutta.CHANGES])
-        self.walk.count[runge_kutta.CHANGES] = 0
+        walk, count = self.walk, int(self.walk.tally[runge_kutta.CHANGES])
+        self.walk.tally[runge_kutta.CHANGES] = 0
         rows = zip(walk.change_time[:count], walk.change[:count], strict=True)
         return [(float(t), int(j), int(state)) for t, (j, state) in rows]
 
@@ -208,14 +207,23 @@ class Stepper:
             yield until, 0.0
 
     def _emptied(self) -> Stretch:
-        walk, rows = self.walk, int(self.walk.count[runge_kutta.ROWS])
-        walk.count[runge_kutta.ROWS] = 0
-        parts = (walk.t, walk.record, walk.rate, walk.states)
-        return Stretch(*(part[:rows].copy() for part in parts))
+        walk, rows = self.walk, int(self.walk.tally[runge_kutta.ROWS])
+        walk.tally[runge_kutta.ROWS] = 0
+        return Stretch(
+            walk.t[:rows].copy(), walk.record[:rows].copy(), walk.rate[:rows].copy(),
+            walk.states[:rows].copy(),
+        )  # fmt: skip
+
+    def _directions(self) -> Real:
+        """Directions of the springs, (m, N); none acts normal to the surface."""
+        directions = np.zeros((len(self.springs), self.size))
+        for row, spring in zip(directions, self.springs, strict=True):
+            row[: spring.direction.size] = spring.direction
+        return directions
 
     def _walk(self, s: Real, fastest: float) -> Walk:
         method, tableau = self.method, TABLEAUX[self.method.formula]
-        stages, n, m = len(tableau.b), self.size, len(self.springs)
+        stages, m = len(tableau.b), len(self.springs)
         a = np.zeros((stages, stages))
         for i, row in enumerate(tableau.a):
             a[i, : len(row)] = [float(value) for value in row]
@@ -228,8 +236,8 @@ class Stepper:
             relative=method.tolerance if adaptive else 0.0,
             absolute=self._absolute(s, fastest), longest=longest,
             step=np.array([method.step or longest]), time=np.zeros(1),
-            state=np.zeros(m, np.int64), s=s.copy(), end=np.zeros(s.size), point=np.zeros(s.size),
-            rows=np.zeros((stages + 1, s.size)), count=np.zeros(6, np.int64), t=np.zeros(rows),
+            state=np.zeros(m, np.int64), s=s.copy(), end=np.zeros(s.size),
+            rows=np.zeros((stages + 1, s.size)), tally=np.zeros(7, np.int64), t=np.zeros(rows),
             record=np.zeros((rows, s.size)), rate=np.zeros((rows, s.size)),
             states=np.zeros((rows, m), np.int64), change_time=np.zeros(rows),
             change=np.zeros((rows, 2), np.int64),

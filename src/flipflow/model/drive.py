@@ -317,7 +317,8 @@ def assumed_drive(
             f"inertia {inertia:.3g} kg m^2, twice that of the unbalance at {UNBALANCE_RADIUS:g} m",
         ),
         friction=take(
-            "friction", FRICTION_SHARE * power / speed, f"friction {FRICTION_SHARE:.0%} of rated"
+            "friction", FRICTION_SHARE * power / speed,
+            f"friction torque {100.0 * FRICTION_SHARE:.0f} % of rated torque",
         ),
         viscous_friction=known.get("viscous_friction", 0.0),
         assumed=tuple(words),

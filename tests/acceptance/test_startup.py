@@ -1,0 +1,305 @@
+"""Start and coast-down: through the resonance or captured by it, and the books of the energy."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.analyses.normal import normal_motion
+from flipflow.cli.main import main
+from flipflow.errors import Cancelled, InputError
+from flipflow.model.drive import assumed_drive
+
+RPM = np.pi / 30.0
+WORKING = 850.0 * RPM
+W01 = 22.493898  # rad/s, row 3 of the trusted values
+
+
+def drive_of(screen, power):
+    return assumed_drive(screen.eccentric_moment, WORKING, power)
+
+
+@pytest.fixture(scope="module")
+def start(screen):
+    """FFS0827 under a motor of 5.5 kW."""
+    return ff.start_up(screen, drive_of(screen, 5500.0), speed=WORKING)
+
+
+def test_a_plausible_motor_passes_the_resonance_and_reaches_speed(start):
+    assert start.outcome == "reached"
+    assert start.first_frequency == pytest.approx(W01, abs=1e-6)
+    assert 0.0 < start.passing < start.time_to_speed < 2.0
+    assert WORKING <= start.final_speed < start.drive.synchronous_speed
+    assert "reaches 850 rpm" in start.verdict
+
+
+def test_peaks_on_the_way_exceed_those_of_running(start):
+    """The main frame and the foundation peak near the resonance, far below working speed."""
+    for name in ("main_amplitude", "foundation_force"):
+        assert W01 < start.peaks[name].omega < 0.6 * WORKING
+    last = start.history.t > start.duration - 0.5
+    running = np.ptp(start.history.displacement("main")[last]) / 2.0
+    assert start.peaks["main_amplitude"].value > 3.0 * running
+
+
+def test_a_weaker_motor_is_captured(screen):
+    run = ff.start_up(screen, drive_of(screen, 1500.0), speed=WORKING)
+    assert run.outcome == "captured"
+    name, omega = run.near
+    assert name == "w01"
+    assert omega == pytest.approx(W01, abs=1e-6)
+    assert run.final_speed == pytest.approx(omega, rel=0.05)
+    assert run.verdict.startswith("captured at 21")
+    assert run.verdict.endswith("near the natural frequency w01 = 215 rpm")
+    assert run.passing is None
+
+
+@pytest.mark.parametrize("power", [5500.0, 1500.0])
+def test_power_balance_of_steady_running(screen, power):
+    """Motor power = friction + dampers in the mean; the motor's by its curve at the mean speed."""
+    run = ff.start_up(screen, drive_of(screen, power), speed=WORKING)
+    assert run.power["motor"] == pytest.approx(
+        run.power["friction"] + run.power["dampers"], rel=1e-4
+    )
+    curve = float(run.drive.torque(run.final_speed)) * run.final_speed
+    # The speed ripples within a turn, and the curve is bent: second order in the ripple.
+    assert run.power["motor"] == pytest.approx(curve, rel=0.02)
+
+
+def test_dampers_take_what_the_exact_orbit_says(screen, start):
+    """The mean of the simulation against the periodic motion at constant speed, both directions."""
+    omega = start.final_speed
+    orbit = ff.periodic_orbits(screen, omega)[0]
+    expected = orbit.input_power() + normal_motion(screen, omega).power
+    # The shaft's speed ripples by half a per cent within a turn, which the orbit does not know.
+    assert start.power["dampers"] == pytest.approx(expected, rel=2e-3)
+    friction = float(start.drive.friction_torque(omega)) * omega
+    assert start.power["friction"] == pytest.approx(friction, rel=1e-3)
+
+
+def test_energy_over_the_whole_start(start):
+    """Motor's work = friction and dampers + what masses, springs and shaft hold at the end."""
+    energy = start.history.energy
+    assert energy["input"] == pytest.approx(energy["dissipated"] + energy["stored"], rel=1e-6)
+    shaft = 0.5 * start.drive.inertia * start.final_speed**2
+    assert energy["stored"] == pytest.approx(shaft, rel=0.1)
+
+
+def test_coast_down_passes_the_resonance(screen):
+    run = ff.coast_down(screen, WORKING, drive_of(screen, 5500.0))
+    assert run.outcome == "stopped"
+    assert run.history.omega[0] == pytest.approx(WORKING)
+    assert run.final_speed < 0.05 * WORKING
+    assert run.passing > 0.0
+    assert run.peaks["main_amplitude"].omega < 1.2 * W01
+    energy = run.history.energy
+    assert energy["input"] == 0.0
+    assert -energy["stored"] == pytest.approx(energy["dissipated"], rel=1e-6)
+
+
+def test_coast_down_begins_with_the_settled_motion(screen):
+    run = ff.coast_down(screen, 120.0, drive_of(screen, 5500.0))
+    orbit = ff.periodic_orbits(screen, 120.0)[0]
+    for k in (0, 1):
+        assert run.history.x[0, k] == pytest.approx(float(orbit.displacement(k, 0.0)), abs=1e-8)
+
+
+def test_slow_profile_follows_the_branch(screen):
+    """Very slowly, the motion is at every speed that of constant speed: 100 rad/s, row 4."""
+    run = ff.start_up(screen, ff.SpeedProfile((0.0, 10.0, 60.0), (90.0, 90.0, 100.0)))
+    last = run.history.t > run.duration - 2.0 * np.pi / 100.0
+    x = run.history.displacement("relative")[last]
+    assert run.outcome == "followed"
+    assert np.ptp(x) / 2.0 == pytest.approx(7.888703398e-3, rel=5e-3)
+    assert run.history.torque is None
+    assert run.final_speed == pytest.approx(100.0, rel=1e-12)
+
+
+def test_a_drive_is_assumed_and_said(screen):
+    run = ff.start_up(screen, speed=WORKING)
+    assert run.outcome == "reached"
+    assert any("four times what the dampers take" in note for note in run.notes)
+    with pytest.raises(InputError, match="speed"):
+        ff.start_up(screen)
+
+
+def test_any_machine_starts(screen):
+    """A plain system has no normal direction; the screen without its data says so."""
+    drive = drive_of(screen, 5500.0)
+    plain = ff.start_up(screen.system(), drive)
+    bare = ff.start_up(screen.replace(normal_stiffness=None), drive)
+    assert plain.outcome == bare.outcome == "reached"
+    assert plain.history.normal is None
+    assert plain.history.x == pytest.approx(bare.history.x)
+    assert any("Normal direction not checked" in note for note in bare.notes)
+
+
+def test_a_machine_that_nothing_holds(screen):
+    """No spring to the ground: no natural frequency can hold it, and none is named."""
+    system = ff.MechanicalSystem([[1000.0]], [[5e3]], [[0.0]], (), ff.Unbalance([4.0]))
+    run = ff.start_up(system, drive_of(screen, 5500.0))
+    assert run.outcome == "reached"
+    assert run.first_frequency == 0.0
+    assert run.passing is None
+
+
+def test_cancelling(screen):
+    with pytest.raises(Cancelled):
+        ff.start_up(screen, drive_of(screen, 1500.0), monitor=lambda _sentence, _share: False)
+
+
+def test_history_reads_like_an_orbit(start):
+    history = start.history
+    x2 = history.displacement("relative")
+    assert np.array_equal(x2, history.displacement("main") - history.displacement("floating"))
+    assert np.all(np.diff(history.t) >= 0.0)
+    assert np.abs(history.stop_force()[np.abs(x2) < 5.9e-3]).max() == 0.0
+    assert history.motor_power == pytest.approx(history.torque * history.omega)
+    assert len(history.events) == history.counters["events"]
+    assert history.normal_displacement.shape == history.t.shape
+
+
+@pytest.mark.parametrize("change", [
+    {"speed": -1.0}, {"speed": math.inf}, {"duration": 0.0}, {"duration": math.nan},
+    {"duration": 1e9},
+])  # fmt: skip
+def test_bad_arguments(screen, change):
+    with pytest.raises(InputError, match=next(iter(change))):
+        ff.start_up(screen, drive_of(screen, 5500.0), **{"speed": WORKING, **change})
+
+
+def test_figure_and_file(start, tmp_path):
+    assert len(ff.figure(start).panels) == 3
+    ff.save(start, tmp_path / "start.json")
+    document = ff.open_result(tmp_path / "start.json")
+    assert document["schema"] == "flipflow/run-up/1"
+    assert document["outcome"] == "reached"
+
+
+def run(monkeypatch, capsys, *words):
+    monkeypatch.setattr(sys, "argv", ["flipflow", "startup", *map(str, words)])
+    try:
+        main()
+        code = 0
+    except SystemExit as ended:
+        code = ended.code or 0
+    told = capsys.readouterr()
+    assert "Traceback" not in told.err
+    return code, told.out, told.err
+
+
+def test_command_line(monkeypatch, capsys, tmp_path):
+    code, out, _ = run(
+        monkeypatch, capsys, "ffs0827", "-o", tmp_path / "out", "--json", tmp_path / "a.json"
+    )
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0].startswith("FFS0827: reaches 850 rpm in ")
+    assert max(map(len, lines)) <= 80
+    assert "Switched off, it comes down from" in out
+    assert "passed in" in out
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["coast_down.html", "start.html"]
+    document = json.loads((tmp_path / "a.json").read_text())
+    assert document["schema"] == "flipflow/startup/1"
+    assert set(document) == {"schema", "name", "start", "coast_down"}
+
+
+def test_command_line_motor_too_weak_is_an_answer(monkeypatch, capsys):
+    code, out, _ = run(monkeypatch, capsys, "ffs0827", "--motor-power", "1.5 kW")
+    assert code == 0
+    assert "captured at 21" in out
+    assert "Switched off" not in out
+
+
+def test_command_line_profile(monkeypatch, capsys):
+    code, out, _ = run(monkeypatch, capsys, "ffs0827", "--profile", "0 s: 0 rpm, 5 s: 850 rpm")
+    assert code == 0
+    assert "follows the given speed for 5 s" in out
+
+
+@pytest.mark.parametrize(("words", "told"), [
+    (("--profile", "5 s: 0 rpm, 0 s: 850 rpm"), ("--profile", "rise")),
+    (("--profile", "0 s: 0 rpm, inf s: 850 rpm"), ("--profile",)),
+    (("--profile", "0 s: 0 rpm, 1e999 s: 850 rpm"), ("--profile", "finite")),
+    (("--profile", "0 s 0 rpm"), ("--profile", "points such as")),
+    (("--motor-power", "1.5 kW", "--inertia", "-1 kg m^2"), ("--inertia", "above 0")),
+    (("--inertia", "1 kg m^2"), ("--inertia", "--motor-power")),
+    (("--motor-power", "1.5 kW", "--inertia", "0.01 kg m^2"), ("inertia", "(m0r)^2")),
+    (("--motor-power", "0 kW"), ("--motor-power", "above 0")),
+    (("--motor-power", "5.5 kN"), ("--motor-power", "a force")),
+    (("--speed", "inf rpm"), ("--speed",)),
+])  # fmt: skip
+def test_bad_input_is_one_sentence(monkeypatch, capsys, words, told):
+    code, out, err = run(monkeypatch, capsys, "ffs0827", *words)
+    assert code == 2
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert all(word in err for word in told), err
+
+
+def test_no_damping_is_refused(monkeypatch, capsys, tmp_path):
+    path = machine_file(
+        tmp_path, ('"9.866 kN s/m"', '"0 kN s/m"'), ('"2.605 kN s/m"', '"0 kN s/m"')
+    )
+    code, _, err = run(monkeypatch, capsys, path)
+    assert code == 2
+    assert "damping" in err
+
+
+def test_interrupt_ends_with_130(monkeypatch, capsys):
+    def interrupted(*_words, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flipflow.analyses.startup.run_history", interrupted)
+    code, _, err = run(monkeypatch, capsys, "ffs0827", "--motor-power", "1.5 kW")
+    assert (code, err) == (130, "")
+
+
+def test_drive_section(monkeypatch, capsys, tmp_path):
+    section = '[drive]\nrated_power = "1.5 kW"\ninertia = "0.9 kg m^2"\n\n[limits]'
+    path = machine_file(tmp_path, ("[limits]", section))
+    project = ff.load_project(path)
+    assert project.drive.inertia == 0.9
+    assert project.drive.motor.power == pytest.approx(1500.0)
+    assert project.drive.rated_speed == pytest.approx(WORKING)
+    assert "drive: breakdown slip 0.2" in project.assumed
+    assert not any("inertia" in text for text in project.assumed)
+    code, out, _ = run(monkeypatch, capsys, path)
+    assert code == 0
+    assert "captured" in out
+    code, out, _ = run(monkeypatch, capsys, path, "--motor-power", "5.5 kW")
+    assert "reaches 850 rpm" in out
+    assert ff.load_project("ffs0827").drive is None
+
+
+@pytest.mark.parametrize(("lines", "told"), [
+    ('inertia = "0.9 kg m^2"', ("drive.rated_power", "(left out)")),
+    ('rated_power = "1.5 kW"\ninertia = "-1 kg m^2"', ("drive.inertia", "above 0")),
+    ('rated_power = "1.5 kW"\ninertia = "9000 kg m^2"', ("drive.inertia", "looks wrong")),
+    ('rated_power = "1.5 kW"\nbreakdown_torque_ratio = 0.9', ("breakdown_torque_ratio", "above 1")),
+    ('rated_power = "1.5 kW"\nrato = 2', ("drive.rato", "'ratio'")),
+])  # fmt: skip
+def test_bad_drive_section(tmp_path, lines, told):
+    path = machine_file(tmp_path, ("[limits]", f"[drive]\n{lines}\n\n[limits]"))
+    with pytest.raises(InputError) as caught:
+        ff.load_project(path)
+    assert all(word in str(caught.value) for word in told), caught.value
+
+
+def machine_file(folder, *changes):
+    """The bundled machine file with texts replaced."""
+    from importlib.resources import files  # noqa: PLC0415
+
+    text = files("flipflow.io").joinpath("machines/ffs0827.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "machine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
