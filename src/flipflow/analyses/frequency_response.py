@@ -84,13 +84,13 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
 
 
 def solver_for(
-    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None
+    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
 ) -> Solver:
     """The solver of a method. Without stops both are the closed form, which shooting meets."""
     symmetric = system.symmetric if half_turn is None else half_turn
     if isinstance(method, HarmonicBalance) and system.with_bonded().springs:
         return BalanceSolver(system, method.harmonics, half_turn=symmetric)
-    return ExactSolver(system, half_turn=symmetric)
+    return ExactSolver(system, half_turn=symmetric, turns=turns)
 
 
 def check_interval(omega: object) -> tuple[float, float]:
@@ -186,6 +186,7 @@ def _finished(
 ) -> Branch:
     if eigenvalues is None:
         eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
+    beyond = _beyond_where_rising(traced, eigenvalues)
     special = tuple(
         SpecialPoint(
             one.kind,
@@ -202,9 +203,9 @@ def _finished(
         solver=solver,
         traced=traced,
         return_maps=maps,
-        saddle_side_at_start=_starts_beyond(eigenvalues),
+        saddle_side_at_start=beyond,
         multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
-        stability=stability_words(eigenvalues, _saddle_side(traced, eigenvalues)),
+        stability=stability_words(eigenvalues, (traced.tangent[:, -1] < 0.0) ^ beyond),
         special_points=special,
         status=BranchStatus.from_code(traced.code),
         notes=tuple(notes),
@@ -217,17 +218,13 @@ def _word(kind: str) -> str | None:
     return UNDETERMINED if kind in STABILITY_CHANGES else None
 
 
-def _saddle_side(traced: Traced, eigenvalues: NDArray[np.complex128]) -> NDArray[np.bool_] | None:
-    """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
-    if traced.omega.size == 0:
-        return None
-    backwards = traced.tangent[:, -1] * np.sign(traced.tangent[0, -1]) < 0.0
-    return np.asarray(backwards ^ _starts_beyond(eigenvalues))
+def _beyond_where_rising(traced: Traced, eigenvalues: NDArray[np.complex128]) -> bool:
+    """Whether an odd number of real eigenvalues lies beyond +1 where the branch rises in omega.
 
-
-def _starts_beyond(eigenvalues: NDArray[np.complex128]) -> bool:
-    """Whether the first motion has an odd number of real eigenvalues beyond +1."""
+    Read off the first motion: the number changes by one where d omega / ds changes sign.
+    """
     if eigenvalues.shape[0] == 0:
         return False
     first = eigenvalues[0]
-    return int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
+    beyond = int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
+    return beyond ^ bool(traced.tangent[0, -1] < 0.0)

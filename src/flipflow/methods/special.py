@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,14 @@ SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Ne
 STABILITY_CHANGES = (FOLD, SYMMETRY, DOUBLING, NEIMARK_SACKER)
 
 
+class Follower(Protocol):
+    """Whatever can solve for a point between two of the branch it has followed."""
+
+    def between(self, traced: Any, p: int, share: float) -> Point:
+        """The branch's point at ``share`` of the way from point p to point p + 1."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Found:
     """A refined special point: after branch point ``index``, at ``share`` of the step."""
@@ -43,7 +52,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class _Test:
+class Test:
     """One test function: its values at the branch points and anywhere between."""
 
     kind: str
@@ -57,9 +66,15 @@ def find_special_points(
     solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
 ) -> tuple[list[Found], list[str]]:
     """All special points in branch order, and a sentence for each that could not be refined."""
+    tests = [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]
+    return zeros_of(tests, solver, traced)
+
+
+def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Found], list[str]]:
+    """Zeros of test functions in branch order, and a sentence for each that was not refined."""
     found: list[Found] = []
     notes: list[str] = []
-    for test in [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]:
+    for test in tests:
         for p, low, high in _brackets(solver, traced, test, notes):
             try:
                 found.append(_refine(solver, traced, test, p, low, high))
@@ -71,15 +86,15 @@ def find_special_points(
 
 def _map_tests(
     solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
-) -> list[_Test]:
+) -> list[Test]:
     fold = traced.tangent[:, -1] / traced.course.omega_step
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
-        _Test(FOLD, fold, lambda point: point.omega_tangent),
-        _Test(
+        Test(FOLD, fold, lambda point: point.omega_tangent),
+        Test(
             kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))
         ),
-        _Test(
+        Test(
             NEIMARK_SACKER,
             neimark_sacker(eigenvalues),
             lambda point: float(neimark_sacker(point.eigenvalues)),
@@ -87,7 +102,7 @@ def _map_tests(
     ]
 
 
-def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
+def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
     """Greatest depth beyond each gap over the turn; one side serves for a symmetric motion."""
     springs = solver.builder.springs
     if not springs:
@@ -104,12 +119,12 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
                 least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
                 return float((most[0, j] if side > 0 else -least[0, j]) - gap)
 
-            tests.append(_Test(CONTACT_BEGIN, depth, evaluate, j, side))
+            tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side))
     return tests
 
 
 def _brackets(
-    solver: Solver, traced: Traced, test: _Test, notes: list[str]
+    solver: Follower, traced: Any, test: Test, notes: list[str]
 ) -> list[tuple[int, float, float]]:
     """Steps (p, low share, high share) within which the test changes sign."""
     values = test.values
@@ -145,7 +160,7 @@ def _dips(values: Real) -> list[int]:
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
-def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) -> float | None:
+def _bottom(solver: Follower, traced: Any, test: Test, p: int, sign: float) -> float | None:
     """Share in step p where the test has the other sign, None when it never has."""
 
     def height(share: float) -> float:
@@ -157,7 +172,7 @@ def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) ->
     return float(best.x) if best.fun < 0.0 else None
 
 
-def _refine(solver: Solver, traced: Traced, test: _Test, p: int, low: float, high: float) -> Found:
+def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high: float) -> Found:
     """Root of the test on corrected points between two shares of step p."""
     last: dict[float, Point] = {}
 

@@ -66,6 +66,7 @@ def branch_document(branch: Branch) -> Document:
         "error": plain(branch.error),
         "special_points": [special_point_document(point) for point in branch.special_points],
         "half_turn": branch.solver.half_turn,
+        "turns": branch.solver.turns,
         "saddle_side_at_start": branch.saddle_side_at_start,
         "unknowns": plain(traced.u),
         "tangent": plain(traced.tangent),
@@ -89,6 +90,8 @@ def special_point_document(point: SpecialPoint) -> Document:
         "spring": point.spring,
         "side": point.side,
         "amplitude": {str(which): point.amplitude(which) for which in system.named},
+        "half_turn": point.orbit.point.solver.half_turn,
+        "turns": point.orbit.periods,
         "unknowns": plain(point.orbit.unknowns),
         "return_map": plain(point.orbit.return_map),
     }
