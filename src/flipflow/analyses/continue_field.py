@@ -10,7 +10,6 @@ import numpy as np
 
 from flipflow import __version__
 from flipflow.errors import InputError
-from flipflow.kernels import status
 from flipflow.methods.field_path import (
     FieldEquations,
     FieldFollower,
@@ -208,7 +207,7 @@ def _meeting(
     )  # fmt: skip
     w = path.points[p].w
     value = float(w[-1])
-    z = (w[:-1] + image(equations.solver_at(value), w[:-1], equations.omega)) / 2.0
+    z = (w[:-1] + image(parent.solver_at(value), w[:-1], equations.omega)) / 2.0
     point = meeting_over_field(parent, z, value)
     if point is None:
         return []

@@ -32,9 +32,7 @@ from flipflow.results.orbit import Orbit
 SYMMETRIC = 1e-9
 
 
-def continue_orbit(
-    orbit: Orbit, field: str, interval: tuple[float, float]
-) -> Branch | FieldBranch:
+def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> Branch | FieldBranch:
     """Follow a periodic motion over frequency or over a field of the machine, both ways.
 
     The motion may repeat after any number of forcing periods, be stable or not, and lie on a
@@ -119,7 +117,7 @@ def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
     method = PiecewiseExact()
     course = _course(low, high, method)
     first = beside(child, parent, course)
-    followed = follow_away(child, first.u, first.omega, course, parent)
+    followed = follow_away(child, first, course, parent)
     return _branch(point.orbit.machine, method, child, followed)
 
 
@@ -130,12 +128,12 @@ def solver_like(orbit: Orbit, kind: type[Solver]) -> Solver:
     """
     own = orbit.point.solver
     turns = own.turns
-    symmetric = own.half_turn or (
-        own.system.symmetric
-        and turns % 2 == 1
-        and distance_to(orbit.state, image(own, orbit.unknowns, orbit.omega), orbit.omega)
-        < SYMMETRIC
-    )
+    symmetric = own.half_turn
+    if own.system.symmetric and turns % 2 == 1 and not symmetric:
+        mirrored = image(
+            ExactSolver(own.system, half_turn=True, turns=turns), orbit.state, orbit.omega
+        )
+        symmetric = distance_to(orbit.state, mirrored, orbit.omega) < SYMMETRIC
     if isinstance(own, kind) and own.half_turn == symmetric:
         return own
     if kind is BalanceSolver and isinstance(own, BalanceSolver):
@@ -150,7 +148,9 @@ def _exact_point(point: SpecialPoint) -> Point:
         return point.orbit.point
     exact = meeting(solver, solver.unknowns_from(point.orbit.motion), point.omega)
     if exact is None:
-        raise InputError("point", point, "no exact motion has such a point near; use PiecewiseExact")
+        raise InputError(
+            "point", point, "no exact motion has such a point near; use PiecewiseExact"
+        )
     return exact
 
 

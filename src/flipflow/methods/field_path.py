@@ -15,6 +15,7 @@ from flipflow.methods.exact import ExactSolver
 from flipflow.methods.predictor_corrector import Equations, Path, Solved
 from flipflow.methods.solver import STEP_SHARE, Point, Real
 from flipflow.methods.stability import determinant_plus
+from flipflow.methods.switching import distance_to, image, parent_of
 from flipflow.model.system import MechanicalSystem
 
 POINTS = 200
@@ -60,7 +61,11 @@ class FieldEquations(Equations):
         def solver_at(value: float) -> ExactSolver:
             return ExactSolver(system_at(value), half_turn=half_turn, turns=turns)
 
-        self.solver_at = solver_at
+        @lru_cache(maxsize=SOLVERS_KEPT)
+        def parent_at(value: float) -> ExactSolver | None:
+            return parent_of(solver_at(value))
+
+        self.solver_at, self.parent_at = solver_at, parent_at
 
     def shooting(self, z: Real, omega: float, value: float) -> tuple[Real, Real] | None:
         """r and [dr/dz, dr/d omega] of the machine at a value; None outside the bounds."""
@@ -100,6 +105,12 @@ class FieldEquations(Equations):
 
     def signature(self) -> int:
         return self._segments
+
+    def apart(self, w: Real) -> float:
+        parent = self.parent_at(float(w[-1]))
+        if parent is None:
+            return np.inf
+        return distance_to(w[:-1], image(parent, w[:-1], self.omega), self.omega)
 
     def point(self, solved: Solved) -> FieldPoint:
         """The motion at a corrected point."""
@@ -151,6 +162,9 @@ class FoldEquations(FieldEquations):
         sizes = self.sizes(w[:-2], float(w[-2]), float(w[-1]))
         steps = [OMEGA_SHARE * w[-2], (self.upper - self.lower) / POINTS]
         return np.append(STEP_SHARE * sizes, steps)
+
+    def apart(self, w: Real) -> float:  # noqa: ARG002
+        return np.inf
 
     def point(self, solved: Solved) -> FieldPoint:
         return self._point(solved, float(solved.w[-2]))

@@ -37,6 +37,7 @@ from flipflow.kernels.arclength import (
 
 Real = NDArray[np.float64]
 FIRST_STEP, POINTS_MOST = 0.1, 5000
+NEAR, CLOSE, SAME = 1e-2, 1e-3, 1e-7
 
 
 class Equations(ABC):
@@ -56,6 +57,10 @@ class Equations(ABC):
     @abstractmethod
     def signature(self) -> int:
         """A number that changes when the contacts of the last residual's motion change."""
+
+    @abstractmethod
+    def apart(self, w: Real) -> float:
+        """How far a solution is from the branch that this one may come from; infinite: none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +108,8 @@ def follow_both_ways(equations: Equations, w: Real) -> Path:
     """Follow the branch from w until it leaves the bounds, closes, or crosses another branch."""
     value = float(w[-1])
     ahead = follow(equations, w, -1.0 if value == equations.upper else 1.0)
-    if ahead.code != status.FOLLOWED and ahead.code != status.STEP_TOO_SMALL:
-        return ahead
-    if value in (equations.lower, equations.upper):
+    both = ahead.code in (status.FOLLOWED, status.STEP_TOO_SMALL)
+    if not both or value in (equations.lower, equations.upper):
         return ahead
     back = follow(equations, w, -1.0)
     points = (*(point.backwards() for point in back.points[:0:-1]), *ahead.points)
@@ -129,10 +133,12 @@ def follow(equations: Equations, w: Real, direction: float) -> Path:
         if new is None or refused(equations, last, new, guess, step):
             length = step * HALVE
             if length < SHORTEST:
+                if equations.apart(last.w) < NEAR:
+                    return met(equations, points)
                 return Path(equations, tuple(points), status.STEP_TOO_SMALL)
             continue
         if new.side != last.side:
-            return Path(equations, tuple(points), status.FOLLOWED, crossed_end=True)
+            return met(equations, points)
         points.append(new.rescaled(equations.scale(new.w)))
         distance = float(np.linalg.norm((new.w - first.w) / new.scale))
         travelled = max(travelled, distance)
@@ -142,6 +148,14 @@ def follow(equations: Equations, w: Real, direction: float) -> Path:
             return Path(equations, tuple(points), status.CLOSED)
         length = longer(length, step, new.iterations)
     return Path(equations, tuple(points), status.POINT_LIMIT)
+
+
+def met(equations: Equations, points: list[Solved]) -> Path:
+    """A path that ends on another branch, without the points that are one with it to rounding."""
+    kept = len(points)
+    while kept > 1 and equations.apart(points[kept - 1].w) < CLOSE:
+        kept -= 1
+    return Path(equations, tuple(points[:kept]), status.FOLLOWED, crossed_end=True)
 
 
 def predicted(equations: Equations, last: Solved, step: float) -> tuple[Real, Real, bool]:
@@ -218,14 +232,16 @@ def solved(A: Real, b: Real) -> Real | None:
 
 
 def refused(equations: Equations, last: Solved, new: Solved, guess: Real, step: float) -> bool:
-    """Whether a corrected step is too laboured, too far or too bent, or changes its contacts."""
+    """Whether a corrected step is laboured, far or bent, changes its contacts, or lands elsewhere."""
     laboured = new.iterations > NEWTON_MANY and step > LABOURED_STEP
     outside = not equations.lower <= new.w[-1] <= equations.upper
     bent = abs(float(new.tangent @ last.tangent)) < TURN_MOST
     astray = float(np.linalg.norm((new.w - guess) / new.scale)) > ASTRAY_MOST * step
     strand = new.side != last.side and step > STRAND_STEP
     contact = new.signature != last.signature and step > CONTACT_STEP
-    return laboured or outside or bent or astray or strand or contact
+    if laboured or outside or bent or astray or strand or contact:
+        return True
+    return equations.apart(new.w) < SAME
 
 
 def longer(length: float, step: float, iterations: int) -> float:

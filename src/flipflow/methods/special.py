@@ -91,9 +91,7 @@ def _map_tests(
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
         Test(FOLD, fold, lambda point: point.omega_tangent),
-        Test(
-            kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))
-        ),
+        Test(kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))),
         Test(
             NEIMARK_SACKER,
             neimark_sacker(eigenvalues),

@@ -16,11 +16,12 @@ from scipy.optimize import root_scalar
 from flipflow.errors import IncompleteError
 from flipflow.kernels import arclength, status
 from flipflow.methods.exact import ExactSolver
+from flipflow.methods.predictor_corrector import CLOSE, NEAR, SAME
 from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Point, Real, Solver, Traced
 from flipflow.methods.stability import determinant_plus
 
-NEAR = 1e-2
+FINER = (1.0, 0.1, 0.01, 0.001)
 SMALL = 1e-3
 SECANT, SECANT_MOST = 1e-6, 30
 
@@ -54,15 +55,14 @@ def child_of(parent: Solver) -> ExactSolver:
     return ExactSolver(parent.system, half_turn=False, turns=turns)
 
 
-def image(solver: Solver, u: Real, omega: float) -> Real:
-    """The state half the period later, mirrored where that is an odd number of half turns.
+def image(parent: ExactSolver, u: Real, omega: float) -> Real:
+    """The state half a child's period later, mirrored where the parent's motions are.
 
     The parent's motions are their own images; a child's image is another motion of its branch.
+    NaN where the flow does not end.
     """
-    motion = solver.motion(u, omega)
-    t = solver.turns * math.pi / omega
-    sign = 1.0 if solver.turns % 2 == 0 else -1.0
-    return np.asarray(sign * np.concatenate([motion.derivative(t, 0), motion.derivative(t, 1)]))
+    found = parent.residual(u, omega)
+    return np.full(u.size, np.nan) if found is None else np.asarray(u + found[0])
 
 
 def distance_to(state: Real, other: Real, omega: float) -> float:
@@ -93,55 +93,75 @@ def meeting(parent: Solver, u: Real, omega: float) -> Point | None:
     return parent.solve(guess.u, float(answer.root))
 
 
-def until_meeting(solver: Solver, traced: Traced) -> tuple[Traced, Point | None]:
-    """The part of a trace before it meets the parent branch, and the motion where it does.
+def follow_until_meeting(
+    solver: Solver, u: Real, omega: float, course: arclength.Course
+) -> tuple[Traced, Point | None]:
+    """Follow the branch one way until it leaves the interval or meets its parent.
 
-    The sign of det [J; tangent] changes where two branches cross and nowhere else.
+    With the motion where it does. A long step may land on the parent, which looks like the child
+    where the two meet: the branch is then followed anew with finer steps.
     """
     parent = parent_of(solver)
-    points = traced.omega.size
-    if parent is None or points == 0:
-        return traced, None
-    crossed = np.flatnonzero(np.diff(np.sign(traced.record.side[:points])))
-    stalled = [points - 1] if traced.code == status.STEP_TOO_SMALL else []
-    for p in (*crossed, *stalled):
-        u, omega = traced.u[p], float(traced.omega[p])
-        mirrored = image(solver, u, omega)
-        if distance_to(u, mirrored, omega) > NEAR:
+    for finer in FINER:
+        traced = solver.trace(u, omega, course._replace(u_step=course.u_step * finer))
+        if parent is None or traced.omega.size == 0:
+            return traced, None
+        apart = _distances(parent, traced)
+        landed = np.flatnonzero(apart < SAME)
+        if landed.size == 0 or landed[0] == 0:
+            break
+    # The sign of det [J; tangent] changes where two branches cross and nowhere else.
+    crossed = np.flatnonzero(np.diff(np.sign(traced.record.side[: traced.omega.size])))
+    stalled = [apart.size - 1] if traced.code == status.STEP_TOO_SMALL else []
+    beyond = landed[:1] - 1 if landed.size and landed[0] > 0 else []
+    for p in sorted({*map(int, crossed), *stalled, *map(int, beyond)}):
+        if apart[p] > NEAR and p not in beyond:
             continue
-        point = meeting(parent, (u + mirrored) / 2.0, omega)
+        state, at = traced.u[p], float(traced.omega[p])
+        point = meeting(parent, (state + image(parent, state, at)) / 2.0, at)
         if point is not None:
-            return Traced.recorded(traced.record, int(p) + 1, status.FOLLOWED, traced.course), point
+            # Beside the meeting two branches are one to rounding; nothing is read off there.
+            clear = int(np.flatnonzero(apart[: p + 1] > CLOSE).max(initial=0))
+            return Traced.recorded(traced.record, clear + 1, status.FOLLOWED, traced.course), point
     return traced, None
 
 
 def follow_both_ways(solver: Solver, u: Real, omega: float, course: arclength.Course) -> Followed:
-    """Follow the branch from (u, omega) until it leaves the interval or meets its parent."""
-    inside = course.lower < omega < course.upper
-    direction = -1.0 if omega == course.upper else 1.0
-    traced = solver.trace(u, omega, course._replace(direction=direction))
-    ahead, end = until_meeting(solver, traced)
-    if ahead.code == status.CLOSED or ahead.omega.size == 0:
-        return Followed(ahead)
-    if not inside:
-        ended = ahead.code in (status.REACHED_UPPER, status.REACHED_LOWER)
-        return Followed(replace(ahead, code=status.FOLLOWED if ended else ahead.code), end=end)
-    traced = solver.trace(u, omega, course._replace(direction=-1.0))
-    back, start = until_meeting(solver, traced)
+    """Follow the branch from (u, omega) both ways; it begins at its end of lower omega."""
+    up, down = course._replace(direction=1.0), course._replace(direction=-1.0)
+    if omega == course.upper:
+        return _one_way(*follow_until_meeting(solver, u, omega, down), None)
+    ahead, end = follow_until_meeting(solver, u, omega, up)
+    if ahead.code == status.CLOSED or ahead.omega.size == 0 or omega == course.lower:
+        return _one_way(ahead, end, None)
+    back, start = follow_until_meeting(solver, u, omega, down)
+    if ahead.omega[-1] < back.omega[-1]:
+        return Followed(ahead.reversed_into(back), end, start)
     return Followed(back.reversed_into(ahead), start, end)
 
 
-def follow_away(
-    solver: Solver, u: Real, omega: float, course: arclength.Course, parent: Point
-) -> Followed:
+def follow_away(child: Solver, first: Point, course: arclength.Course, parent: Point) -> Followed:
     """Follow a child branch from a motion beside its parent, away from it."""
-    direction = math.copysign(1.0, omega - parent.omega)
-    traced, end = until_meeting(
-        solver, solver.trace(u, omega, course._replace(direction=direction))
+    direction = math.copysign(1.0, first.omega - parent.omega)
+    traced, end = follow_until_meeting(
+        child, first.u, first.omega, course._replace(direction=direction)
     )
+    return _one_way(traced, end, parent)
+
+
+def _one_way(traced: Traced, end: Point | None, start: Point | None) -> Followed:
+    """A trace that began at an end of its branch."""
     ended = traced.code in (status.REACHED_UPPER, status.REACHED_LOWER)
-    return Followed(
-        replace(traced, code=status.FOLLOWED if ended else traced.code), parent, end
+    return Followed(replace(traced, code=status.FOLLOWED if ended else traced.code), start, end)
+
+
+def _distances(parent: ExactSolver, traced: Traced) -> Real:
+    """How far each motion is from being one of the parent's."""
+    return np.array(
+        [
+            distance_to(u, image(parent, u, float(omega)), float(omega))
+            for u, omega in zip(traced.u, traced.omega, strict=True)
+        ]
     )
 
 
@@ -155,6 +175,7 @@ def beside(child: Solver, parent: Point, course: arclength.Course) -> Point:
     IncompleteError
         When no such motion is found.
     """
+    own = parent_of(child)
     values, vectors = np.linalg.eig(parent.return_map)
     critical = vectors[:, np.abs(values + 1.0).argmin()].real
     n = critical.size // 2
@@ -167,7 +188,8 @@ def beside(child: Solver, parent: Point, course: arclength.Course) -> Point:
     record.tangent[:] = np.append(away, 0.0)
     chord = Traced.recorded(record, 2, status.OK, course)
     point = child.between(chord, 0, 1.0)
-    moved = distance_to(point.u, image(child, point.u, point.omega), point.omega)
+    mirrored = parent.u if own is None else image(own, point.u, point.omega)
+    moved = distance_to(point.u, mirrored, point.omega)
     if not SMALL < moved < NEAR:
         raise IncompleteError(
             f"no motion was found beside the one at {parent.omega:.6g} rad/s that branches off"
