@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
 
 from flipflow.analyses.assessment import Assessment
@@ -9,10 +10,12 @@ from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.branches import branches_figure, field_branch_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
 from flipflow.results.branch import Branch
+from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
 
 
@@ -23,7 +26,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a linear response, an operating region or an assessment.
+        A branch, a list of branches over frequency, a branch over a field, an orbit, a linear
+        response, an operating region or an assessment.
 
     Returns
     -------
@@ -43,6 +47,17 @@ def figure(result: object) -> Figure:
 @figure.register
 def _(result: Branch) -> Figure:
     return branch_figure(result)
+
+
+@figure.register(list)
+@figure.register(tuple)
+def _(result: Sequence[Branch]) -> Figure:
+    return branches_figure(result)
+
+
+@figure.register
+def _(result: FieldBranch) -> Figure:
+    return field_branch_figure(result)
 
 
 @figure.register

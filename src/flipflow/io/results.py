@@ -16,7 +16,14 @@ from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import branch_from
 from flipflow.errors import InputError, StoreError
 from flipflow.results.branch import Branch
-from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
+from flipflow.results.document import (
+    BRANCH,
+    branch_document,
+    field_branch_document,
+    orbit_document,
+    plain,
+)
+from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
 
 if TYPE_CHECKING:
@@ -32,7 +39,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit or Assessment.
+        A Branch, FieldBranch, Orbit or Assessment.
     path
         File to write; its ending decides the form.
 
@@ -87,11 +94,15 @@ def document_of(result: object) -> dict[str, Any]:
     """The data document of a result."""
     if isinstance(result, Branch):
         return branch_document(result)
+    if isinstance(result, FieldBranch):
+        return field_branch_document(result)
     if isinstance(result, Orbit):
         return orbit_document(result)
     if isinstance(result, Assessment):
         return assessment_document(result)
-    raise InputError("result", type(result).__name__, "give a Branch, an Orbit or an Assessment")
+    raise InputError(
+        "result", type(result).__name__, "give a Branch, a FieldBranch, an Orbit or an Assessment"
+    )
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:

@@ -101,7 +101,7 @@ class FieldEquations(Equations):
         n = z.size // 2
         reach = np.hypot(z[:n], z[n:] / omega).max()
         amplitude = max(reach, self.solver_at(value).length)
-        return amplitude * np.repeat([1.0, omega], n)
+        return np.asarray(amplitude * np.repeat([1.0, omega], n))
 
     def signature(self) -> int:
         return self._segments

@@ -133,21 +133,25 @@ def follow(equations: Equations, w: Real, direction: float) -> Path:
         if new is None or refused(equations, last, new, guess, step):
             length = step * HALVE
             if length < SHORTEST:
-                if equations.apart(last.w) < NEAR:
-                    return met(equations, points)
-                return Path(equations, tuple(points), status.STEP_TOO_SMALL)
+                return stalled(equations, points)
             continue
         if new.side != last.side:
             return met(equations, points)
         points.append(new.rescaled(equations.scale(new.w)))
         distance = float(np.linalg.norm((new.w - first.w) / new.scale))
         travelled = max(travelled, distance)
-        if ends:
-            return Path(equations, tuple(points), status.FOLLOWED)
-        if travelled > AWAY and distance < BACK * step:
-            return Path(equations, tuple(points), status.CLOSED)
+        closed = travelled > AWAY and distance < BACK * step
+        if ends or closed:
+            return Path(equations, tuple(points), status.FOLLOWED if ends else status.CLOSED)
         length = longer(length, step, new.iterations)
     return Path(equations, tuple(points), status.POINT_LIMIT)
+
+
+def stalled(equations: Equations, points: list[Solved]) -> Path:
+    """A path whose step became too small, as it may where it meets another branch."""
+    if equations.apart(points[-1].w) < NEAR:
+        return met(equations, points)
+    return Path(equations, tuple(points), status.STEP_TOO_SMALL)
 
 
 def met(equations: Equations, points: list[Solved]) -> Path:
@@ -228,11 +232,11 @@ def solved(A: Real, b: Real) -> Real | None:
         x = np.linalg.solve(A, b)
     except np.linalg.LinAlgError:
         return None
-    return x if np.isfinite(x).all() else None
+    return np.asarray(x, float) if np.isfinite(x).all() else None
 
 
 def refused(equations: Equations, last: Solved, new: Solved, guess: Real, step: float) -> bool:
-    """Whether a corrected step is laboured, far or bent, changes its contacts, or lands elsewhere."""
+    """Whether a step is laboured, far or bent, changes its contacts, or lands elsewhere."""
     laboured = new.iterations > NEWTON_MANY and step > LABOURED_STEP
     outside = not equations.lower <= new.w[-1] <= equations.upper
     bent = abs(float(new.tangent @ last.tangent)) < TURN_MOST

@@ -102,9 +102,11 @@ def follow_until_meeting(
     where the two meet: the branch is then followed anew with finer steps.
     """
     parent = parent_of(solver)
+    if parent is None:
+        return solver.trace(u, omega, course), None
     for finer in FINER:
         traced = solver.trace(u, omega, course._replace(u_step=course.u_step * finer))
-        if parent is None or traced.omega.size == 0:
+        if traced.omega.size == 0:
             return traced, None
         apart = _distances(parent, traced)
         landed = np.flatnonzero(apart < SAME)
@@ -113,8 +115,8 @@ def follow_until_meeting(
     # The sign of det [J; tangent] changes where two branches cross and nowhere else.
     crossed = np.flatnonzero(np.diff(np.sign(traced.record.side[: traced.omega.size])))
     stalled = [apart.size - 1] if traced.code == status.STEP_TOO_SMALL else []
-    beyond = landed[:1] - 1 if landed.size and landed[0] > 0 else []
-    for p in sorted({*map(int, crossed), *stalled, *map(int, beyond)}):
+    beyond = [int(p) - 1 for p in landed[:1] if p > 0]
+    for p in sorted({*map(int, crossed), *stalled, *beyond}):
         if apart[p] > NEAR and p not in beyond:
             continue
         state, at = traced.u[p], float(traced.omega[p])

@@ -19,6 +19,7 @@ from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
 
 Document = dict[str, Any]
@@ -27,6 +28,7 @@ METHODS: Mapping[str, type[PiecewiseExact | HarmonicBalance]] = {
     "HarmonicBalance": HarmonicBalance,
 }
 BRANCH, ORBIT = "flipflow/branch/1", "flipflow/orbit/1"
+FIELD_BRANCH = "flipflow/field-branch/1"
 
 
 def plain(value: object) -> Any:
@@ -77,6 +79,34 @@ def branch_document(branch: Branch) -> Document:
         "rejected": plain(traced.rejected),
         "reason": plain(traced.reason),
         "code": traced.code,
+    }
+
+
+def field_branch_document(branch: FieldBranch) -> Document:
+    """A branch over a field: amplitudes, stability, and the state of every motion."""
+    system = branch.machine.system()
+    return {
+        "schema": FIELD_BRANCH,
+        "version": branch.version,
+        "machine": machine_document(branch.machine),
+        "field": branch.field,
+        "status": branch.status.name,
+        "status_sentence": branch.status.value,
+        "complete": branch.complete,
+        "notes": list(branch.notes),
+        "values": plain(branch.values),
+        "omega": plain(branch.omega),
+        "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
+        "phase": {str(which): plain(branch.phase(which)) for which in system.named},
+        "stability": branch.stability.tolist(),
+        "multipliers": plain(branch.multipliers),
+        "error": plain(branch.error),
+        "periods": [orbit.periods for orbit in branch.orbits],
+        "states": [plain(orbit.state) for orbit in branch.orbits],
+        "special_points": [
+            {"value": point.value, **special_point_document(point)}
+            for point in branch.special_points
+        ],
     }
 
 
