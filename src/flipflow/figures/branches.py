@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.errors import InputError
 from flipflow.figures.curves import Curve
@@ -25,6 +26,8 @@ from flipflow.model.fields import FIELD
 from flipflow.results.branch import Branch
 from flipflow.results.field_branch import FieldBranch
 from flipflow.results.status import BranchStatus
+
+Real = NDArray[np.float64]
 
 
 def branches_figure(branches: Sequence[Branch]) -> Figure:
@@ -92,7 +95,7 @@ def field_branch_figure(branch: FieldBranch) -> Figure:
     # Lengths are read in mm; every other field is drawn in SI.
     scale, unit = (MM, "mm") if field.unit == "m" else (1.0, field.unit)
     x = branch.values * scale
-    axis = Axis(f"{field.name.replace('_', ' ')} ({field.symbol})", unit, (x.min(), x.max()))
+    axis = Axis(f"{field.name.replace('_', ' ')} ({field.symbol})", unit, _with_margin(x))
     amplitude = branch.amplitude("relative")
     curve = Curve(branch.values, amplitude, amplitude, branch.stability)
     traces = [
@@ -107,9 +110,16 @@ def field_branch_figure(branch: FieldBranch) -> Figure:
             Trace(KIND_WORDS.get(kind, kind), at, heights, "point", "jump",
                   symbol=KIND_SYMBOLS.get(kind, "square-open"))
         )  # fmt: skip
-    panels = [Panel(axis, Axis("amplitude (|x2|)", "mm"), traces=tuple(traces))]
+    height = Axis("amplitude (|x2|)", "mm", (0.0, 1.08 * MM * float(amplitude.max())))
+    panels = [Panel(axis, height, traces=tuple(traces))]
     if np.ptp(branch.omega) > 0.0:
-        speed = Trace("speed of the fold", x, branch.omega * RPM, "undetermined", "main")
+        speed = Trace("speed of the fold", x, branch.omega * RPM, colour="main")
         panels.append(Panel(axis, Axis("shaft speed", "rpm"), traces=(speed,)))
     caption = f"Half the peak-to-peak motion as {field.name.replace('_', ' ')} is changed."
     return Figure(f"Motions over {field.name.replace('_', ' ')}", caption, tuple(panels))
+
+
+def _with_margin(x: Real) -> tuple[float, float]:
+    """Ends of an axis a little beyond the values."""
+    margin = 0.02 * float(np.ptp(x))
+    return float(x.min()) - margin, float(x.max()) + margin
