@@ -23,7 +23,10 @@ from flipflow.model.system import Coordinate, MechanicalSystem
 Int = NDArray[np.int64]
 Kind = Literal["+", "-", "lump"]
 KINDS: tuple[Kind, ...] = ("+", "-", "lump")
-LADDER_STEP, LADDER = 1.2, 48
+LINEAR_STEP = 1.0 / 60.0
+LADDER = np.concatenate(
+    [np.geomspace(1e-4, 0.1, 38, endpoint=False), np.arange(0.1, 1.0 + LINEAR_STEP, LINEAR_STEP)]
+)
 FINE_LADDER = np.geomspace(0.6, 1.05, 24)
 BISECTIONS = 12
 NEARBY, NARROWINGS = 9, 2
@@ -124,9 +127,9 @@ class Blows:
     ) -> Real:
         """The least share that throws, for rows and moments (K,); infinite where none does.
 
-        The ladder of shares leads up to 1, or is a fine one around shares (K,).
+        Steps of the ladder up to 1 are a fifth, at most a sixtieth of the whole; or the ladder is a fine one around shares (K,).
         """
-        ladder = LADDER_STEP ** np.arange(1.0 - LADDER, 1.0) if around is None else FINE_LADDER
+        ladder = LADDER if around is None else FINE_LADDER
         base = np.ones(row.size) if around is None else around
         shares = np.outer(base, ladder)
         every = np.repeat(np.arange(row.size), ladder.size)

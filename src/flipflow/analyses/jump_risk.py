@@ -22,7 +22,7 @@ from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
 Monitor = Callable[[str, float], None]
-PHASES = 48
+PHASES = 60
 LONE_STRIDE = 6
 MOST_IMPULSE = 1e9
 NO_OTHER = "No other motion found: it cannot jump."
@@ -151,8 +151,8 @@ def jump_risk(
     .. math:: J = - v \, \frac{L}{1 + L \, e^T M^{-1} e},
 
     so the frame's velocity becomes v m / (m + L); an infinitely heavy lump stops the frame for a
-    moment. Moments of the turn and sizes are scanned, each size 1.2 times the one before; the
-    first that throws the motion out is refined by bisection, and so is the moment. A window of
+    moment. Moments of the turn and sizes are scanned, each size a fifth above the one before
+    and no step above a sixtieth of the largest; the first that throws the motion out is refined by bisection, and so is the moment. A window of
     sizes narrower than a step of the scan can be missed.
 
     Parameters
@@ -299,4 +299,8 @@ def _notes(blows: Blows, others: tuple[Orbit, ...], found: list[Throw]) -> tuple
         )
     if not all(throw.sharp for throw in found):
         notes.append("Close to a least blow the outcome changes more than once within 1 %.")
+    idle = [f for f in dict.fromkeys(r.frame for r in blows.rows) if f not in {t.frame for t in found}]
+    if others and idle:
+        names = " or ".join(map(str, idle))
+        notes.append(f"No impulse tried on {names}, and no lump, throws the motion onto another.")
     return tuple(notes)

@@ -9,9 +9,11 @@ from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.basins import basins_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
 
@@ -23,7 +25,7 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a linear response, an operating region or an assessment.
+        A branch, an orbit, basins, a linear response, an operating region or an assessment.
 
     Returns
     -------
@@ -63,3 +65,8 @@ def _(result: OperatingRegion) -> Figure:
 @figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@figure.register
+def _(result: Basins) -> Figure:
+    return basins_figure(result)

@@ -39,6 +39,15 @@ FILLS: Mapping[str, str] = {
     "contact": "rgba(90,98,105,0.24)",
     "contact minus": "rgba(90,98,105,0.13)",
 }
+TINTS: Mapping[str, str] = {
+    "none": "#ffffff",
+    "case 0": "#c3c9cf",
+    "case 1": "#a9c8ee",
+    "case 2": "#f6d9c4",
+    "case 3": "#7fc4a6",
+    "case 4": "#d9bfe2",
+    "case 5": "#e9ebee",
+}
 DASHES: Mapping[str, str] = {"unstable": "dash", "undetermined": "dot"}
 SYMBOLS = ("", "circle", "square", "triangle", "diamond", "cross")
 HATCHES = ("", "/", "\\", "x", "-", ".")

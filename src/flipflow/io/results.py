@@ -13,10 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.reopen import branch_from
+from flipflow.analyses.reopen import basins_from, branch_from
 from flipflow.errors import InputError, StoreError
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
-from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
+from flipflow.results.document import (
+    BASINS,
+    BRANCH,
+    basins_document,
+    branch_document,
+    orbit_document,
+    plain,
+)
 from flipflow.results.orbit import Orbit
 
 if TYPE_CHECKING:
@@ -32,7 +40,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit or Assessment.
+        A Branch, Orbit, Basins or Assessment.
     path
         File to write; its ending decides the form.
 
@@ -55,8 +63,8 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         )  # fmt: skip
 
 
-def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
-    """Open what :func:`save` wrote as JSON: a branch as a Branch, other documents as they are.
+def open_result(path: str | os.PathLike[str]) -> Branch | Basins | dict[str, Any]:
+    """Open what :func:`save` wrote as JSON: a Branch or Basins, other documents as they are.
 
     Raises
     ------
@@ -78,6 +86,8 @@ def open_result(path: str | os.PathLike[str]) -> Branch | dict[str, Any]:
     if not isinstance(document, dict) or not str(document.get("schema")).startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
+        if document["schema"] == BASINS:
+            return basins_from(document)
         return branch_from(document) if document["schema"] == BRANCH else document
     except (KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path} is damaged: {error!r}") from None
@@ -89,9 +99,11 @@ def document_of(result: object) -> dict[str, Any]:
         return branch_document(result)
     if isinstance(result, Orbit):
         return orbit_document(result)
+    if isinstance(result, Basins):
+        return basins_document(result)
     if isinstance(result, Assessment):
         return assessment_document(result)
-    raise InputError("result", type(result).__name__, "give a Branch, an Orbit or an Assessment")
+    raise InputError("result", type(result).__name__, "give a Branch, an Orbit, Basins or an Assessment")
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
