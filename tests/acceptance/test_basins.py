@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import flipflow as ff
 from flipflow.cli.main import main
@@ -71,9 +72,7 @@ def test_shares_count_cells_and_carry_their_confidence(found):
 
 
 def test_result_does_not_depend_on_threads_or_chunks(screen, found):
-    part = ff.basins(
-        screen, OMEGA, {"relative": X[::4]}, {"relative": V[::4]}, threads=1
-    )
+    part = ff.basins(screen, OMEGA, {"relative": X[::4]}, {"relative": V[::4]}, threads=1)
     np.testing.assert_array_equal(part.labels, found.labels[::4, ::4])
 
 
@@ -108,9 +107,7 @@ def test_motions_of_several_periods_are_found_by_the_lanes():
         orbit = here.orbits[label]
         t = 2.0 * np.pi / omega * np.arange(orbit.periods)
         states = np.stack([orbit.displacement(0, t), orbit.velocity(0, t)], axis=1)
-        end = solver.settled(
-            np.array([here.axes[0].values[i], here.axes[1].values[j]]), omega, 600
-        )
+        end = solver.settled(np.array([here.axes[0].values[i], here.axes[1].values[j]]), omega, 600)
         assert np.abs(states - end).max(axis=1).min() < 1e-7
 
 
@@ -174,9 +171,7 @@ def test_cancelled_run_keeps_the_cells_it_has_finished(screen, found):
         if sentence == "cells" and share > 0.5:
             raise Cancelled("enough")
 
-    part = ff.basins(
-        screen, OMEGA, {"relative": X}, {"relative": V}, monitor=stop, threads=2
-    )
+    part = ff.basins(screen, OMEGA, {"relative": X}, {"relative": V}, monitor=stop, threads=2)
     ran = part.turns >= 0
     assert 0.4 < ran.mean() < 1.0
     assert not part.complete
@@ -227,8 +222,6 @@ def after_blow(screen, throw, orbit, factor):
 
 def rk_to_end_of_turn(system, z, t, omega):
     """The state at the end of the turn, by the reference integrator of the tests."""
-    from scipy.integrate import solve_ivp
-
     (spring,) = system.springs
     M, C, K = system.M, system.C, system.K
     edges = np.array([spring.gaps[0], -spring.gaps[1]])
@@ -238,7 +231,9 @@ def rk_to_end_of_turn(system, z, t, omega):
         y, w = spring.direction @ x, spring.direction @ v
         H = spring.stiffness * (y - edges[side]) + spring.damping * w if side is not None else 0.0
         F = system.excitation.vector * omega**2 * np.exp(1j * omega * time)
-        return np.concatenate([v, np.linalg.solve(M, F.real - C @ v - K @ x - spring.direction * H)])
+        return np.concatenate(
+            [v, np.linalg.solve(M, F.real - C @ v - K @ x - spring.direction * H)]
+        )
 
     def gap(sign):
         def event(_time, state, _side):
@@ -250,13 +245,21 @@ def rk_to_end_of_turn(system, z, t, omega):
     end = 2.0 * np.pi / omega
     while t < end:
         y, w = spring.direction @ z[:2], spring.direction @ z[2:]
-        side = next((s for s, sign in enumerate((1, -1)) if sign * y > spring.gaps[0] - 1e-12
-                     and (sign * y > spring.gaps[0] + 1e-12 or sign * w > 0)), None)
+        side = next(
+            (
+                s
+                for s, sign in enumerate((1, -1))
+                if sign * y > spring.gaps[0] - 1e-12
+                and (sign * y > spring.gaps[0] + 1e-12 or sign * w > 0)
+            ),
+            None,
+        )
         events = [gap(1), gap(-1)]
         for event, sign in zip(events, (1, -1), strict=True):
             event.direction = -1.0 if side is not None and (1, -1)[side] == sign else 1.0
-        done = solve_ivp(rate, (t, end), z, "DOP853", rtol=1e-11, atol=1e-13, events=events,
-                         args=(side,))
+        done = solve_ivp(
+            rate, (t, end), z, "DOP853", rtol=1e-11, atol=1e-13, events=events, args=(side,)
+        )
         t, z = done.t[-1], done.y[:, -1]
     return z
 

@@ -102,7 +102,9 @@ def _axes(system: MechanicalSystem, kind: Kind, window: Window | None) -> list[G
     if window is None:
         return []
     if not isinstance(window, Mapping):
-        raise InputError(kind, window, f'give coordinates with their values, as {{"{_any(system)}": [...]}}')
+        raise InputError(
+            kind, window, f'give coordinates with their values, as {{"{_any(system)}": [...]}}'
+        )
     made = []
     for which, given in window.items():
         system.coordinate(which)
@@ -150,7 +152,9 @@ def _completed(system: MechanicalSystem, kind: str, given: list[Coordinate]) -> 
         vector = system.coordinate(which)
         if not _independent([*rows, vector]):
             raise InputError(
-                f"{kind}[{which!r}]", "given", "it follows from the other coordinates; leave one out"
+                f"{kind}[{which!r}]",
+                "given",
+                "it follows from the other coordinates; leave one out",
             )
         rows.append(vector)
     for which in (*system.named, *range(system.size)):

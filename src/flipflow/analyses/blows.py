@@ -127,7 +127,8 @@ class Blows:
     ) -> Real:
         """The least share that throws, for rows and moments (K,); infinite where none does.
 
-        Steps of the ladder up to 1 are a fifth, at most a sixtieth of the whole; or the ladder is a fine one around shares (K,).
+        Steps of the ladder up to 1 are a fifth, at most a sixtieth of the whole; the ladder is a
+        fine one around shares (K,) where these are given.
         """
         ladder = LADDER if around is None else FINE_LADDER
         base = np.ones(row.size) if around is None else around

@@ -17,7 +17,7 @@ from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.solver import Point
 from flipflow.methods.stability import STABLE, stability_words
-from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
@@ -152,8 +152,9 @@ def jump_risk(
 
     so the frame's velocity becomes v m / (m + L); an infinitely heavy lump stops the frame for a
     moment. Moments of the turn and sizes are scanned, each size a fifth above the one before
-    and no step above a sixtieth of the largest; the first that throws the motion out is refined by bisection, and so is the moment. A window of
-    sizes narrower than a step of the scan can be missed.
+    and no step above a sixtieth of the largest; the first that throws the motion out is refined by
+    bisection, and so is the moment. A window of sizes narrower than a step of the scan can be
+    missed.
 
     Parameters
     ----------
@@ -299,7 +300,9 @@ def _notes(blows: Blows, others: tuple[Orbit, ...], found: list[Throw]) -> tuple
         )
     if not all(throw.sharp for throw in found):
         notes.append("Close to a least blow the outcome changes more than once within 1 %.")
-    idle = [f for f in dict.fromkeys(r.frame for r in blows.rows) if f not in {t.frame for t in found}]
+    idle = [
+        f for f in dict.fromkeys(r.frame for r in blows.rows) if f not in {t.frame for t in found}
+    ]
     if others and idle:
         names = " or ".join(map(str, idle))
         notes.append(f"No impulse tried on {names}, and no lump, throws the motion onto another.")

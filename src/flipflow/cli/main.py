@@ -9,6 +9,7 @@ import typer
 
 from flipflow import __version__
 from flipflow.cli.analyze import analyze
+from flipflow.cli.basins import basins
 from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.schema import schema
@@ -23,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (analyze, check, new, schema):
+for command in (analyze, basins, check, new, schema):
     app.command()(command)
 
 

@@ -103,7 +103,9 @@ def document_of(result: object) -> dict[str, Any]:
         return basins_document(result)
     if isinstance(result, Assessment):
         return assessment_document(result)
-    raise InputError("result", type(result).__name__, "give a Branch, an Orbit, Basins or an Assessment")
+    raise InputError(
+        "result", type(result).__name__, "give a Branch, an Orbit, Basins or an Assessment"
+    )
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:

@@ -107,6 +107,7 @@ def caught(z: Real, centre: Real, form: Real, owner: Int) -> int:
                 row += form[a, i, j] * (z[j] - centre[a, j])
             value += row * (z[i] - centre[a, i])
             if not math.isfinite(value):
+                value = math.inf
                 break
         if value <= 1.0:
             return int(owner[a])

@@ -33,9 +33,7 @@ def section_states(lanes: Lanes, point: Point) -> Real:
     return np.array(states)
 
 
-def capture_of(
-    lanes: Lanes, point: Point, label: int, rng: np.random.Generator
-) -> Capture | None:
+def capture_of(lanes: Lanes, point: Point, label: int, rng: np.random.Generator) -> Capture | None:
     """One ellipsoid for each turn of a stable motion; None where no size of it holds.
 
     ``point`` is solved for over whole turns, ``solver.turns`` of them.
@@ -65,7 +63,9 @@ def _form(lanes: Lanes, centre: Point, rng: np.random.Generator) -> Real | None:
         return None
     unit = np.linalg.inv(L).T
     radius = _radius(lanes, centre, scale[:, None] * unit, L.T / scale, rng)
-    return None if radius is None else np.ascontiguousarray((P / scale / scale[:, None]) / radius**2)
+    return (
+        None if radius is None else np.ascontiguousarray((P / scale / scale[:, None]) / radius**2)
+    )
 
 
 def _radius(

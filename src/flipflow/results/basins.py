@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -115,5 +114,3 @@ class Basins:
     def axis(self, kind: str, which: Coordinate) -> GridAxis | None:
         """The axis of a coordinate, None where it does not vary."""
         return next((a for a in self.axes if (a.kind, a.which) == (kind, which)), None)
-
-

@@ -1,0 +1,54 @@
+"""Progress on stderr, and Ctrl-C that keeps what is finished."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from flipflow.errors import Cancelled
+
+Monitor = Callable[[str, float], None]
+
+
+@contextmanager
+def progress() -> Iterator[Monitor]:
+    """A monitor that shows a sentence and the share done, on a terminal only."""
+    from rich.console import Console  # noqa: PLC0415  keeps --help quick
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
+
+    terminal = Console(stderr=True)
+    bar = Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
+        console=terminal, transient=True, disable=not terminal.is_terminal,
+    )  # fmt: skip
+    with bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda sentence, share: bar.update(task, description=sentence, completed=share)
+
+
+@contextmanager
+def stoppable(monitor: Monitor, stage: str) -> Iterator[Monitor]:
+    """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
+
+    In other stages, and at the second time, Ctrl-C ends the program at once.
+    """
+    at = {"stage": "", "stop": ""}
+
+    def told(sentence: str, share: float) -> None:
+        at["stage"] = sentence
+        if at["stop"]:
+            raise Cancelled("stopped by the user")
+        monitor(sentence, share)
+
+    def interrupted(_number: int, _frame: FrameType | None) -> None:
+        if at["stage"] != stage or at["stop"]:
+            raise KeyboardInterrupt
+        at["stop"] = "asked"
+
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield told
+    finally:
+        signal.signal(signal.SIGINT, before)
