@@ -20,14 +20,25 @@ _HOME = {
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "basins": "flipflow.analyses.basins",
     "jump_risk": "flipflow.analyses.jump_risk",
+    "start_up": "flipflow.analyses.startup",
+    "coast_down": "flipflow.analyses.startup",
     "assess": "flipflow.analyses.assessment",
+    "simulate": "flipflow.analyses.simulate",
+    "sweep": "flipflow.analyses.sweep",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
     "Unbalance": "flipflow.model.elements",
     "MechanicalSystem": "flipflow.model.system",
     "FlipFlowScreen": "flipflow.model.screen",
+    "Impulse": "flipflow.model.disturbance",
+    "LoadStep": "flipflow.model.disturbance",
+    "Lump": "flipflow.model.disturbance",
+    "InputError": "flipflow.errors",
     "Load": "flipflow.model.screen",
+    "Motor": "flipflow.model.drive",
+    "Drive": "flipflow.model.drive",
+    "SpeedProfile": "flipflow.model.drive",
     "Limits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
@@ -47,6 +58,11 @@ if TYPE_CHECKING:
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.analyses.simulate import simulate as simulate
+    from flipflow.analyses.startup import coast_down as coast_down
+    from flipflow.analyses.startup import start_up as start_up
+    from flipflow.analyses.sweep import sweep as sweep
+    from flipflow.errors import InputError as InputError
     from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
@@ -54,6 +70,12 @@ if TYPE_CHECKING:
     from flipflow.io.results import save as save
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
     from flipflow.methods.options import PiecewiseExact as PiecewiseExact
+    from flipflow.model.disturbance import Impulse as Impulse
+    from flipflow.model.disturbance import LoadStep as LoadStep
+    from flipflow.model.disturbance import Lump as Lump
+    from flipflow.model.drive import Drive as Drive
+    from flipflow.model.drive import Motor as Motor
+    from flipflow.model.drive import SpeedProfile as SpeedProfile
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.elements import HarmonicForce as HarmonicForce
     from flipflow.model.elements import Unbalance as Unbalance

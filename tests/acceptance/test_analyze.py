@@ -78,10 +78,10 @@ def test_feasible_window_is_inside_the_region_and_binds(analyzed):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--speeds", "0 rpm", "900 rpm"), ("omega", "above 0 rad/s")),
-        (("--speeds", "900 rpm", "300 rpm"), ("omega", "reversed")),
-        (("--speeds", "300 rpm", "300 rpm"), ("omega", "empty")),
-        (("--speeds", "300 rpm", "1e9 rpm"), ("omega", "no screen runs above")),
+        (("--speeds", "0 rpm", "900 rpm"), ("--speeds = '0 rpm to 900 rpm'", "above 0")),
+        (("--speeds", "15 Hz", "5 Hz"), ("--speeds = '15 Hz to 5 Hz'", "reversed")),
+        (("--speeds", "300 rpm", "300 rpm"), ("--speeds = '300 rpm to 300 rpm'", "empty")),
+        (("--speeds", "300 rpm", "1e9 rpm"), ("'300 rpm to 1e9 rpm'", "no screen runs above")),
         (("--speeds", "300", "900 rpm"), ("--speeds", "'300'")),
         (("--speeds", "2,5 Hz", "900 rpm"), ("--speeds", "'2,5 Hz'", "point")),
         (("--harmonics", "0"), ("harmonics = 0", "1 to 200")),

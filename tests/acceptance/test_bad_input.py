@@ -115,7 +115,24 @@ VALUES = {
     "reversed limit": (
         '["5 mm", "8 mm"]', '["8 mm", "5 mm"]', ("limits.relative_amplitude", "'8 mm'", "lesser"),
     ),
-    "half a limit": ('["5 mm", "8 mm"]', '"8 mm"', ("limits.relative_amplitude", "'8 mm'", "[")),
+    "half a limit": (
+        '["5 mm", "8 mm"]',
+        '"8 mm"',
+        (
+            "limits.relative_amplitude",
+            "'8 mm'",
+            'write for example relative_amplitude = ["4 mm", "8 mm"]',
+            'or relative_amplitude = ["0 mm", "8 mm"] for at most 8 mm',
+        ),
+    ),
+    "half a limit on speed": (
+        '["600 rpm", "1000 rpm"]',
+        '"1000 rpm"',
+        ("limits.speed", "'1000 rpm'", 'speed = ["0 rpm", "1000 rpm"] for at most 1000 rpm'),
+    ),
+    "a limit that is no pair": (
+        '["5 mm", "8 mm"]', '"small"', ("limits.relative_amplitude", "'small'", '["4 mm", "8 mm"]'),
+    ),
     "margin above one": ('jump_margin = "20 %"', 'jump_margin = "120 %"', ("limits.jump_margin",)),
     "temperature beyond the table": (
         'temperature = "50 degC"',

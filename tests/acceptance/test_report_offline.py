@@ -6,6 +6,7 @@ browser for its own housekeeping. No name is resolved, so that nothing could be 
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import shutil
@@ -86,6 +87,37 @@ def test_the_console_stays_silent(opened):
 def test_nothing_is_asked_for(opened):
     _, _, asked = opened
     assert [url for url in asked if not url.startswith("data:")] == []
+
+
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils is not installed")
+@pytest.mark.parametrize("count", [1, 4, 8, 20])
+def test_the_first_page_is_one_page(tmp_path, count):
+    """Issue 2: printed on A4, page 1 ends with its last line however many load cases there are."""
+    project = ff.load_project("ffs0827")
+    more = (ff.Load(name=f"half full {k}", stiffness_factor=1.0 + 0.01 * k) for k in range(16))
+    loads = (*project.load_cases, *more)[:count]
+    report = tmp_path / "report.html"
+    assessed = assess(dataclasses.replace(project, load_cases=loads))
+    report.write_text(html(assessed), encoding="utf-8")
+    first, second = (" ".join(page.split()) for page in pages(report, tmp_path)[:2])
+    assert "Power, throw dissipated power" in first
+    assert second.startswith("The machine" if count <= 4 else "Load cases and notes")
+    assert all(load.name in (first if count <= 4 else second) for load in loads)
+
+
+def pages(report, folder):
+    """Text of each page as Chromium prints it."""
+    printed = folder / "report.pdf"
+    subprocess.run(
+        [CHROMIUM, *QUIET, f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer",
+         f"--print-to-pdf={printed}", report.as_uri()],
+        capture_output=True, timeout=120, check=True,
+    )  # fmt: skip
+    text = subprocess.run(
+        [shutil.which("pdftotext"), "-layout", printed, "-"],
+        capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    return text.stdout.split("\f")
 
 
 def test_the_watch_would_notice(tmp_path):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from flipflow import __version__
 from flipflow.cli import main as cli
+from flipflow.io.source import bundled_names
 
 
 @pytest.fixture
@@ -120,3 +122,26 @@ def test_help_loads_nothing_heavy():
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.strip() == "[]"
+
+
+def test_values_without_a_source_are_counted_and_grouped(run, tmp_path):
+    run("new", "a.toml")
+    lines = (tmp_path / "a.toml").read_text(encoding="utf-8").split("[sources]")[0]
+    (tmp_path / "a.toml").write_text(lines, encoding="utf-8")
+    _, out, _ = run("check", "a.toml")
+    assert max(map(len, out.splitlines())) <= 80
+    words = " ".join(out.split("Sources")[1].split())
+    assert "no source given for " in words
+    assert "frames (main_mass, floating_mass" in words
+    count = int(words.split("no source given for ")[1].split()[0])
+    document = json.loads(run("check", "a.toml", "--json", "-")[1])
+    assert count == len(document["values"]) + len(document["load_cases"])
+
+
+@pytest.mark.parametrize("command", ["analyze", "check"])
+def test_help_and_readme_name_every_bundled_machine(run, command):
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    _, out, _ = run(command, "--help")
+    for name in bundled_names():
+        assert name in out.replace("-\n", "-").split() or f"{name}," in out
+        assert f"`{name}`" in readme

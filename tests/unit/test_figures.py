@@ -12,6 +12,8 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Sheet
 
 import flipflow as ff
 from flipflow.analyses.assessment import assess
@@ -22,6 +24,7 @@ from flipflow.figures.layout import WIDTH, arrange, place_labels
 from flipflow.figures.motion import contact_bands, motions_figure, orbits_figure, portrait_figure
 from flipflow.figures.parts import Axis, Figure, Line, Panel
 from flipflow.figures.plotly import described
+from flipflow.figures.print import _draw
 from flipflow.figures.response import cases_figure
 from flipflow.figures.scales import MM, RPM
 from flipflow.figures.schematic import schematic
@@ -125,6 +128,32 @@ def test_shaded_contact_is_the_contact_share(orbit):
     assert shaded == pytest.approx(720.0 * orbit.contact_share(), rel=1e-9)
 
 
+@pytest.mark.parametrize("parts", [1, 2])
+def test_both_sides_are_shaded_and_drawn_where_gaps_differ(screen, parts):
+    """The stop as one spring with two gaps, and as two springs with one gap each."""
+    stop = screen.replace(clearance_minus=7e-3).stop()
+    springs = (stop,)
+    if parts == 2:
+        springs = (
+            dataclasses.replace(stop, clearance_minus=math.inf),
+            dataclasses.replace(
+                stop, direction=-stop.direction, clearance=7e-3, clearance_minus=math.inf
+            ),
+        )
+    system = dataclasses.replace(screen.system(), springs=springs)
+    orbit = ff.frequency_response(system, (60.0, 110.0)).orbits_at(100.0)[0]
+    bands = list(contact_bands(orbit))
+    touched = {
+        role: sum(band.high - band.low for band in bands if band.role == role)
+        for role in ("contact", "contact minus")
+    }
+    moving = orbit.displacement("relative", np.linspace(0.0, orbit.period, 200001)[1:])
+    assert touched["contact"] == pytest.approx(720.0 * (moving > 6e-3).mean(), abs=0.05)
+    assert touched["contact minus"] == pytest.approx(720.0 * (moving < -7e-3).mean(), abs=0.05)
+    lines = ff.figure(orbit).panels[0].lines
+    assert sorted(line.at for line in lines) == pytest.approx([-7.0, 6.0])
+
+
 def test_orbits_have_one_scale(assessment):
     figure = motions_figure(assessment)
     orbits = figure.panels[0]
@@ -194,6 +223,29 @@ def test_labels_of_lines_do_not_cover_each_other(places):
         for other in taken.get(label.level, []):
             assert abs(other - middle) > 40.0
         taken.setdefault(label.level, []).append(middle)
+
+
+@pytest.mark.parametrize("middle", [2.0, 500.0, 998.0])
+def test_many_labels_at_one_place_are_printed_apart(middle):
+    """Six labels as matplotlib sets them: none touches another, the panel or the title."""
+    places = [middle + 0.2 * k for k in range(6)]
+    lines = tuple(Line("x", at, f"jump (rising) {at:.4g} rpm") for at in places)
+    axes = (Axis("speed", "rpm", (0.0, 1000.0)), Axis("y", "mm", (0.0, 1.0)))
+    figure = Figure("a", "b.", (Panel(*axes, lines=lines, title="Title"),) * 2, 2, 300)
+    sheet = Sheet(figsize=(WIDTH / 96, 3.0), dpi=96)
+    _draw(sheet, figure, arrange(figure))
+    renderer = FigureCanvasAgg(sheet).get_renderer()
+    boxes = [
+        text.get_window_extent(renderer)
+        for panel in sheet.axes
+        for text in panel.texts
+    ]  # fmt: skip
+    assert len(boxes) == 14
+    for one, two in itertools.combinations(boxes, 2):
+        assert not one.overlaps(two)
+    for rect in (panel.get_window_extent(renderer) for panel in sheet.axes):
+        assert rect.height > 100.0
+        assert not any(rect.overlaps(box) for box in boxes)
 
 
 def test_plotly_takes_plain_json(assessment):

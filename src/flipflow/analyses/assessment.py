@@ -295,19 +295,32 @@ def verdict(
         head = f"{len(broken)} of {len(judged)} limits broken; worst"
     elif unchecked:
         head = f"all limits that could be checked are met {where}; tightest"
-    inside = any(low <= omega <= high for low, high in region.feasible)
-    outside = "" if inside or broken else ", but outside the operating region"
+    outside = "" if broken else _outside(omega, region)
     return f"{speed}: {head}: {_against(tightest)}{outside}."
 
 
+def _outside(omega: float, region: OperatingRegion) -> str:
+    """Which end of the region the speed lies beyond, in words; empty where it may run."""
+    if any(low <= omega <= high for low, high in region.feasible):
+        return ""
+    if region.lower <= omega <= region.upper:
+        return ", but outside the allowed speed range"
+    below = omega < region.lower
+    end, words = (region.lower, region.ends[0]) if below else (region.upper, region.ends[1])
+    side = "below" if below else "above"
+    return f", but {side} the operating region: {words} at {end * 30.0 / math.pi:.4g} rpm"
+
+
 def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
-    """A sentence for each case in which another motion is possible at working speed."""
-    return tuple(
-        f"Case {case.name}: another motion is possible at this speed; shown is the one reached "
-        f"when the speed is raised from below."
-        for case in cases
-        if sum(orbit.stable for orbit in case.orbits) > 1
+    """A sentence that names the cases in which another motion is possible at working speed."""
+    names = [case.name for case in cases if sum(orbit.stable for orbit in case.orbits) > 1]
+    if not names:
+        return ()
+    sentence = (
+        f"{'Case' if len(names) == 1 else 'Cases'} {'; '.join(names)}: another motion is possible "
+        "at this speed; shown is the one reached when the speed is raised from below."
     )
+    return (sentence,)
 
 
 def _against(row: LimitRow) -> str:

@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 from flipflow.analyses.periodic_orbits import periodic_orbits
 from flipflow.kernels import status
 from flipflow.kernels.lanes import NOT_SETTLED
-from flipflow.methods.capture import capture_of, section_states
-from flipflow.methods.exact import ExactSolver
+from flipflow.methods.capture import capture_of
 from flipflow.methods.lanes import Capture, Lanes, Run
+from flipflow.methods.settle import Settling, is_stable
 from flipflow.methods.solver import Point, Real
-from flipflow.methods.stability import STABLE, stability_words
 from flipflow.model.system import Machine, system_of
 from flipflow.results.orbit import Orbit
 
 MOST_PERIODS = 4
 TRIED_STATES = 16
 FIRST_SHARE = 64
-SAME = 1e-5
 
 
 class Attractors:
@@ -53,7 +51,7 @@ class Attractors:
         self.lanes = Lanes(self.system, omega, threads)
         self.capture = Capture.nothing(2 * self.system.size)
         self.orbits: list[Orbit] = []
-        self._sections: list[Real] = []
+        self._settling = Settling(self.system, MOST_PERIODS)
         for orbit in found:
             if orbit.stable:
                 self.add(orbit.point)
@@ -64,21 +62,19 @@ class Attractors:
         if known is not None:
             return known
         label = len(self.orbits)
-        capture = capture_of(self.lanes, point, label, self._rng)
+        phases = self._settling.phases(point)
+        capture = capture_of(self.lanes, point, phases, label, self._rng)
         if capture is None:
             return None
         self.capture = self.capture.joined(capture)
         self.orbits.append(Orbit(self.machine, point))
-        self._sections.append(section_states(self.lanes, point))
         return label
 
     def label_of(self, z: Real) -> int | None:
         """Label of the motion that passes through the state z at the start of a turn."""
-        n = self.system.size
-        scale = np.repeat([1.0, self.lanes.omega], n)
-        for label, section in enumerate(self._sections):
-            size = np.abs(section / scale).max() + self.orbits[label].point.solver.length
-            if np.abs((section - z) / scale).max(axis=1).min() < SAME * size:
+        for label, orbit in enumerate(self.orbits):
+            phases = self._settling.phases(orbit.point)
+            if any(self._settling.same(z, phase, orbit.omega) for phase in phases):
                 return label
         return None
 
@@ -139,11 +135,10 @@ class Attractors:
 
     def _stable_near(self, z: Real) -> Iterator[Point]:
         """Stable motions of one and more forcing periods that Newton reaches from z."""
-        for turns in range(1, MOST_PERIODS + 1):
-            solver = ExactSolver(self.system, half_turn=False, turns=turns)
-            point = solver.solve(z, self.lanes.omega)
-            if point is not None and stability_words(point.eigenvalues[None], None)[0] == STABLE:
-                yield point
+        for periods in range(1, MOST_PERIODS + 1):
+            point = self._settling.solver_of(periods).solve(z, self.lanes.omega)
+            if point is not None and is_stable(point):
+                yield self._settling.shortest(point)
 
 
 def _unsettled(run: Run) -> NDArray[np.bool_]:

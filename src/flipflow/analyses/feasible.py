@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
-import numpy as np
 from scipy.optimize import brentq
 
 from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.errors import IncompleteError
+from flipflow.methods.special import STABILITY_CHANGES
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import LIMIT_FIELD, Limits
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -21,6 +22,7 @@ Interval = tuple[float, float]
 Intervals = tuple[Interval, ...]
 AT_LEAST = ("jump_margin",)
 STABILITY = "stability"
+REGION = "operating region"
 
 
 @dataclass(frozen=True)
@@ -109,13 +111,14 @@ def common_window(
     """Intervals in which every limit is met in every case, and what binds their two ends."""
     window: Intervals = (region,)
     ends: dict[float, Bound] = {
-        region[0]: Bound("operating region", "empty"),
-        region[1]: Bound("operating region", "empty"),
+        region[0]: Bound(REGION, "empty"),
+        region[1]: Bound(REGION, "empty"),
     }
     for case in cases:
-        for name, intervals in case.intervals.items():
-            window = intersect(window, intervals)
-            for low, high in intervals:
+        # The range analysed ends where the limit on speed does, and with it every other interval.
+        for name in sorted(case.intervals, key=lambda name: name != "speed"):
+            window = intersect(window, case.intervals[name])
+            for low, high in case.intervals[name]:
                 ends.setdefault(low, Bound(name, case.name))
                 ends.setdefault(high, Bound(name, case.name))
     return window, tuple((ends[low], ends[high]) for low, high in window)
@@ -149,12 +152,36 @@ def _runs(branch: Branch, screen: FlipFlowScreen, span: Interval) -> list[_Run]:
         last = float(omega[-1])
         if low >= high:
             continue
-        inside = [i + run.start for i in np.flatnonzero((omega > low) & (omega < high))]
-        ends = [branch.solve_in(run, low), branch.solve_in(run, high)]
-        orbits = [ends[0], *(branch.orbit(i) for i in inside), ends[1]]
-        nodes = tuple(Working(screen, orbit, jumps) for orbit in orbits if orbit is not None)
+        orbits = _orbits(branch, run, (low, high))
+        nodes = tuple(Working(screen, orbit, jumps) for orbit in orbits)
         runs.append(_Run(branch, screen, run, jumps, nodes))
     return runs
+
+
+def _orbits(branch: Branch, run: slice, span: Interval) -> Iterator[Orbit]:
+    """Motions of a run over ``span``, rising: both ends, the branch's own, its special points.
+
+    Between two special points one more motion stands, so that it is known what holds there.
+    """
+    inside = [i for i in range(run.start, run.stop) if span[0] < branch.omega[i] < span[1]]
+    own = [branch.orbit(i) for i in inside]
+    special = [
+        point.orbit
+        for point in branch.special_points
+        if point.kind in STABILITY_CHANGES
+        and run.start <= point.position <= run.stop - 1
+        and span[0] < point.omega < span[1]
+    ]
+    middles = [
+        (one.omega + two.omega) / 2.0 for one, two in pairwise(sorted(special, key=_speed_of))
+    ]
+    solved = [branch.solve_in(run, omega) for omega in (*span, *middles)]
+    found = [orbit for orbit in solved if orbit is not None]
+    yield from sorted([*own, *special, *found], key=_speed_of)
+
+
+def _speed_of(orbit: Orbit) -> float:
+    return orbit.omega
 
 
 def _met(
@@ -190,9 +217,9 @@ def _met(
 
 
 def _stable_parts(run: _Run) -> list[Interval]:
-    """Parts of a run in which the motion is not unstable."""
+    """Parts of a run in which the motion is not unstable; they end at special points."""
     parts: list[Interval] = []
-    for one, two in zip(run.nodes, run.nodes[1:], strict=False):
+    for one, two in pairwise(run.nodes):
         if "unstable" in (one.orbit.stability, two.orbit.stability):
             continue
         if parts and parts[-1][1] == one.omega:

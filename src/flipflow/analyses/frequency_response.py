@@ -16,7 +16,13 @@ from flipflow.methods.exact import ExactSolver
 from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
 from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced, eigenvalues_of
 from flipflow.methods.special import STABILITY_CHANGES, Found, find_special_points
-from flipflow.methods.stability import UNDETERMINED, full_turn, stability_words
+from flipflow.methods.stability import (
+    UNDETERMINED,
+    full_turn,
+    saddle_side,
+    stability_words,
+    starts_beyond,
+)
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.orbit import Orbit
@@ -100,9 +106,11 @@ def check_interval(omega: object) -> tuple[float, float]:
     except (TypeError, ValueError):
         raise InputError("omega", omega, "give an interval (low, high) in rad/s") from None
     if not (math.isfinite(low) and math.isfinite(high) and low > 0.0):
-        raise InputError("omega", omega, "give two finite frequencies above 0 rad/s")
+        raise InputError("omega", omega, "give two finite speeds above 0 rad/s")
     if high <= low:
-        raise InputError("omega", omega, "the interval is empty or reversed; give (low, high)")
+        raise InputError(
+            "omega", omega, "the interval is empty or reversed; give the lower end first"
+        )
     if high > OMEGA_MOST:
         raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
     return low, high
@@ -186,6 +194,7 @@ def _finished(
 ) -> Branch:
     if eigenvalues is None:
         eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
+    side = saddle_side(traced.tangent[:, -1], eigenvalues) if eigenvalues.size else None
     special = tuple(
         SpecialPoint(
             one.kind,
@@ -202,9 +211,9 @@ def _finished(
         solver=solver,
         traced=traced,
         return_maps=maps,
-        saddle_side_at_start=_starts_beyond(eigenvalues),
+        saddle_side_at_start=starts_beyond(eigenvalues),
         multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
-        stability=stability_words(eigenvalues, _saddle_side(traced, eigenvalues)),
+        stability=stability_words(eigenvalues, side),
         special_points=special,
         status=BranchStatus.from_code(traced.code),
         notes=tuple(notes),
@@ -215,19 +224,3 @@ def _finished(
 def _word(kind: str) -> str | None:
     """Where stability changes the motion is neither; elsewhere its multipliers tell."""
     return UNDETERMINED if kind in STABILITY_CHANGES else None
-
-
-def _saddle_side(traced: Traced, eigenvalues: NDArray[np.complex128]) -> NDArray[np.bool_] | None:
-    """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
-    if traced.omega.size == 0:
-        return None
-    backwards = traced.tangent[:, -1] * np.sign(traced.tangent[0, -1]) < 0.0
-    return np.asarray(backwards ^ _starts_beyond(eigenvalues))
-
-
-def _starts_beyond(eigenvalues: NDArray[np.complex128]) -> bool:
-    """Whether the first motion has an odd number of real eigenvalues beyond +1."""
-    if eigenvalues.shape[0] == 0:
-        return False
-    first = eigenvalues[0]
-    return int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1

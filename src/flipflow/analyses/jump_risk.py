@@ -15,8 +15,8 @@ from flipflow.analyses.blows import Blows
 from flipflow.analyses.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.exact import ExactSolver
+from flipflow.methods.settle import is_stable
 from flipflow.methods.solver import Point
-from flipflow.methods.stability import STABLE, stability_words
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.orbit import Orbit
 
@@ -245,7 +245,7 @@ def _working_point(system: MechanicalSystem, motion: float | Orbit) -> Point:
     else:
         start, omega = first_unknowns(solver, motion), float(motion)
     point = solver.solve(start, omega)
-    if point is None or stability_words(point.eigenvalues[None], None)[0] != STABLE:
+    if point is None or not is_stable(point):
         raise IncompleteError(
             f"No stable motion of one turn is reached from below at {omega:.6g} rad/s; give the "
             "working motion as an orbit, for example one of ff.periodic_orbits."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,10 @@ from flipflow.results.branch import Branch
 
 Monitor = Callable[[str, float], None]
 LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
+CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
+JUMP_WORDS = "jump when the speed falls (w_lb)"
+ANTIRESONANCE_WORDS = "antiresonance of the main frame (w_ar)"
+PEAK_WORDS = "peak of the relative amplitude"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +45,8 @@ class OperatingRegion:
         w_ea and w_ar: equal amplitudes, antiresonance of the main frame.
     omega_cs
         w_cs: contact begins, the last rising one before the main peak; None if it never does.
+        With unequal gaps this is the side touched last: from there on both stops work.
+        :attr:`contact_speeds` holds both sides.
     omega_lb, omega_ub
         The two saddle-nodes of the main resonance; None without folds.
     lower, upper
@@ -72,6 +78,30 @@ class OperatingRegion:
     cases: tuple[CaseWindow, ...]
     branches: tuple[Branch, ...]
     notes: tuple[str, ...]
+
+    @property
+    def contact_speeds(self) -> Mapping[int, float]:
+        """Where each side's contact begins, rad/s, by side: +1, -1.
+
+        The last rising one up to ``omega_cs``. With equal gaps both sides begin together and only
+        +1 is there; a side that is not touched up to ``omega_cs`` is left out.
+        """
+        begins = self.branch.points_of(CONTACT_BEGIN)
+        last = max((p.position for p in begins if p.omega == self.omega_cs), default=-1.0)
+        return {p.side: p.omega for p in begins if p.position <= last}
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """Words for what ends the region below and above."""
+        below = {self.omega_cs: CONTACT_WORDS, self.omega_ea: EQUAL_WORDS}
+        above = {self.omega_lb: JUMP_WORDS, self.omega_ar: ANTIRESONANCE_WORDS}
+        highest = float(self.branch.omega.max())
+        return (
+            below.get(self.lower, "lowest speed analysed"),
+            above.get(
+                self.upper, "highest speed analysed" if self.upper == highest else PEAK_WORDS
+            ),
+        )
 
 
 def operating_region(
@@ -125,11 +155,7 @@ def operating_region(
         cases.append(case_window(loaded, load, own, wanted, within))
     marks = _landmarks(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
-    notes = {
-        f"The limit on {QUANTITIES[name].label} is not checked: {why}."
-        for case in cases
-        for name, why in case.unchecked.items()
-    }
+    notes = _unchecked_notes(cases)
     named = zip(("empty", *(case.name for case in cases)), (branch, *branches), strict=True)
     unfinished = dict.fromkeys(
         f"Case {name}: {text}"
@@ -138,8 +164,20 @@ def operating_region(
     )
     return OperatingRegion(
         screen, branch, *marks.frequencies, marks.lower, marks.upper, feasible, binding,
-        tuple(cases), tuple(branches), (*sorted(notes), *unfinished, *marks.notes),
+        tuple(cases), tuple(branches), (*notes, *unfinished, *marks.notes),
     )  # fmt: skip
+
+
+def _unchecked_notes(cases: Sequence[CaseWindow]) -> Iterator[str]:
+    """A sentence for each reason why limits are not checked, which names them all."""
+    reasons: dict[str, dict[str, None]] = {}
+    for case in cases:
+        for name, why in case.unchecked.items():
+            reasons.setdefault(why, {})[QUANTITIES[name].label] = None
+    for why, labels in reasons.items():
+        *others, last = labels
+        named = f"limits on {', '.join(others)} and {last} are" if others else f"limit on {last} is"
+        yield f"The {named} not checked: {why}."
 
 
 def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[float, float]:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.frequency_response import first_unknowns
-from flipflow.errors import InputError
-from flipflow.methods.exact import ExactSolver
+from flipflow.analyses.operating_region import Monitor
+from flipflow.analyses.sweep import check_count
+from flipflow.errors import IncompleteError, InputError
+from flipflow.methods.settle import Settling
 from flipflow.methods.solver import Point, Real
 from flipflow.methods.two_event import TwoEventProblem
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -17,19 +19,25 @@ from flipflow.results.orbit import Orbit
 
 STARTS = 64
 SETTLING_TURNS = 60
-SAME = 1e-6
+MOST_PERIODS = 6
+SWEEP_RATIO, SWEEP_STEPS = 1.3, 12
 
 
 def periodic_orbits(
-    machine: Machine, omega: float, max_periods: int = 1, rng: int | np.random.Generator = 0
+    machine: Machine,
+    omega: float,
+    max_periods: int = 1,
+    rng: int | np.random.Generator = 0,
+    monitor: Monitor | None = None,
 ) -> tuple[Orbit, ...]:
-    """Periodic motions of one forcing period at ``omega``, stable and unstable.
+    """Periodic motions at ``omega`` that repeat after up to ``max_periods`` forcing periods.
 
     Starts: the motion reached from below; for one symmetric stop, every zero of the scalar problem
-    of two-touch motions; rest, and a low-discrepancy cloud of states as large as the linear motion
-    or the gaps. Each is tried as it is (unstable motions are found so) and after some turns of
-    settling. Newton on the exact flow over a whole turn, so that motions need not be
-    symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
+    of two-touch motions; rest; what is reached by stepping the speed up and down to ``omega``; and
+    a low-discrepancy cloud of states as large as the linear motion or the gaps. Each is tried as it
+    is (unstable motions are found so) and after some turns of settling. Newton on the exact flow
+    over 1, 2, ... turns, so that motions need not be symmetric; for a machine that is its own
+    mirror image every motion's mirror image is one too.
 
     Parameters
     ----------
@@ -38,48 +46,87 @@ def periodic_orbits(
     omega
         Forcing frequency in rad/s.
     max_periods
-        Forcing periods after which a motion may repeat: 1.
+        Most forcing periods after which a motion may repeat, 1 to 6.
     rng
         Seed or generator for the cloud of starts.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
 
     Returns
     -------
     tuple of Orbit
-        Without duplicates, largest relative motion at the first gap first. A search, not a proof:
-        a motion with a small basin and weak instability can be missed.
+        Stable and unstable, each once whatever its phase, largest relative motion at the first gap
+        first. A search, not a proof: a motion with a small basin and weak instability can be
+        missed.
 
     Raises
     ------
     InputError
-        For a frequency that is not finite or not above 0.
+        For a frequency that is not finite or not above 0, or periods outside 1 to 6.
     """
-    if max_periods != 1:
-        raise InputError(
-            "max_periods", max_periods, "motions of one forcing period are searched: 1"
-        )
+    check_count("max_periods", max_periods, MOST_PERIODS)
     number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
     if not (number and math.isfinite(omega) and omega > 0.0):
         raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    solver = ExactSolver(system_of(machine), half_turn=False)
-    found: list[Point] = []
-    for start in _starts(solver, omega, np.random.default_rng(rng)):
-        for turns in (0, SETTLING_TURNS):
-            z = solver.settled(start, omega, turns) if turns else start
-            point = solver.solve(z, omega)
-            if point is None:
-                continue
-            _keep(found, point, solver)
-            if solver.system.symmetric:
-                _keep(found, _mirrored(solver, point), solver)
-    orbits = [Orbit(machine, point) for point in found]
-    which = _first_gap(solver.system)
+    search = _Search(machine, float(omega), max_periods)
+    starts = _starts(search.settling, search.omega, np.random.default_rng(rng))
+    for k, start in enumerate(starts):
+        search.try_from(start)
+        if monitor is not None:
+            monitor(f"{len(search.found)} motions found", (k + 1) / len(starts))
+    orbits = [Orbit(machine, point) for point in search.found]
+    which = _first_gap(search.settling.solver.system)
     return tuple(sorted(orbits, key=lambda o: (-_reach(o, which), -o.state @ which)))
 
 
-def _starts(solver: ExactSolver, omega: float, rng: np.random.Generator) -> list[Real]:
-    """Rest, the motion from below, two-touch motions, and a cloud of states."""
+class _Search:
+    """The motions found so far at one frequency."""
+
+    def __init__(self, machine: Machine, omega: float, max_periods: int) -> None:
+        self.settling = Settling(system_of(machine), max_periods)
+        self.omega, self.max_periods = omega, max_periods
+        self.found: list[Point] = []
+
+    def try_from(self, start: Real) -> None:
+        """Newton from a state and from where it settles to, for every number of periods."""
+        solver = self.settling.solver
+        try:
+            settled = solver.section(start, self.omega, SETTLING_TURNS)[-1]
+        except IncompleteError:
+            return
+        for z in (start, settled):
+            for periods in range(1, self.max_periods + 1):
+                point = self.settling.solver_of(periods).solve(z, self.omega)
+                if point is not None and self.settling.shortest(point) is point:
+                    self._keep(point)
+                    if solver.system.symmetric:
+                        self._keep(self._mirrored(point))
+
+    def _keep(self, point: Point) -> None:
+        """Add a motion unless it is known, in whatever phase."""
+        for known in self.found:
+            if known.solver.turns == point.solver.turns and any(
+                self.settling.same(point.u, phase, self.omega)
+                for phase in self.settling.phases(known)
+            ):
+                return
+        self.found.append(point)
+
+    def _mirrored(self, point: Point) -> Point:
+        """The mirror image: minus the state half a turn later."""
+        solver = self.settling.solver_of(point.solver.turns)
+        motion = solver.motion(point.u, self.omega)
+        t = math.pi / self.omega
+        state = -np.concatenate([motion.derivative(t, 0), motion.derivative(t, 1)])
+        mirrored = solver.solve(state, self.omega)
+        return point if mirrored is None else mirrored
+
+
+def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[Real]:
+    """Rest, the motion from below, two-touch motions, stepped speeds, and a cloud of states."""
     from scipy.stats import qmc  # noqa: PLC0415  slow to import, and few ask for all motions
 
+    solver = settling.solver
     n = solver.system.size
     X = np.abs(solver.builder.contact_free(np.array([omega]))[0])
     gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
@@ -91,28 +138,12 @@ def _starts(solver: ExactSolver, omega: float, rng: np.random.Generator) -> list
     starts = [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
     if TwoEventProblem.applies(solver.builder):
         starts += list(TwoEventProblem(solver.builder).states(omega)[0])
+    for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO):
+        z = np.zeros(2 * n)
+        for speed in np.geomspace(ratio * omega, omega, SWEEP_STEPS):
+            z = solver.section(z, float(speed), SETTLING_TURNS)[-1]
+        starts.append(z)
     return starts
-
-
-def _keep(found: list[Point], point: Point, solver: ExactSolver) -> None:
-    """Add a point unless it is known."""
-    scale = np.concatenate(
-        [np.full(solver.system.size, 1.0), np.full(solver.system.size, point.omega)]
-    )
-    for known in found:
-        size = np.abs(known.u / scale).max() + solver.length
-        if np.abs((known.u - point.u) / scale).max() < SAME * size:
-            return
-    found.append(point)
-
-
-def _mirrored(solver: ExactSolver, point: Point) -> Point:
-    """The mirror image: minus the state half a turn later."""
-    half = solver.motion(point.u, point.omega)
-    t = math.pi / point.omega
-    state = -np.concatenate([half.derivative(t, 0), half.derivative(t, 1)])
-    mirrored = solver.solve(state, point.omega)
-    return point if mirrored is None else mirrored
 
 
 def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:

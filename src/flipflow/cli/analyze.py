@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.errors import InputError
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from flipflow.analyses.assessment import Assessment
     from flipflow.model.project import Project
 
+FILE_HELP = "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without)."
+
 
 def analyze(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-    ],
+    file: Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help="Folder for report and data."),
@@ -76,7 +78,10 @@ def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str,
     options: dict[str, Any] = {}
     if speeds is not None:
         low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in speeds)
-        options["omega"] = check_interval((low, high))
+        try:
+            options["omega"] = check_interval((low, high))
+        except InputError as error:
+            raise InputError("--speeds", " to ".join(speeds), error.remedy) from None
     if harmonics is not None:
         options["method"] = HarmonicBalance(harmonics)
     return options

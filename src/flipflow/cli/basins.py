@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.options import File, Force, Json, Output, Speed, speed_of
+from flipflow.cli.progress import progress, stoppable
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -23,27 +26,14 @@ WINDOW = 2.0
 
 
 def basins(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-    ],
-    speed: Annotated[
-        str | None,
-        typer.Option("--speed", metavar="SPEED", help='"850 rpm"; without it, the file\'s speed.'),
-    ] = None,
+    file: File,
+    speed: Speed = None,
     cells: Annotated[
         int, typer.Option("--cells", metavar="N", help="N x N starting states.")
     ] = CELLS,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder for figure and data."),
-    ] = None,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
-    ] = False,
+    output: Output = None,
+    json: Json = None,
+    force: Force = False,
 ) -> None:
     """Show on which motion a machine settles, and what throws it off."""
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
@@ -52,7 +42,7 @@ def basins(
     from flipflow.io.results import prepare_folder  # noqa: PLC0415
 
     project = load_project(file, force=force)
-    omega = _speed(project.speed, speed)
+    omega = speed_of(project, speed)
     if not 2 <= cells <= MOST_CELLS_ASIDE:
         raise InputError("--cells", cells, f"give a whole number from 2 to {MOST_CELLS_ASIDE}")
     folder = output or Path(f"{project.name}-flipflow")
@@ -73,29 +63,13 @@ def basins(
         raise Cancelled("Stopped by the user; the cells that were finished are written.")
 
 
-def _speed(given_by_file: float | None, speed: str | None) -> float:
-    from flipflow.analyses.frequency_response import check_interval  # noqa: PLC0415
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.units import parse_quantity  # noqa: PLC0415
-
-    if speed is None:
-        if given_by_file is None:
-            raise InputError("--speed", None, 'the file gives no speed; give one, as "850 rpm"')
-        return given_by_file
-    omega = parse_quantity(speed, "rad/s", field="--speed")
-    if omega <= 0.0:
-        raise InputError("--speed", speed, "give a speed above 0")
-    return check_interval((omega / 2.0, omega))[1]
-
-
 def _computed(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Basins, JumpRisk | None]:
     """Basins, then the jump risk unless the user stopped the run."""
     from flipflow.analyses.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
     from flipflow.analyses.jump_risk import jump_risk  # noqa: PLC0415
-    from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
     from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
 
-    with progress() as monitor:
+    with progress("starting") as monitor:
         compile_ahead(
             lambda seconds: monitor(f"compiling, once per version: {seconds:.0f} s", 0.0),
             ("lanes",),

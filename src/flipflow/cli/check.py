@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.analyze import FILE_HELP
+from flipflow.cli.output import print_list, printable
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -16,9 +19,7 @@ if TYPE_CHECKING:
 
 
 def check(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-    ],
+    file: Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)],
     json: Annotated[
         str | None,
         typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
@@ -41,11 +42,11 @@ def check(
 
 def _show(result: Check, out: Console) -> None:
     for warning in result.warnings:
-        out.print(f"Warning: {_printable(warning)}\n", style="bold yellow")
-    out.print(f"{_printable(result.name)}: {_verdict(result)}", style="bold")
+        out.print(f"Warning: {printable(warning)}\n", style="bold yellow")
+    out.print(f"{printable(result.name)}: {_verdict(result)}", style="bold")
     out.print()
     out.print(_values(result.values))
-    _list(out, "Sums of pieces", (f"{key}: {text}" for key, text in result.sums.items()))
+    print_list(out, "Sums of pieces", (f"{key}: {text}" for key, text in result.sums.items()))
     out.print()
     out.print(_speeds(result))
     out.print()
@@ -54,9 +55,9 @@ def _show(result: Check, out: Console) -> None:
     out.print(f"Unbalance over all mass (m0r/(m1+m2)): {1e3 * result.static_amplitude:.4g} mm")
     out.print()
     out.print(_cases(result.load_cases))
-    _list(out, "Sources", _sources(result))
-    _list(out, "Assumed", result.assumed)
-    _list(out, "Missing", (f"{g.missing}: disables {g.disables}" for g in result.missing))
+    print_list(out, "Sources", _sources(result))
+    print_list(out, "Assumed", result.assumed)
+    print_list(out, "Missing", (f"{g.missing}: disables {g.disables}" for g in result.missing))
 
 
 def _verdict(result: Check) -> str:
@@ -76,7 +77,7 @@ def _values(values: Iterable[Value]) -> Table:
             digits = 6 if len(value.si) == 1 else 5  # two ends must fit the column
             numbers = " to ".join(_plain(number, digits) for number in value.si)
             si = f"{numbers} {value.unit}".strip()
-            table.add_row(value.key.split(".")[1], value.symbol, _printable(value.written), si)
+            table.add_row(value.key.split(".")[1], value.symbol, printable(value.written), si)
     return table
 
 
@@ -98,32 +99,26 @@ def _cases(cases: Iterable[Case]) -> Table:
     for case in cases:
         numbers = (case.stiffness_factor, case.damping_factor, case.main_mass, case.floating_mass)
         warm = "" if case.temperature is None else f"{case.temperature:.4g}"
-        table.add_row(_printable(case.name), *(f"{number:.4g}" for number in numbers), warm)
+        table.add_row(printable(case.name), *(f"{number:.4g}" for number in numbers), warm)
     return table
 
 
 def _sources(result: Check) -> Iterator[str]:
     """Group by source; a value without one stands last."""
-    named = [(value.source, value.key) for value in result.values]
-    named += [(case.source, f"load case {case.name!r}") for case in result.load_cases]
+    named = [(value.source, *value.key.split(".")) for value in result.values]
+    named += [(case.source, "load_cases", repr(case.name)) for case in result.load_cases]
     for source, rows in groupby(sorted(named, key=_no_source_last), key=lambda row: row[0]):
-        keys = ", ".join(_printable(key) for _, key in rows)
-        yield f"{_printable(source) or 'no source given'}: {keys}"
+        listed = tuple(rows)
+        sections = "; ".join(
+            f"{section} ({', '.join(printable(key) for *_, key in group)})"
+            for section, group in groupby(listed, key=lambda row: row[1])
+        )
+        head = printable(source) or f"no source given for {len(listed)} entries"
+        yield f"{head}: {sections}"
 
 
-def _no_source_last(row: tuple[str, str]) -> tuple[bool, str]:
+def _no_source_last(row: tuple[str, ...]) -> tuple[bool, str]:
     return not row[0], row[0]
-
-
-def _list(out: Console, title: str, lines: Iterable[str]) -> None:
-    """Print a titled list whose lines wrap under their own beginning."""
-    from rich.padding import Padding  # noqa: PLC0415  slow to import
-
-    lines = tuple(lines)
-    if lines:
-        out.print(f"\n{title}", style="bold")
-    for line in lines:
-        out.print(Padding(line, (0, 0, 0, 2)))
 
 
 def _table(*names: str, right: int = 0, fixed: bool = False) -> Table:
@@ -136,7 +131,3 @@ def _table(*names: str, right: int = 0, fixed: bool = False) -> Table:
         held = fixed and index == 0
         table.add_column(name, justify="right" if numeric else "left", no_wrap=held)
     return table
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)

@@ -12,7 +12,11 @@ from flipflow.cli.analyze import analyze
 from flipflow.cli.basins import basins
 from flipflow.cli.check import check
 from flipflow.cli.new import new
+from flipflow.cli.orbits import orbits
 from flipflow.cli.schema import schema
+from flipflow.cli.simulate import simulate
+from flipflow.cli.startup import startup
+from flipflow.cli.sweep import sweep
 from flipflow.errors import FlipflowError
 
 app = typer.Typer(
@@ -24,7 +28,8 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (analyze, basins, check, new, schema):
+COMMANDS = (analyze, basins, check, new, schema, simulate, sweep, orbits, startup)
+for command in COMMANDS:
     app.command()(command)
 
 

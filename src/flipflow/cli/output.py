@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,22 @@ def console() -> Console:
 
     width = min(shutil.get_terminal_size().columns, COLUMNS)
     return Console(width=max(width, 40), highlight=False, markup=False, emoji=False)
+
+
+def print_list(out: Console, title: str, lines: Iterable[str]) -> None:
+    """Print a titled list whose lines wrap under their own beginning; nothing where it is empty."""
+    from rich.padding import Padding  # noqa: PLC0415  slow to import
+
+    lines = tuple(lines)
+    if lines:
+        out.print(f"\n{title}", style="bold")
+    for line in lines:
+        out.print(Padding(line, (0, 0, 0, 2)))
+
+
+def printable(text: str) -> str:
+    """Blanks for control characters, which a terminal would act on."""
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def write_json(document: Mapping[str, object], target: str) -> None:

@@ -1,4 +1,4 @@
-"""Progress on stderr, and Ctrl-C that keeps what is finished."""
+"""Progress of long work on stderr, and Ctrl-C that keeps what is finished."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from types import FrameType
 
 from flipflow.errors import Cancelled
 
-Monitor = Callable[[str, float], None]
+Tell = Callable[[str, float], None]
 
 
 @contextmanager
-def progress() -> Iterator[Monitor]:
-    """A monitor that shows a sentence and the share done, on a terminal only."""
+def progress(begin: str) -> Iterator[Tell]:
+    """A bar while the block runs; what it yields takes a sentence and the share done.
+
+    Nothing is written where stderr is not a terminal.
+    """
     from rich.console import Console  # noqa: PLC0415  keeps --help quick
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
 
@@ -24,12 +27,12 @@ def progress() -> Iterator[Monitor]:
         console=terminal, transient=True, disable=not terminal.is_terminal,
     )  # fmt: skip
     with bar:
-        task = bar.add_task("starting", total=1.0)
+        task = bar.add_task(begin, total=1.0)
         yield lambda sentence, share: bar.update(task, description=sentence, completed=share)
 
 
 @contextmanager
-def stoppable(monitor: Monitor, stage: str) -> Iterator[Monitor]:
+def stoppable(tell: Tell, stage: str) -> Iterator[Tell]:
     """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
 
     In other stages, and at the second time, Ctrl-C ends the program at once.
@@ -40,7 +43,7 @@ def stoppable(monitor: Monitor, stage: str) -> Iterator[Monitor]:
         at["stage"] = sentence
         if at["stop"]:
             raise Cancelled("stopped by the user")
-        monitor(sentence, share)
+        tell(sentence, share)
 
     def interrupted(_number: int, _frame: FrameType | None) -> None:
         if at["stage"] != stage or at["stop"]:

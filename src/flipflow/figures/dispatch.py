@@ -7,15 +7,21 @@ from functools import singledispatch
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
+from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
 from flipflow.figures.basins import basins_figure
+from flipflow.figures.history import history_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.figures.sweep import sweep_figure
+from flipflow.figures.transient import run_up_figure
 from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
+from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.sweep import Sweep
 
 
 @singledispatch
@@ -25,7 +31,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, basins, a linear response, an operating region or an assessment.
+        A branch, an orbit, basins, a motion over time, a sweep, a start or coast-down, a linear
+        response, an operating region or an assessment.
 
     Returns
     -------
@@ -65,6 +72,21 @@ def _(result: OperatingRegion) -> Figure:
 @figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@figure.register
+def _(result: Sweep) -> Figure:
+    return sweep_figure((result,))
+
+
+@figure.register
+def _(result: History) -> Figure:
+    return history_figure(result)
+
+
+@figure.register
+def _(result: RunUp) -> Figure:
+    return run_up_figure(result)
 
 
 @figure.register

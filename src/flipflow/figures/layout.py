@@ -11,7 +11,7 @@ from flipflow.figures.parts import Figure, Line, Panel
 WIDTH = 690  # the width of an A4 page within its margins, 96 pixels an inch
 FONT = 11
 CHARACTER = 5.9
-LABEL_ROW, TITLE_ROW, LEGEND_ROW = 14, 17, 19
+LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
 BOTTOM, LEFT, RIGHT = 40, 58, 14
 BARE_GAP, ROW_GAP = 26, 48
 LEGEND_MARK = 42
@@ -88,14 +88,22 @@ def legend_names(figure: Figure) -> list[str]:
 
 def legend_columns(figure: Figure) -> int:
     """Entries of the legend in a row."""
-    widest = max((len(name) for name in legend_names(figure)), default=0)
-    return max(int((WIDTH - RIGHT) / (LEGEND_MARK + CHARACTER * widest)), 1)
+    return _entries_in_a_row(legend_names(figure))
 
 
 def legend_rows(figure: Figure) -> int:
     """Rows the legend needs; none where there is one entry only."""
-    count = len(legend_names(figure))
-    return math.ceil(count / legend_columns(figure)) if count > 1 else 0
+    return legend_lines(legend_names(figure))
+
+
+def legend_lines(names: Sequence[str]) -> int:
+    """Rows that a legend of these entries needs."""
+    return math.ceil(len(names) / _entries_in_a_row(names)) if len(names) > 1 else 0
+
+
+def _entries_in_a_row(names: Sequence[str]) -> int:
+    widest = max(map(len, names), default=0)
+    return max(int((WIDTH - RIGHT) / (LEGEND_MARK + CHARACTER * widest)), 1)
 
 
 def place_labels(panel: Panel, width: float) -> dict[int, Label]:

@@ -24,9 +24,7 @@ TURNS = 2
 POINTS = 181
 MOTION_HEIGHT = 186
 TICKS = tuple((90.0 * k, f"{90 * k}") for k in range(0, 4 * TURNS + 1, 2))
-CONTACT_WORDS = (
-    "Shaded: the stop is touched; dark on the plus side (x2 > 0), light on the minus side."
-)
+CONTACT_WORDS = "Shaded: a stop is touched; dark on the plus side, light on the minus side."
 NO_CONTACT = "The stop is not reached."
 ORBITS = (
     "Orbit: path of a frame in one turn, both axes at the same scale; dot: where it is when the "
@@ -83,11 +81,7 @@ def motions_figure(assessment: Assessment) -> Figure | None:
     )  # fmt: skip
     said = f"The stop is not reached in case {case.name}."
     if case.stop_reached:
-        share = 100.0 * orbit.contact_share()
-        said = (
-            f"Shaded: the stop is touched, {share:.3g} % of the turn, dark on the plus side (case "
-            f"{case.name})."
-        )
+        said = f"Shaded: the stop is touched, {_shares_of_turn(orbit)} (case {case.name})."
     orbits = _orbits(found)
     if orbits is None:
         return Figure("Relative motion over two turns", said, (turns,), height=MOTION_HEIGHT)
@@ -132,13 +126,13 @@ def orbits_figure(assessment: Assessment) -> Figure | None:
     return Figure("Orbits of both frames", ORBITS, panels, columns, 60 + 172 * rows)
 
 
-def contact_bands(orbit: Orbit, spring: int = 0) -> Iterator[Band]:
-    """Strips over the shaft angle in degrees in which a stop is touched."""
+def contact_bands(orbit: Orbit) -> Iterator[Band]:
+    """Strips over the shaft angle in degrees in which a stop is touched, on either side."""
     turn = 360.0 / orbit.period * orbit.periods
+    along = [sign for sign, _ in _stops(orbit)]
     for touch in orbit.contact_intervals:
-        if touch.spring != spring:
-            continue
-        role = "contact" if touch.side > 0 else "contact minus"
+        plus = touch.side * (along[touch.spring] or 1) > 0
+        role = "contact" if plus else "contact minus"
         for k in range(-1, TURNS):
             low = max(touch.start * turn + 360.0 * k * orbit.periods, 0.0)
             high = min(touch.end * turn + 360.0 * k * orbit.periods, 360.0 * TURNS)
@@ -149,18 +143,40 @@ def contact_bands(orbit: Orbit, spring: int = 0) -> Iterator[Band]:
 def gap_lines(
     orbit: Orbit, axis: Literal["x", "y"] = "y", *, text: bool = True
 ) -> tuple[Line, ...]:
-    """Lines at the gap on both sides of the first stop."""
-    stop = _stop(orbit)
-    if stop is None:
-        return ()
-    plus, minus = stop.gaps
+    """Lines at every gap of the stops across the coordinate drawn, on both sides."""
     moving = orbit.displacement(_across(orbit))[:-1]
     # The label of a gap stands where the motion is at the other side, so that no line covers it.
-    ends = ((plus, "gap (e)", moving.argmin()), (-minus, "gap (-e)", moving.argmax()))
+    free = {1: _free(moving.argmin() / moving.size), -1: _free(moving.argmax() / moving.size)}
+    places = dict.fromkeys(
+        (sign * side * gap, _gap_word(stop, side), sign * side)
+        for sign, stop in _stops(orbit)
+        for side, gap in zip((1, -1), stop.gaps, strict=True)
+        if sign and math.isfinite(gap)
+    )
     return tuple(
-        Line(axis, at * MM, word if text else "", "gap", text_at=_free(place / moving.size))
-        for at, word, place in ends
-        if math.isfinite(at)
+        Line(axis, at * MM, word if text else "", "gap", text_at=free[side])
+        for at, word, side in places
+    )
+
+
+def _gap_word(stop: ClearanceSpring, side: int) -> str:
+    plus, minus = stop.gaps
+    mark = "" if plus == minus else "+" if side > 0 else "-"
+    return f"gap ({'' if side > 0 else '-'}e{mark})"
+
+
+def _shares_of_turn(orbit: Orbit) -> str:
+    """Share of the turn in contact; side by side where the gaps differ."""
+    if orbit.system.symmetric:
+        share = 100.0 * orbit.contact_share()
+        return f"{share:.3g} % of the turn; dark on the plus side, light on the minus side"
+    touches = orbit.contact_intervals
+    plus, minus = (
+        100.0 * sum(t.end - t.start for t in touches if t.side == side) / orbit.period
+        for side in (1, -1)
+    )
+    return (
+        f"{plus:.3g} % of the turn on the plus side (dark), {minus:.3g} % on the minus side (light)"
     )
 
 
@@ -169,8 +185,14 @@ def _free(share: float) -> float:
     return share / TURNS if share > 0.15 else (1.0 + share) / TURNS
 
 
-def _stop(orbit: Orbit) -> ClearanceSpring | None:
-    return orbit.system.springs[0] if orbit.system.springs else None
+def _stops(orbit: Orbit) -> list[tuple[int, ClearanceSpring]]:
+    """Every stop with a gap, and the sign by which it lies along the coordinate drawn, or 0."""
+    drawn = orbit.system.coordinate(_across(orbit))
+    return [
+        (next((s for s in (1, -1) if np.allclose(s * drawn, stop.direction)), 0), stop)
+        for stop in orbit.system.springs
+        if stop.acts and not stop.bonded
+    ]
 
 
 def _across(orbit: Orbit) -> Coordinate:

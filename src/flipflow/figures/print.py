@@ -184,10 +184,10 @@ def _draw_labels(axes: Axes, panel: Panel, geometry: Geometry, index: int) -> No
 def _draw_line_label(axes: Axes, line: Line, place: Label | None) -> None:
     colour = COLOURS[line.colour]
     if place is not None:
-        up = LABEL_ROW * place.level + 3.0
+        up = LABEL_ROW * place.level + 1.0
         axes.annotate(line.text, (line.at, 1.0), (place.shift * POINT, up * POINT),
                       xycoords=("data", "axes fraction"), textcoords="offset points",
-                      ha="center", color=colour)  # fmt: skip
+                      ha="center", va="bottom", color=colour)  # fmt: skip
     else:
         side = SIDES.get(line.text_at, "center")
         inwards = {"left": 3.0, "right": -3.0}.get(side, 0.0)

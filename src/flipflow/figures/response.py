@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
 from flipflow.figures.curves import Curve, Jump
+from flipflow.figures.layout import LEGEND_ROW, legend_rows
 from flipflow.figures.palette import CASES, case_colour, case_symbol
 from flipflow.figures.parts import Arrow, Axis, Band, Figure, Line, Panel, Trace
 from flipflow.figures.scales import DEGREES, HZ, MM, RPM
@@ -27,6 +29,7 @@ KIND_SYMBOLS = {"fold": "diamond", "contact begin": "circle-open", "contact end"
 BAND_POINTS = 300
 NEAR = 0.35
 MOST_COORDINATES = CASES
+LEGEND_WITHIN = 2  # rows of the legend of all load cases that its height has room for
 READING = (
     "Solid: the motion returns after a small disturbance. Dashed: it does not, so the machine "
     "leaves it. Arrows: the amplitude jumps, as the speed rises or falls."
@@ -129,10 +132,12 @@ def cases_figure(assessment: Assessment) -> Figure:
         "Half the peak-to-peak motion. Green strip: allowed speeds. Dashed: does not return after "
         "a small disturbance. Arrows: jumps."
     )
-    return Figure(
+    figure = Figure(
         "Amplitude of the relative motion over speed", caption, panels, len(panels), 216,
         shares=(0.56, 0.44) if len(panels) == 2 else (),
     )  # fmt: skip
+    beyond = max(legend_rows(figure) - LEGEND_WITHIN, 0)
+    return dataclasses.replace(figure, height=figure.height + LEGEND_ROW * beyond)
 
 
 def coordinates(system: MechanicalSystem) -> tuple[Coordinate, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from flipflow.errors import InputError
+from flipflow.model.drive import DRIVE_FIELDS
 from flipflow.model.elements import ContactLaw
 from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS
@@ -65,6 +66,7 @@ SECTION_SENTENCES: Mapping[str, str] = {
     "shear_springs": "Shear springs between main frame and floating frame.",
     "stops": "Stop springs, touched beyond a gap; leave the section out for a machine without.",
     "operation": "How the machine is run.",
+    "drive": "Motor and shaft, for starts; leave the section out and a drive is assumed.",
     "limits": "What the machine may do; a limit left out is not checked.",
     "load_cases": "Loads and weather the machine must bear; the empty machine should be one.",
     "sources": 'Where values come from: "section.key" = "drawing 4711, sheet 2".',
@@ -174,6 +176,7 @@ def _by_section() -> Mapping[str, tuple[Entry, ...]]:
         *document,
         *_machine_entries(),
         entry_of(SPEED),
+        *map(entry_of, DRIVE_FIELDS),
         *map(entry_of, LIMIT_FIELDS),
         *_load_entries(),
     )

@@ -9,6 +9,7 @@ from flipflow.errors import InputError
 from flipflow.io.derived import Derived, derive
 from flipflow.io.layout import LOAD_FIELDS, SPEED
 from flipflow.io.units import in_unit, shown
+from flipflow.model.drive import DRIVE_FIELDS, Drive
 from flipflow.model.fields import FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS, Limits
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -26,6 +27,7 @@ def implausible(
     limits: Limits,
     cases: Sequence[Load],
     speed: float | None,
+    drive: Drive | None,
     written: Mapping[str, object],
 ) -> tuple[InputError, ...]:
     """Return what looks wrong, as errors to be raised or shown; empty when nothing does.
@@ -33,7 +35,10 @@ def implausible(
     Derived figures are judged only where every single value is plausible: otherwise they would
     repeat in other words what is wrong already. ``written`` holds values as the file has them.
     """
-    values = tuple(_values(screen, limits, cases, speed, written))
+    values = (
+        *_values(screen, limits, cases, speed, written),
+        *_drive_values(drive, written),
+    )
     return values or tuple(_figures(derive(screen)))
 
 
@@ -60,6 +65,15 @@ def _values(
                 f"load_cases.material of {case.name!r}", f"{carried:.4g} kg",
                 f"this looks wrong, it is more than three times the machine, check it {_FORCE}",
             )  # fmt: skip
+
+
+def _drive_values(drive: Drive | None, written: Mapping[str, object]) -> Iterator[InputError]:
+    if drive is None:
+        return
+    for field in DRIVE_FIELDS:
+        if field.key in written:
+            owner = drive if hasattr(drive, field.name) else drive.motor
+            yield from _question(field, getattr(owner, field.name), written)
 
 
 def _question(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from flipflow.errors import InputError
+from flipflow.io.drive import read_drive
 from flipflow.io.layout import FORMAT, SECTIONS, SPEED, refuse_unknown
 from flipflow.io.load_cases import read_load_cases
 from flipflow.io.machine import Tables, read_screen
@@ -67,11 +68,13 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
     notes = Notes()
     _check_format(source.tables, notes)
     screen = read_screen(tables, notes)
+    speed = _speed(tables.get("operation", {}), notes)
     project = Project(
         screen=screen,
         limits=_limits(tables.get("limits", {}), notes),
         load_cases=read_load_cases(cases, screen, notes),
-        speed=_speed(tables.get("operation", {}), notes),
+        speed=speed,
+        drive=read_drive(tables.get("drive"), screen, speed, notes),
         document=_document(tables.get("document", {}), source.name, notes),
         sources=_sources(tables.get("sources", {}), cases),
         name=source.name,
@@ -85,8 +88,9 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
 
 def _plausible(project: Project, *, force: bool) -> Project:
     found = implausible(
-        project.screen, project.limits, project.load_cases, project.speed, project.written
-    )
+        project.screen, project.limits, project.load_cases, project.speed, project.drive,
+        project.written,
+    )  # fmt: skip
     if found and not force:
         raise found[0]
     return replace(project, warnings=tuple(map(str, found)))

@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 from collections.abc import Mapping
+from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,9 @@ import numpy as np
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import basins_from, branch_from
+from flipflow.analyses.startup import RunUp
 from flipflow.errors import InputError, StoreError
+from flipflow.io.run_up import run_up_document
 from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.document import (
@@ -25,7 +28,10 @@ from flipflow.results.document import (
     orbit_document,
     plain,
 )
+from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.sweep import Sweep
+from flipflow.results.time_document import history_document, sweep_document
 
 if TYPE_CHECKING:
     import xarray
@@ -40,7 +46,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     result
-        A Branch, Orbit, Basins or Assessment.
+        A Branch, Orbit, Basins, History, Sweep, RunUp or Assessment.
     path
         File to write; its ending decides the form.
 
@@ -93,21 +99,22 @@ def open_result(path: str | os.PathLike[str]) -> Branch | Basins | dict[str, Any
         raise StoreError(f"{path} is damaged: {error!r}") from None
 
 
+@singledispatch
 def document_of(result: object) -> dict[str, Any]:
     """The data document of a result."""
-    if isinstance(result, Branch):
-        return branch_document(result)
-    if isinstance(result, Orbit):
-        return orbit_document(result)
-    if isinstance(result, Basins):
-        return basins_document(result)
-    if isinstance(result, Assessment):
-        return assessment_document(result)
-    raise InputError(
-        "result", type(result).__name__, "give a Branch, an Orbit, Basins or an Assessment"
-    )
+    known = ", ".join(sorted(kind.__name__ for kind in document_of.registry if kind is not object))
+    raise InputError("result", type(result).__name__, f"a document can be made of {known}")
 
 
+document_of.register(Branch, branch_document)
+document_of.register(Orbit, orbit_document)
+document_of.register(Basins, basins_document)
+document_of.register(History, history_document)
+document_of.register(Sweep, sweep_document)
+document_of.register(RunUp, run_up_document)
+
+
+@document_of.register(Assessment)
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
     """Verdict, limits, region and cases of an assessment."""
     region = assessment.region

@@ -62,12 +62,7 @@ def read_number(written: object, of: Field, *, label: str | None = None) -> floa
 def read_interval(written: object, of: Field) -> tuple[float, float]:
     """Convert ``["5 mm", "8 mm"]`` to SI; the lesser end comes first."""
     if not isinstance(written, list) or len(written) != 2:
-        least, most = of.example if isinstance(of.example, tuple) else ("", "")
-        raise InputError(
-            of.key,
-            written,
-            f'give least and greatest in brackets, for example ["{least}", "{most}"]',
-        )
+        raise InputError(of.key, written, _two_ends(written, of))
     low, high = (_end(end, of, index) for index, end in enumerate(written))
     if not low < high:
         raise InputError(of.key, written, "give the lesser value first and a greater one second")
@@ -143,6 +138,20 @@ def read_temperatures(written: object, label: str) -> tuple[tuple[float, float],
             raise InputError(label, row[0], "list temperatures in rising order")
         rows.append((temperature, factor))
     return tuple(rows)
+
+
+def _two_ends(written: object, of: Field) -> str:
+    """What to write where least and greatest belong; one end alone is taken as the greatest."""
+    least, most = of.example if isinstance(of.example, tuple) else ("", "")
+    key = of.key.rpartition(".")[2]
+    remedy = f'least and greatest belong here, write for example {key} = ["{least}", "{most}"]'
+    one = written[0] if isinstance(written, list) and len(written) == 1 else written
+    try:
+        value = parse_quantity(one, of.unit, field=of.key)
+    except InputError:
+        return remedy
+    zero = shown(0.0, of.file_unit, of.unit)
+    return f'{remedy}, or {key} = ["{zero}", "{one}"] for at most {one}' if value > 0.0 else remedy
 
 
 def _counted(written: object, of: Field, name: str) -> object:

@@ -19,7 +19,8 @@ NEWTON_MOST = 8
 NEWTON_FEW, NEWTON_MANY = 3, 5
 QUICK, SHARP = 1e-6, 1e-10
 GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
-LONGEST, SHORTEST = 1.0, 1e-7
+LONGEST, SHORTEST = 1.0, 1e-10
+TOLERATED = 1e-2
 TURN_MOST, ASTRAY_MOST = 0.90, 0.2
 AWAY, BACK = 3.0, 0.9
 CONTACT_STEP, STRAND_STEP, LABOURED_STEP = 0.03, 1e-4, 1e-3
@@ -296,7 +297,9 @@ def trace(
         if p > 0:
             step = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
             ends = predict(work, branch, p - 1, step, course)
-        code, iterations = correct(problem, work, course.tolerance)
+        # A correction as long as the step itself would not tell one strand from the next.
+        tolerance = course.tolerance if p == 0 else min(course.tolerance, TOLERATED * step)
+        code, iterations = correct(problem, work, tolerance)
         if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
             return code, p
         reason = judge(problem, work, branch, max(p - 1, 0), step, code, iterations, course)

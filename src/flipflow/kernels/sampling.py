@@ -8,7 +8,7 @@ from typing import NamedTuple
 from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.flow import run_flow, segment_state
-from flipflow.kernels.plan import Complex, Real
+from flipflow.kernels.plan import Complex, Int, Real
 from flipflow.kernels.shooting import Shooting
 
 PANEL = 2.0  # radians of the fastest mode in a Gauss panel
@@ -25,6 +25,15 @@ class Table(NamedTuple):
     force: Real  # (K, m)
 
 
+class Changes(NamedTuple):
+    """Changes of contact, as many as ``used`` tells."""
+
+    t: Real  # (E,)
+    spring: Int  # (E,)
+    state: Int  # (E,) the contact state that begins
+    used: Int  # (1,)
+
+
 class Budget(NamedTuple):
     """What the energies are summed from and into."""
 
@@ -37,7 +46,14 @@ class Budget(NamedTuple):
 
 @kernel(entry=True)
 def sample_motion(
-    problem: Shooting, omega: float, t: float, end: float, first: int, table: Table, budget: Budget
+    problem: Shooting,
+    omega: float,
+    t: float,
+    end: float,
+    first: int,
+    table: Table,
+    changes: Changes,
+    budget: Budget,
 ) -> tuple[int, int]:
     """Carry flow.z from time t to ``end``, filling the table from row ``first`` on.
 
@@ -60,10 +76,24 @@ def sample_motion(
                 sample(problem, e, omega, row, table)
                 row += 1
             add_work(problem, e, omega, budget)
+            if e > 0:
+                note_change(problem, e, changes)
         e = flow.segments[0] - 1
         segment_state(plan, flow, e, omega, flow.length[e], flow.z, problem.rate)
         t += duration
     return status.OK, row
+
+
+@kernel(inline=True)
+def note_change(problem: Shooting, e: int, changes: Changes) -> None:
+    """The change of contact with which segment e begins."""
+    flow = problem.flow
+    k = changes.used[0]
+    spring = flow.spring[e - 1]
+    changes.t[k] = flow.start[e]
+    changes.spring[k] = spring
+    changes.state[k] = flow.states[e, spring]
+    changes.used[0] = k + 1
 
 
 @kernel(inline=True)

@@ -59,9 +59,16 @@ class BalanceSolver(Solver):
         A truncated series blurs the instants of contact, to which the multipliers of a stiff
         stop are far more sensitive than its amplitudes are.
         """
+        return self.corrected_maps(u, omega)[0]
+
+    def corrected_maps(self, u: Real, omega: Real) -> tuple[Real, Real]:
+        """Maps (P, 2 N, 2 N) of the exact flow beside the series, and its distance (P,) in m.
+
+        The distance is infinite where no exact motion is near.
+        """
         nothing = np.zeros(0, np.int64), np.zeros((omega.size, 0, self.system.size), np.complex128)
         states = self.states(u, omega)
-        return self.corrected(states, omega, *nothing, half_turn=self.half_turn)[0]
+        return self.corrected(states, omega, *nothing, half_turn=self.half_turn)
 
     def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
         return self.harmonics, self._describe(u, omega)

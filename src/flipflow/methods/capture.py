@@ -25,21 +25,15 @@ GROWTH, MOST_GROWTH, MOST_HALVINGS = 1.25, 40, 30
 FIRST_RADIUS = 0.1
 
 
-def section_states(lanes: Lanes, point: Point) -> Real:
-    """States of a motion at the start of each of its turns, (turns, 2 N)."""
-    states = [np.array(point.u)]
-    for _ in range(1, point.solver.turns):
-        states.append(lanes.carry(states[-1][None], 1)[0])
-    return np.array(states)
-
-
-def capture_of(lanes: Lanes, point: Point, label: int, rng: np.random.Generator) -> Capture | None:
+def capture_of(
+    lanes: Lanes, point: Point, phases: Real, label: int, rng: np.random.Generator
+) -> Capture | None:
     """One ellipsoid for each turn of a stable motion; None where no size of it holds.
 
-    ``point`` is solved for over whole turns, ``solver.turns`` of them.
+    ``point`` is solved for over whole turns; ``phases`` (turns, 2 N) are its states at their ends.
     """
     centres, forms = [], []
-    for z in section_states(lanes, point):
+    for z in phases:
         centre = point.solver.solve(z, point.omega)
         form = None if centre is None else _form(lanes, centre, rng)
         if centre is None or form is None:

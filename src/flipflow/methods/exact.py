@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import IncompleteError
 from flipflow.kernels import status
+from flipflow.kernels.lanes import strobe
 from flipflow.kernels.observe import observe_flow
 from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
 from flipflow.methods.scratch import new_gap_motion
@@ -55,6 +58,30 @@ class ExactSolver(Solver):
         self._observe(states, np.array([omega]), none, whole_turn=True, waiting=turns)
         return np.asarray(states[0])
 
+    def with_turns(self, turns: int) -> ExactSolver:
+        """A solver of the same machine for motions that repeat after ``turns`` periods."""
+        other = copy.copy(self)
+        other.turns, other.half_turn = turns, False
+        other._prepare()  # noqa: SLF001  a copy of itself
+        return other
+
+    def section(self, z: Real, omega: float, turns: int) -> Real:
+        """States after 1, 2, ... ``turns`` of the solver's turns from z, (turns, 2 N).
+
+        Raises
+        ------
+        IncompleteError
+            When the flow over a turn does not end.
+        """
+        record = np.empty((turns, z.size))
+        while True:
+            code = strobe(self.turn, np.array(z), omega, record)
+            if code == status.OK:
+                return record
+            if code != status.MISSING_CONFIGURATION:
+                raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
+            self.add_configuration(self.turn.flow)
+
     def motion(self, u: Real, omega: float) -> Motion:
         states = np.array(u)[None]
         every = np.eye(self.system.size)
@@ -97,7 +124,7 @@ class ExactSolver(Solver):
             )
             if not np.any(code == status.MISSING_CONFIGURATION):
                 break
-            self._add_configuration(problem.flow)
+            self.add_configuration(problem.flow)
             states[:] = begin
         bad = code != status.OK
         low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan

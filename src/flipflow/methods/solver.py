@@ -181,9 +181,9 @@ class Solver(ABC):
 
     def add_missing_configuration(self) -> None:
         """Prepare the configuration a kernel stopped at, and the problem anew."""
-        self._add_configuration(self.flow)
+        self.add_configuration(self.flow)
 
-    def _add_configuration(self, flow: Flow) -> None:
+    def add_configuration(self, flow: Flow) -> None:
         """Prepare the configuration at which a flow stopped, and the problem anew."""
         self.builder.add_contact_state(flow.state)
         self._prepare()
@@ -270,7 +270,7 @@ class Solver(ABC):
             )  # fmt: skip
             if not np.any(code == status.MISSING_CONFIGURATION):
                 return maps, error
-            self._add_configuration(problem.flow)
+            self.add_configuration(problem.flow)
 
     def shooting(self, *, half_turn: bool) -> Shooting:
         """The shooting problem of the present plan, made once."""

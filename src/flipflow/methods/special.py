@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.errors import IncompleteError
-from flipflow.methods.solver import Point, Real, Solver, Traced
-from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker
+from flipflow.methods.balance import BalanceSolver
+from flipflow.methods.confirm import ExactBeside, unconfirmed_note
+from flipflow.methods.solver import Point, Real, Solver, Traced, eigenvalues_of
+from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
 SHARE_TOLERANCE = 1e-10
 DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
@@ -59,14 +61,73 @@ def find_special_points(
     """All special points in branch order, and a sentence for each that could not be refined."""
     found: list[Found] = []
     notes: list[str] = []
+    arc = _arc(traced)
     for test in [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]:
-        for p, low, high in _brackets(solver, traced, test, notes):
+        for p, low, high in _brackets(solver, traced, test, arc, notes):
             try:
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
-    kept = [one for one in found if _is_real(one)]
-    return sorted(kept, key=lambda one: (one.index, one.share)), notes
+    kept = sorted((one for one in found if _is_real(one)), key=lambda one: (one.index, one.share))
+    if isinstance(solver, BalanceSolver):
+        side = saddle_side(traced.tangent[:, -1], eigenvalues)
+        return _confirmed(ExactBeside(solver, traced), kept, notes, side)
+    return kept, notes
+
+
+def _confirmed(
+    beside: ExactBeside, found: list[Found], notes: list[str], side: NDArray[np.bool_]
+) -> tuple[list[Found], list[str]]:
+    """Special points of a series that the exact motions beside it show; notes of the others."""
+    positions = np.array([one.index + one.share for one in found])
+    shown = np.ones(len(found), dtype=bool)
+    for kind in STABILITY_CHANGES:
+        ours = np.flatnonzero([one.kind == kind for one in found])
+        if not ours.size:
+            continue
+        ends = np.array([-1.0, *positions[ours], beside.traced.omega.size])
+        room = np.minimum(ends[1:-1] - ends[:-2], ends[2:] - ends[1:-1])
+        shown[ours] = (
+            beside.folds_shown(positions[ours], side)
+            if kind == FOLD
+            else [
+                beside.crosses(*at, _TEST[kind]) for at in zip(positions[ours], room, strict=True)
+            ]
+        )
+        if kind in _ALONG:
+            for i, steps in zip(ours, room, strict=True):
+                shown[i] = shown[i] or beside.passes(positions[i], steps, _ALONG[kind])
+        omegas = [found[i].point.omega for i in ours if not shown[i]]
+        notes += [unconfirmed_note(kind, omegas)] if omegas else []
+    return [one for one, kept in zip(found, shown, strict=True) if kept], notes
+
+
+def _minus_one_test(point: Point) -> float:
+    return float(determinant_plus(point.return_map))
+
+
+def _neimark_sacker_test(point: Point) -> float:
+    return float(neimark_sacker(point.eigenvalues))
+
+
+def _fold_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
+    return traced.tangent[:, -1]
+
+
+def _neimark_sacker_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
+    return neimark_sacker(eigenvalues_of(maps))
+
+
+# Both stand where a branch turns, and where no exact motion has the speed of the series.
+_ALONG: dict[str, Callable[[Traced, Real], Real]] = {
+    FOLD: _fold_along,
+    NEIMARK_SACKER: _neimark_sacker_along,
+}
+_TEST: dict[str, Callable[[Point], float]] = {
+    SYMMETRY: _minus_one_test,
+    DOUBLING: _minus_one_test,
+    NEIMARK_SACKER: _neimark_sacker_test,
+}
 
 
 def _map_tests(
@@ -76,14 +137,8 @@ def _map_tests(
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
         _Test(FOLD, fold, lambda point: point.omega_tangent),
-        _Test(
-            kind, determinant_plus(maps), lambda point: float(determinant_plus(point.return_map))
-        ),
-        _Test(
-            NEIMARK_SACKER,
-            neimark_sacker(eigenvalues),
-            lambda point: float(neimark_sacker(point.eigenvalues)),
-        ),
+        _Test(kind, determinant_plus(maps), _minus_one_test),
+        _Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
     ]
 
 
@@ -109,23 +164,52 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
 
 
 def _brackets(
-    solver: Solver, traced: Traced, test: _Test, notes: list[str]
+    solver: Solver, traced: Traced, test: _Test, arc: Real, notes: list[str]
 ) -> list[tuple[int, float, float]]:
     """Steps (p, low share, high share) within which the test changes sign."""
     values = test.values
     sign = np.sign(values)
     brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
-    for p in _dips(values):
-        for start in (p - 1, p):
+    suspects: list[tuple[int, ...]] = [(p - 1, p) for p in _dips(values)]
+    if test.kind in (FOLD, SYMMETRY, DOUBLING):
+        suspects += [(p,) for p in _plunges(values, arc, traced.signature)]
+    settled: set[int] = set()
+    for steps in suspects:
+        for start in steps:
+            if start in settled:
+                break
             try:
-                bottom = _bottom(solver, traced, test, start, float(sign[p]))
+                bottom = _bottom(solver, traced, test, start, plunges=len(steps) == 1)
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
                 continue
             if bottom is not None:
                 brackets += [(start, 0.0, bottom), (start, bottom, 1.0)]
+                settled.add(start)
                 break
     return brackets
+
+
+def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> list[int]:
+    """Steps with contact and no change of sign which the slope at one end carries the test across.
+
+    A motion without contact has the eigenvalues of the linear machine, all within the circle.
+    """
+    slope = np.diff(values) / np.diff(arc)
+    step = np.diff(arc)[1:-1]
+    first, last = values[1:-2], values[2:-1]
+    ahead, behind = first + slope[:-2] * step, last - slope[2:] * step
+    over = (first * last > 0.0) & ((ahead * first < 0.0) | (behind * last < 0.0))
+    touches = (signature[1:-2] != 0) | (signature[2:-1] != 0)
+    return [int(p) + 1 for p in np.flatnonzero(over & touches)]
+
+
+def _arc(traced: Traced) -> Real:
+    """Length along the branch at its points, in steps."""
+    size = np.abs(traced.u).max(axis=0, initial=0.0) * traced.course.u_step
+    shape = traced.u / np.where(size > 0.0, size, 1.0)
+    scaled = np.column_stack([shape, traced.omega / traced.course.omega_step])
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1))])
 
 
 def _dips(values: Real) -> list[int]:
@@ -145,12 +229,19 @@ def _dips(values: Real) -> list[int]:
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
-def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, sign: float) -> float | None:
-    """Share in step p where the test has the other sign, None when it never has."""
+def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, *, plunges: bool) -> float | None:
+    """Share in step p where the test has the other sign, None when it never has.
+
+    A plunge that has ended halfway, no lower than the ends, goes no further.
+    """
+    ends = np.abs(test.values[p : p + 2])
+    sign = float(np.sign(test.values[p]))
 
     def height(share: float) -> float:
         return sign * test.evaluate(solver.between(traced, p, share))
 
+    if plunges and height(0.5) > ends.min():
+        return None
     best = minimize_scalar(
         height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": BOTTOM_STEPS}
     )

@@ -51,6 +51,20 @@ def stability_words(
     return words
 
 
+def saddle_side(omega_tangent: Real, eigenvalues: Complex) -> NDArray[np.bool_]:
+    """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
+    backwards = omega_tangent * np.sign(omega_tangent[0]) < 0.0
+    return np.asarray(backwards ^ starts_beyond(eigenvalues))
+
+
+def starts_beyond(eigenvalues: Complex) -> bool:
+    """Whether the first motion has an odd number of real eigenvalues beyond +1."""
+    if eigenvalues.shape[0] == 0:
+        return False
+    first = eigenvalues[0]
+    return int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
+
+
 def determinant_plus(maps: Real) -> Real:
     """det(I + map): zero at an eigenvalue -1."""
     return np.asarray(np.linalg.det(maps + np.eye(maps.shape[-1])))

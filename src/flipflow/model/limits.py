@@ -143,7 +143,7 @@ def _interval(field: LimitField, value: object) -> Interval | None:
     if value is None:
         return None
     if not isinstance(value, (tuple, list)) or len(value) != 2:
-        raise InputError(field.name, value, f"give two numbers in {field.unit}, least and greatest")
+        raise InputError(field.name, value, f"give (least, greatest), two numbers in {field.unit}")
     low, high = (field.check(end, label=field.name) for end in value)
     if low is None or high is None or not low < high or math.isinf(high):
         raise InputError(field.name, value, "give the lesser end first and a greater one second")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from flipflow.model.drive import Drive
 from flipflow.model.limits import Limits
 from flipflow.model.screen import FlipFlowScreen, Load
 
@@ -51,6 +52,8 @@ class Project:
         What was taken because the file leaves it out.
     warnings
         What looked implausible and was let through by ``force``.
+    drive
+        Motor and shaft; None where the file gives none.
     """
 
     screen: FlipFlowScreen
@@ -65,3 +68,4 @@ class Project:
     sums: Mapping[str, str]
     assumed: tuple[str, ...]
     warnings: tuple[str, ...] = ()
+    drive: Drive | None = None

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from flipflow.analyses.assessment import Assessment
+from flipflow.analyses.assessment import Assessment, CaseAssessment
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.bars import energy_figure, region_figure
 from flipflow.figures.motion import orbits_figure, portrait_figure
@@ -34,6 +34,7 @@ DRAWN = (
     "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
     "clearance_minus",
 )  # fmt: skip
+CASES_ABREAST = 6  # load cases for which a table has columns on an A4 page
 SYMBOLS = {
     "clearance": "gap per side e",
     "clearance_minus": "other side e-",
@@ -76,15 +77,9 @@ def quantities(assessment: Assessment) -> Iterator[Block]:
     if not found:
         return
     yield Heading("Results", 1, new_page=False)
-    columns = [Column("Quantity"), Column("Symbol")]
-    columns += [Column(case.name, numeric=True) for case in found]
-    rows = []
-    for name, one in QUANTITIES.items():
-        values = [named(name, case.values.get(name)) for case in found]
-        label = one.label[:1].upper() + one.label[1:]
-        rows.append((Cell(label, one.sentence), Cell(one.symbol), *cells(*values)))
     speed = "" if assessment.omega is None else f" at {rpm(assessment.omega)} rpm"
-    yield Table(f"Quantities{speed}", tuple(columns), tuple(rows))
+    for group in (found[k : k + CASES_ABREAST] for k in range(0, len(found), CASES_ABREAST)):
+        yield _quantities(f"Quantities{speed}", group)
 
 
 @section(Assessment, Part.DETAILS, 40)
@@ -116,6 +111,16 @@ def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
         for name in DRAWN
         if (value := getattr(screen, name)) is not None
     }
+
+
+def _quantities(title: str, cases: Sequence[CaseAssessment]) -> Table:
+    columns = (Column("Quantity"), Column("Symbol"), *(Column(c.name, numeric=True) for c in cases))
+    rows = []
+    for name, one in QUANTITIES.items():
+        values = [named(name, case.values.get(name)) for case in cases]
+        label = one.label[:1].upper() + one.label[1:]
+        rows.append((Cell(label, one.sentence), Cell(one.symbol), *cells(*values)))
+    return Table(title, columns, tuple(rows))
 
 
 def _parameter(value: Value) -> tuple[Cell, ...]:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 
 from flipflow.analyses.assessment import Assessment, CaseAssessment, LimitRow
-from flipflow.analyses.feasible import Bound
+from flipflow.analyses.feasible import REGION, STABILITY, Bound, missing_words
+from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.analyses.quantities import QUANTITIES
+from flipflow.figures.layout import legend_lines
 from flipflow.figures.motion import motions_figure
-from flipflow.figures.response import cases_figure
+from flipflow.figures.response import LEGEND_WITHIN, cases_figure
 from flipflow.report.blocks import (
     Block,
     Cell,
     Column,
     FigureBlock,
+    Heading,
     Note,
     Table,
     Text,
@@ -31,6 +35,11 @@ NO_NORMAL = (
     "the machine file."
 )
 NO_LIMIT = (-math.inf, math.inf)
+# What an A4 page has room for beside all that stands there always: rows of load cases, a line of
+# a note being as high as so many rows; lines of notes when the table of load cases is overleaf.
+MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 105
+MOST_NAMED = 4
+OVERLEAF, OVERLEAF_TITLE = 'under "Load cases and notes" on the next page', "Load cases and notes"
 CASE_COLUMNS = (
     ("relative_amplitude", "amplitude"),
     ("stroke", "stroke"),
@@ -66,10 +75,23 @@ def verdict(assessment: Assessment) -> Iterator[Block]:
     """The verdict, and what it rests on."""
     yield Verdict(assessment.verdict, verdict_state(assessment))
     yield Text(allowed_range(assessment), "Allowed speed range:")
-    stop = stop_sentence(assessment)
-    if stop:
-        yield Text(stop, "Stop:")
-    yield from (Note(note) for note in assessment.notes)
+    for lead, text in (
+        ("Contact begins:", contact_sentence(assessment.region)),
+        ("Stop:", stop_sentence(assessment)),
+    ):
+        if text:
+            yield Text(text, lead)
+    yield from (Note(note) for note in assessment.notes[: notes_that_fit(assessment)])
+
+
+@section(Assessment, Part.FIRST_PAGE, 25)
+def further_notes(assessment: Assessment) -> Iterator[Block]:
+    """Where the other notes are."""
+    shown = notes_that_fit(assessment)
+    left = len(assessment.notes) - shown
+    if left:
+        more = f"{left} more" if shown else str(left)
+        yield Note(f"{more} {'note stands' if left == 1 else 'notes stand'} {OVERLEAF}.")
 
 
 @section(Assessment, Part.FIRST_PAGE, 30)
@@ -111,9 +133,31 @@ def limits(assessment: Assessment) -> Iterator[Block]:
 
 @section(Assessment, Part.FIRST_PAGE, 60, brief=True)
 def cases(assessment: Assessment) -> Iterator[Block]:
-    """Load cases by amplitude, stroke, phase, g of both frames, stop force."""
-    if assessment.omega is None:
-        return
+    """Load cases by amplitude, stroke, phase, g of both frames, stop force, if they fit."""
+    if assessment.omega is not None and not crowded(assessment):
+        yield _cases_table(assessment)
+
+
+@section(Assessment, Part.FIRST_PAGE, 65)
+def further_cases(assessment: Assessment) -> Iterator[Block]:
+    """Where the table of load cases is."""
+    if assessment.omega is not None and crowded(assessment):
+        yield Text(f"{len(assessment.cases)}, in the table {OVERLEAF}.", "Load cases:")
+
+
+@section(Assessment, Part.DETAILS, 5, brief=True)
+def overleaf(assessment: Assessment) -> Iterator[Block]:
+    """What the first page has no room for: the table of many load cases, further notes."""
+    notes = assessment.notes[notes_that_fit(assessment) :]
+    table = assessment.omega is not None and crowded(assessment)
+    if table or notes:
+        yield Heading(OVERLEAF_TITLE, 1)
+    if table:
+        yield _cases_table(assessment)
+    yield from (Note(note) for note in notes)
+
+
+def _cases_table(assessment: Assessment) -> Table:
     columns = [Column("Load case")]
     for name, title in CASE_COLUMNS:
         columns.append(Column(title, QUANTITIES[name].shown_unit, numeric=True))
@@ -122,7 +166,7 @@ def cases(assessment: Assessment) -> Iterator[Block]:
         "(negative: it lags). Frames: greatest acceleration in any direction."
     )
     rows = tuple(_case_row(case) for case in assessment.cases)
-    yield Table("", tuple(columns), rows, caption)
+    return Table("", tuple(columns), rows, caption)
 
 
 @section(Assessment, Part.FIRST_PAGE, 70)
@@ -139,6 +183,45 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
             ("Power, throw", f"{_line(assessment, 'dissipated_power')}; {_throw(assessment)}"),
         )
     )
+
+
+def crowded(assessment: Assessment) -> bool:
+    """Whether the table of load cases goes overleaf, for the first page shall be one page."""
+    lines = sum(map(_note_lines, assessment.notes)) + _other_lines(assessment)
+    return len(assessment.cases) + NOTE_ROWS * lines > MOST_ROWS
+
+
+def notes_that_fit(assessment: Assessment) -> int:
+    """How many notes the first page has room for; where not all fit, a line says so."""
+    room = NOTE_LINES - _other_lines(assessment)
+    ends = list(itertools.accumulate(_note_lines(note) for note in assessment.notes))
+    return len(ends) if not ends or ends[-1] <= room else sum(end < room for end in ends)
+
+
+def _other_lines(assessment: Assessment) -> int:
+    """Lines of the first page that not every machine needs."""
+    names = ["band of load cases", *(case.name for case in assessment.cases)]
+    return (
+        max(legend_lines(names) - LEGEND_WITHIN, 0)
+        + bool(contact_sentence(assessment.region))
+        + (not any(case.normal for case in assessment.cases))
+    )
+
+
+def _note_lines(note: str) -> int:
+    return math.ceil(len(note) / LINE_LENGTH)
+
+
+def contact_sentence(region: OperatingRegion) -> str:
+    """Where each side is first touched, where the gaps differ; empty where they do not."""
+    speeds = region.contact_speeds
+    if region.branch.system.symmetric or not speeds:
+        return ""
+    sides = (
+        f"{word} side {f'at {rpm(speeds[side])} rpm' if side in speeds else 'not touched before'}"
+        for side, word in ((1, "plus"), (-1, "minus"))
+    )
+    return f"{', '.join(sides)} (empty); w_cs is the last of them."
 
 
 def verdict_state(assessment: Assessment) -> str:
@@ -159,7 +242,8 @@ def allowed_range(assessment: Assessment) -> str:
         return "none; no speed meets all limits in all load cases."
     parts = []
     for (low, high), (lower, upper) in zip(region.feasible, region.binding, strict=True):
-        parts.append(f"{span(low, high)}, from {_bound(lower)} to {_bound(upper)}")
+        first, last = _bound(lower, region.ends[0]), _bound(upper, region.ends[1])
+        parts.append(f"{span(low, high)}, from {first} to {last}")
     return "; ".join(parts) + "."
 
 
@@ -171,19 +255,29 @@ def stop_sentence(assessment: Assessment) -> str:
         return "the machine has none."
     if any(case.orbit is None for case in assessment.cases):
         return "not known, for no motion was found at working speed in every case."
-    free = [case.name for case in assessment.cases if case.orbit and not case.stop_reached]
+    return _reached(assessment.omega, assessment.cases)
+
+
+def _reached(omega: float, cases: tuple[CaseAssessment, ...]) -> str:
+    free = [case.name for case in cases if case.orbit and not case.stop_reached]
     if not free:
         return "reached in every load case."
-    if len(free) == len(assessment.cases):
-        return f"not reached in any load case at {rpm(assessment.omega)} rpm."
+    if len(free) == len(cases):
+        return f"not reached in any load case at {rpm(omega)} rpm."
+    if len(free) > MOST_NAMED:
+        return f"not reached in {len(free)} of {len(cases)} load cases."
     return f"not reached in {'; '.join(free)}; reached in the other cases."
 
 
-def _bound(bound: Bound) -> str:
-    label = QUANTITIES[bound.limit].label if bound.limit in QUANTITIES else bound.limit
-    if bound.limit in {"operating region", "speed"}:
-        return f"the bound of the {label}" if bound.limit != "speed" else "the limit on speed"
-    return f"the limit on {label} (case {bound.case})"
+def _bound(bound: Bound, region_end: str) -> str:
+    """What ends the allowed range; ``region_end`` says what ends the operating region there."""
+    if bound.limit == REGION:
+        return region_end
+    if bound.limit == "speed":
+        return "the limit on speed"
+    if bound.limit == STABILITY:
+        return f"where the motion is not sure to return after a disturbance (case {bound.case})"
+    return f"the limit on {QUANTITIES[bound.limit].label} (case {bound.case})"
 
 
 def _limit_row(row: LimitRow) -> tuple[Cell, ...]:
@@ -224,8 +318,9 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     first = names[0]
     found = [(v, c) for c in assessment.cases if (v := c.values.get(first)) is not None]
     if not found:
-        needs = ", ".join(QUANTITIES[first].needs)
-        return f"not checked, missing: {needs}" if needs else "not checked"
+        screen = assessment.project.screen
+        needs = tuple(name for name in QUANTITIES[first].needs if getattr(screen, name) is None)
+        return f"not checked, {missing_words(needs)}" if needs else "not checked"
     _, case = (min if lowest else max)(found, key=lambda one: one[0])
     if first == "stop_force" and not case.stop_reached:
         return "stop not reached" if case.screen.has_stop else "none fitted"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import singledispatch
 from typing import TYPE_CHECKING
@@ -13,6 +14,9 @@ from flipflow.report.registry import blocks_of
 if TYPE_CHECKING:
     from rich.console import Console
 
+# Names of the machine file that no column has room for; they break after their section.
+LONG_WORD = re.compile(r"\S{15,}")
+WITHIN = re.compile(r"\.(?=\w)")
 STYLES = {
     "pass": "green",
     "attention": "bold yellow",
@@ -83,7 +87,9 @@ def _(block: Table, console: Console) -> None:
     grid = Grid(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     for k in shown:
         grid.add_column(
-            _title(block.columns[k]), justify="right" if block.columns[k].numeric else "left"
+            _title(block.columns[k]),
+            justify="right" if block.columns[k].numeric else "left",
+            overflow="fold",
         )
     for row in block.rows:
         grid.add_row(*(Words(_text(row[k]), STYLES.get(row[k].state, "")) for k in shown))
@@ -96,4 +102,5 @@ def _title(column: Column) -> str:
 
 
 def _text(cell: Cell) -> str:
-    return f"{cell.text}\n({cell.small})" if cell.small else cell.text
+    text = LONG_WORD.sub(lambda word: WITHIN.sub(".\n", word.group()), cell.text)
+    return f"{text}\n({cell.small})" if cell.small else text

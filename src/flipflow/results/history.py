@@ -66,6 +66,8 @@ class History:
         Work done: ``"steps"``, ``"events"``, ``"rejected"``.
     version
         Version of flipflow.
+    works
+        Running totals in J of what stands in ``energy``, (n,) each, where they were kept.
     """
 
     system: MechanicalSystem
@@ -87,6 +89,7 @@ class History:
     method: str = ""
     counters: Mapping[str, int] = field(default_factory=dict)
     version: str = __version__
+    works: Mapping[str, Real] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal"):
@@ -98,6 +101,7 @@ class History:
                 object.__setattr__(self, name, kept)
         object.__setattr__(self, "energy", MappingProxyType(dict(self.energy)))
         object.__setattr__(self, "counters", MappingProxyType(dict(self.counters)))
+        object.__setattr__(self, "works", MappingProxyType(dict(self.works)))
 
     def __repr__(self) -> str:
         return f"History({self.t.size} times, {self.t[0]:.6g} to {self.t[-1]:.6g} s)"
@@ -137,3 +141,24 @@ class History:
         if self.torque is None:
             raise IncompleteError("The speed is prescribed here: there is no motor and no power.")
         return np.asarray(self.torque * self.omega)
+
+
+def stop_forces(system: MechanicalSystem, x: Real, v: Real, contacts: NDArray[np.int64]) -> Real:
+    """Force of each spring of the machine as given, (n, m), from x and x', (n, N).
+
+    ``contacts`` has a column for each spring with a gap that can act: +1 or -1 where it is engaged.
+    """
+    force = np.zeros((x.shape[0], len(system.springs)))
+    column = 0
+    for j, spring in enumerate(system.springs):
+        y, rate = x @ spring.direction, v @ spring.direction
+        if spring.bonded:
+            force[:, j] = spring.stiffness * y + spring.damping * rate
+        elif spring.acts:
+            state = contacts[:, column]
+            column += 1
+            plus, minus = spring.gaps
+            gap = np.where(state == 1, plus, np.where(state == -1, -minus, 0.0))
+            pushed = spring.stiffness * (y - gap) + spring.damping * rate
+            force[:, j] = np.where(np.abs(state) == 1, pushed, 0.0)
+    return force

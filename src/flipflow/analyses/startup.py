@@ -1,0 +1,431 @@
+"""Start and coast-down: does the drive carry the machine through its resonance, and how hard."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.analyses.linear import linear_response
+from flipflow.analyses.transient import (
+    Monitor,
+    at_rest,
+    check_positive,
+    movable,
+    normal_direction,
+    run_history,
+    settled_start,
+    steady_power,
+    swings,
+    turn_means,
+)
+from flipflow.errors import InputError
+from flipflow.kernels.unsteady import SHAFT_STATES
+from flipflow.methods.time_stepping import RungeKutta, Stretch
+from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
+from flipflow.model.elements import Unbalance
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine
+from flipflow.results.history import History
+
+Real = NDArray[np.float64]
+Outcome = Literal[
+    "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
+]
+POWER_FACTOR = 4.0
+START_SECONDS, COAST_SECONDS = 60.0, 600.0
+MOST_SECONDS = 3600.0
+LAST_TURNS, STEADY = 20, 1e-5
+RECENT = 8  # stretches of the record that hold twice as many turns
+AT_SPEED, AT_REST, STOPPED = 0.95, 0.02, 0.02
+NEAR = (0.8, 1.1)
+PASSING = (0.8, 1.25)
+RPM = 30.0 / math.pi
+GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The greatest value of a quantity on the way, in SI, with the speed in rad/s and time in s."""
+
+    value: float
+    omega: float
+    t: float
+
+
+@dataclass(frozen=True, eq=False)
+class RunUp:
+    """A start or a coast-down, and what it does to the machine.
+
+    Parameters
+    ----------
+    machine, drive
+        What was run, and by what.
+    speed
+        Working speed in rad/s: where a start shall end, or where a coast-down began.
+    history
+        The motion in time.
+    outcome
+        "reached", "captured" (the speed stays near a natural frequency), "short" (it stays below
+        the working speed elsewhere), "not started", "unfinished" (still changing when the time was
+        up), "stopped" (coast-down), "followed" (a given speed over time).
+    final_speed
+        Mean speed over the last turns, rad/s.
+    near
+        Name and value in rad/s of the natural frequency at which it is captured, else None.
+    first_frequency
+        w01 in rad/s.
+    passing
+        Time in s between 0.8 and 1.25 times w01; None where it is not passed.
+    peaks
+        ``"main_amplitude"``, ``"relative_amplitude"`` (half the way from one turning point to the
+        next, m), ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has
+        them.
+    power
+        Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
+        the speed is given or changes.
+    notes
+        What was assumed or left out.
+    """
+
+    machine: Machine
+    drive: Drive | SpeedProfile
+    speed: float
+    history: History
+    outcome: Outcome
+    final_speed: float
+    near: tuple[str, float] | None
+    first_frequency: float
+    passing: float | None
+    peaks: Mapping[str, Peak]
+    power: Mapping[str, float]
+    notes: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """Time calculated in s."""
+        return float(self.history.t[-1])
+
+    @property
+    def time_to_speed(self) -> float | None:
+        """Time in s at which the shaft first has the working speed, within five per cent."""
+        reached = np.flatnonzero(self.history.omega >= AT_SPEED * self.speed)
+        if self.outcome == "stopped" or reached.size == 0:
+            return None
+        return float(self.history.t[reached[0]])
+
+    @property
+    def verdict(self) -> str:
+        """The outcome as a sentence, rpm first."""
+        now, wanted = f"{self.final_speed * RPM:.0f} rpm", f"{self.speed * RPM:.0f} rpm"
+        seconds = f"{self.duration:.3g} s"
+        if self.outcome == "captured" and self.near is not None:
+            name, omega = self.near
+            return f"captured at {now}, near the natural frequency {name} = {omega * RPM:.0f} rpm"
+        sentences = {
+            "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
+            "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",
+            "not started": "does not start: the torque at rest does not turn the shaft",
+            "unfinished": f"at {now} after {seconds}, still changing; calculate a longer time",
+            "stopped": f"comes down from {wanted} in {seconds}",
+            "followed": f"follows the given speed for {seconds}, ending at {now}",
+        }
+        return sentences[self.outcome]
+
+
+def start_up(
+    machine: Machine,
+    drive: Drive | SpeedProfile | None = None,
+    *,
+    speed: float | None = None,
+    duration: float | None = None,
+    method: RungeKutta | None = None,
+    monitor: Monitor | None = None,
+) -> RunUp:
+    r"""Start a machine from rest.
+
+    With the shaft's angle phi, inertia J, motor torque T and friction T_f,
+
+    .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
+              - \ddot y_1 \cos\varphi) .
+
+    Parameters
+    ----------
+    machine
+        A screen, or a :class:`~flipflow.MechanicalSystem` under an unbalance.
+    drive
+        A :class:`~flipflow.Drive`, a :class:`~flipflow.SpeedProfile`, or None for a drive that is
+        assumed from the power the screen takes at working speed.
+    speed
+        Working speed in rad/s; None: the drive's rated speed, or the profile's highest.
+    duration
+        Longest time in s; None: 60 s or the profile's; a run ends when nothing changes any more.
+    method
+        How it is stepped.
+    monitor
+        Called with a sentence and the share done, 0 to 1; False from it cancels.
+
+    Returns
+    -------
+    RunUp
+        Whether the machine reaches its speed or is captured on the way, and the peaks.
+
+    Raises
+    ------
+    InputError
+        Without damping, for a bad speed or duration, and for a drive that cannot be.
+    Cancelled
+        When the monitor asks for it.
+    """
+    movable(machine)
+    given = None if speed is None else check_positive("speed", speed, "rad/s")
+    if drive is None:
+        drive = default_drive(machine, given, method)
+    wanted = given or _working_speed(drive)
+    profile = isinstance(drive, SpeedProfile)
+    longest = drive.duration if isinstance(drive, SpeedProfile) else START_SECONDS
+    longest = longest if duration is None else _seconds(duration)
+    history = run_history(
+        machine, drive, at_rest(machine), longest, fastest=_fastest(drive, wanted), method=method,
+        monitor=monitor, enough=None if profile else _steady,
+    )  # fmt: skip
+    return _judged(machine, drive, wanted, history)
+
+
+def coast_down(
+    machine: Machine,
+    speed: float,
+    drive: Drive | SpeedProfile | None = None,
+    *,
+    duration: float | None = None,
+    method: RungeKutta | None = None,
+    monitor: Monitor | None = None,
+) -> RunUp:
+    """Let a machine come down from its settled motion at ``speed``, the motor switched off.
+
+    Parameters
+    ----------
+    machine
+        A screen, or a :class:`~flipflow.MechanicalSystem` under an unbalance.
+    speed
+        Speed in rad/s at which it runs.
+    drive
+        Its inertia and friction count; a :class:`~flipflow.SpeedProfile` lays the speed down;
+        None: the drive that :func:`start_up` assumes.
+    duration
+        Longest time in s; None: 600 s or the profile's. A free run ends at 2 % of ``speed``.
+    method, monitor
+        As for :func:`start_up`.
+
+    Returns
+    -------
+    RunUp
+        The peaks on the way down, and how long it takes.
+
+    Raises
+    ------
+    InputError
+        Without damping, for a bad speed or duration, and for a drive that cannot be.
+    Cancelled
+        When the monitor asks for it.
+    """
+    movable(machine)
+    omega = check_positive("speed", speed, "rad/s")
+    if drive is None:
+        drive = default_drive(machine, omega, method)
+    if isinstance(drive, SpeedProfile):
+        if drive.speeds[0] != omega:
+            raise InputError("speeds", drive.speeds[0], f"begin the profile at {omega:.6g} rad/s")
+        shaft: Drive | SpeedProfile = drive
+        longest = drive.duration
+    else:
+        shaft, longest = drive.switched_off(), COAST_SECONDS
+    longest = longest if duration is None else _seconds(duration)
+    history = run_history(
+        machine, shaft, settled_start(machine, omega, method), longest, fastest=_fastest(shaft, omega),
+        slowest=-math.inf if isinstance(shaft, SpeedProfile) else STOPPED * omega, method=method,
+        monitor=monitor,
+    )  # fmt: skip
+    return _judged(machine, shaft, omega, history)
+
+
+def default_drive(machine: Machine, speed: float | None, method: RungeKutta | None = None) -> Drive:
+    """A plausible drive for a screen whose drive is not known; what it assumes stands in it.
+
+    The rated power is four times what the dampers take at working speed: starting asks for more
+    than running. The rest is as in :func:`flipflow.model.drive.assumed_drive`.
+    """
+    if not isinstance(machine, FlipFlowScreen):
+        raise InputError("drive", None, "give a Drive or a SpeedProfile for this machine")
+    if speed is None:
+        raise InputError("speed", None, "give the working speed, or a drive")
+    power = POWER_FACTOR * steady_power(machine, speed, method)
+    drive = assumed_drive(machine.eccentric_moment, speed, power)
+    word = f"rated power {power / 1e3:.3g} kW, four times what the dampers take at working speed"
+    return Drive(**{**vars(drive), "assumed": (word, *drive.assumed)})
+
+
+def _seconds(duration: float) -> float:
+    if check_positive("duration", duration, "s") > MOST_SECONDS:
+        raise InputError("duration", duration, f"give at most {MOST_SECONDS:g} s")
+    return float(duration)
+
+
+def _working_speed(drive: Drive | SpeedProfile) -> float:
+    if isinstance(drive, SpeedProfile):
+        return max(drive.speeds)
+    rated = drive.rated_speed
+    if rated is None:
+        raise InputError("motor", None, "give the drive a Motor to start with")
+    return rated
+
+
+def _fastest(drive: Drive | SpeedProfile, speed: float) -> float:
+    if isinstance(drive, SpeedProfile):
+        return max(*drive.speeds, speed)
+    return max(drive.synchronous_speed or 0.0, speed)
+
+
+def _steady(done: list[Stretch]) -> bool:
+    """Whether the mean speed is the same over the last turns and over those before."""
+    recent = done[-RECENT:]
+    t = np.concatenate([one.t for one in recent])
+    angle = np.concatenate([one.states[:, -SHAFT_STATES] for one in recent])
+    marks = angle[-1] - 2.0 * np.pi * LAST_TURNS * np.array([0.0, 1.0, 2.0])
+    if marks[-1] < angle[0]:
+        return False
+    times = np.interp(marks, angle, t)
+    spans = times[:-1] - times[1:]
+    return bool(abs(spans[0] / spans[1] - 1.0) < STEADY)
+
+
+def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history: History) -> RunUp:
+    frequencies = _natural_frequencies(machine)
+    final = turn_means(history, history.angle, LAST_TURNS)
+    if math.isnan(final) or isinstance(drive, SpeedProfile):
+        final = float(history.omega[-1])
+    outcome, near = _outcome(drive, speed, final, history, frequencies)
+    steady = outcome in {"reached", "captured", "short"}
+    return RunUp(
+        machine, drive, speed, history, outcome, final, near, frequencies["w01"],
+        _passing(history, frequencies["w01"]), _peaks(machine, history),
+        _power(history) if steady and isinstance(drive, Drive) else {},
+        (*history.notes, *_notes(machine, drive)),
+    )  # fmt: skip
+
+
+def _outcome(
+    drive: Drive | SpeedProfile,
+    speed: float,
+    final: float,
+    history: History,
+    frequencies: Mapping[str, float],
+) -> tuple[Outcome, tuple[str, float] | None]:
+    """What became of the run, and the natural frequency that holds it."""
+    if isinstance(drive, SpeedProfile):
+        return "followed", None
+    if drive.motor is None:
+        down = history.omega[-1] <= 1.001 * STOPPED * speed
+        return ("stopped" if down else "unfinished"), None
+    if final < AT_REST * speed:
+        return "not started", None
+    if not _is_steady(history):
+        return "unfinished", None
+    if final >= AT_SPEED * speed:
+        return "reached", None
+    name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
+    if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
+        return "captured", (name, frequencies[name])
+    return "short", None
+
+
+def _is_steady(history: History) -> bool:
+    one, two = (turn_means(history, history.angle, k * LAST_TURNS) for k in (1, 2))
+    return abs(one / two - 1.0) < STEADY
+
+
+def _natural_frequencies(machine: Machine) -> dict[str, float]:
+    """Those of the open machine, w01 first, and w0n normal to the surface."""
+    found = linear_response(machine, 1.0).natural_frequencies
+    named = {f"w0{k + 1}": float(omega) for k, omega in enumerate(found)}
+    normal = normal_direction(machine)
+    if normal is not None:
+        named["w0n"] = math.sqrt(normal.stiffness / normal.mass)
+    return named
+
+
+def _passing(history: History, omega: float) -> float | None:
+    """Time in s between both sides of a natural frequency, up or down; None if not passed."""
+    inside = (history.omega > PASSING[0] * omega) & (history.omega < PASSING[1] * omega)
+    within = np.flatnonzero(inside)
+    if within.size == 0 or within[0] == 0 or within[-1] == inside.size - 1:
+        return None
+    sides = history.omega[[within[0] - 1, within[-1] + 1]] > omega
+    if sides[0] == sides[1]:
+        return None
+    return float(history.t[within[-1]] - history.t[within[0]])
+
+
+def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
+    found = {}
+    names = ("main", "relative") if isinstance(machine, FlipFlowScreen) else history.system.named
+    for which in names:
+        times, sizes = swings(history.t, history.displacement(which), history.velocity(which))
+        if sizes.size:
+            found[f"{which}_amplitude"] = _peak(history, times, sizes)
+    if isinstance(machine, FlipFlowScreen):
+        found["foundation_force"] = _peak(history, history.t, foundation_force(machine, history))
+    for j in range(history.force.shape[1]):
+        name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"
+        found[name] = _peak(history, history.t, np.abs(history.stop_force(j)))
+    return found
+
+
+def _peak(history: History, t: Real, values: Real) -> Peak:
+    k = int(values.argmax())
+    omega = float(np.interp(t[k], history.t, history.omega))
+    return Peak(float(values[k]), omega, float(t[k]))
+
+
+def foundation_force(screen: FlipFlowScreen, history: History) -> Real:
+    """Force of the isolation on the foundation in N, both directions where both are known, (n,)."""
+    k, c = screen.isolation_stiffness, screen.isolation_damping
+    along = k * history.displacement("main") + c * history.velocity("main")
+    normal = normal_direction(screen)
+    if normal is None or history.normal is None:
+        return np.abs(along)
+    across = normal.stiffness * history.normal[:, 0] + normal.damping * history.normal[:, 1]
+    return np.asarray(np.hypot(along, across))
+
+
+def _power(history: History) -> dict[str, float]:
+    """Means over the last whole turns."""
+    means = {name: turn_means(history, total, LAST_TURNS) for name, total in history.works.items()}
+    return {
+        "motor": means["input"],
+        "friction": means["friction"],
+        "dampers": means["dissipated"] - means["friction"],
+    }
+
+
+def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
+    notes = []
+    if isinstance(machine, FlipFlowScreen) and normal_direction(machine) is None:
+        notes.append(
+            "Normal direction not checked, for want of isolation.normal_stiffness and "
+            "normal_damping: amplitudes and forces are those along the surface."
+        )
+    if isinstance(drive, SpeedProfile) or drive.motor is None:
+        return [*notes, *(f"Assumed: {text}." for text in getattr(drive, "assumed", ()))]
+    excitation = machine.system().excitation
+    moment = float(np.abs(excitation.vector).max()) if isinstance(excitation, Unbalance) else 0.0
+    if float(drive.torque(0.0)) < moment * GRAVITY:
+        notes.append(
+            f"The torque at rest, {float(drive.torque(0.0)):.3g} N m, is less than the weight of "
+            f"the unbalance may ask for, {moment * GRAVITY:.3g} N m: gravity is not calculated."
+        )
+    return [*notes, *(f"Assumed: {text}." for text in drive.assumed)]

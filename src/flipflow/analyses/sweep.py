@@ -1,0 +1,128 @@
+"""Which motion a machine settles to while its speed is changed in steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow import __version__
+from flipflow.analyses.operating_region import Monitor
+from flipflow.errors import InputError
+from flipflow.methods.settle import MOST_TURNS, Settled, Settling
+from flipflow.model.system import Machine, system_of
+from flipflow.results.orbit import Orbit
+from flipflow.results.sweep import Jump, Sweep
+
+Real = NDArray[np.float64]
+MAX_PERIODS = 6
+JUMP_SHARE = 0.05
+
+
+def sweep(
+    machine: Machine,
+    omega: ArrayLike,
+    *,
+    initial: str | Orbit | ArrayLike = "rest",
+    max_periods: int = MAX_PERIODS,
+    most_turns: int = MOST_TURNS,
+    monitor: Monitor | None = None,
+) -> Sweep:
+    """Settle at one frequency after the other, each from where the one before ended.
+
+    The speed changes when the unbalance points along +x. At each frequency the exact flow runs
+    until the periodic motion it approaches is closer than 1e-9 of the motion's size. That motion
+    is solved for, so that lingering just past a fold is not taken for settling; its leading
+    multiplier says how many turns are still to go.
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        Frequencies in rad/s in the order to pass, (n,).
+    initial
+        "rest", an :class:`~flipflow.results.orbit.Orbit`, or a state (x, x'), (2 N,).
+    max_periods
+        Longest period looked for, in forcing periods.
+    most_turns
+        Most forcing periods waited at a step; what has not settled then is marked so.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
+
+    Returns
+    -------
+    Sweep
+        Settled amplitudes, periods, jumps.
+
+    Raises
+    ------
+    InputError
+        For frequencies that are not finite and above 0, a count below 1, a state of wrong shape,
+        or a machine without damping, which never settles.
+    """
+    speeds = checked_speeds(omega)
+    check_count("max_periods", max_periods, 12)
+    check_count("most_turns", most_turns, 10_000_000)
+    settling = Settling(system_of(machine), max_periods)
+    z = initial_state(settling.solver.system.size, initial)
+    rows: list[Settled] = []
+    jumps: list[Jump] = []
+    for k, speed in enumerate(speeds):
+        row = settling.settle(z, float(speed), most=most_turns)
+        if rows and _jumped(settling, rows[-1], row, float(speed)):
+            jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
+        rows.append(row)
+        z = row.state
+        if monitor is not None:
+            monitor(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
+    return Sweep(
+        machine, speeds, tuple(rows), tuple(jumps), max_periods, most_turns, settling.solver,
+        __version__,
+    )  # fmt: skip
+
+
+def checked_speeds(omega: ArrayLike) -> Real:
+    """Frequencies as an array, or a sentence that says what is wrong with them."""
+    try:
+        speeds = np.atleast_1d(np.asarray(omega, float))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give an array of frequencies in rad/s") from None
+    if speeds.ndim != 1 or speeds.size == 0:
+        raise InputError("omega", omega, "give at least one frequency in rad/s, in one row")
+    if not (np.isfinite(speeds).all() and (speeds > 0.0).all()):
+        raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
+    return speeds
+
+
+def check_count(name: str, value: object, most: int) -> None:
+    """Raise InputError unless ``value`` is a whole number from 1 to ``most``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise InputError(name, value, f"give a whole number from 1 to {most}")
+    if not 1 <= value <= most:
+        raise InputError(name, value, f"give a whole number from 1 to {most}")
+
+
+def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
+    """State (x, x') from "rest", an orbit or numbers, (2 N,)."""
+    if isinstance(initial, Orbit):
+        return initial.state
+    if isinstance(initial, str):
+        if initial != "rest":
+            raise InputError("initial", initial, 'give "rest", an orbit, or a state (x, x\')')
+        return np.zeros(2 * size)
+    state = np.asarray(initial, float)
+    if state.shape != (2 * size,) or not np.isfinite(state).all():
+        raise InputError("initial", initial, f"give {2 * size} finite numbers, (x, x')")
+    return state
+
+
+def _jumped(settling: Settling, before: Settled, after: Settled, omega: float) -> bool:
+    """Whether the motion before cannot be followed to the motion after, or lies far from it."""
+    if before.point is None or after.point is None:
+        return (before.point is None) != (after.point is None)
+    followed = settling.continued(before.point, omega)
+    if followed is None:
+        return True
+    share = JUMP_SHARE * settling.size(after.recent, omega)
+    images = settling.phases(followed)
+    return all(settling.distance(image, after.state, omega) > share for image in images)

@@ -1,0 +1,187 @@
+"""``flipflow startup``: does the drive carry the machine through its resonance, and how hard."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flipflow.cli.output import console, print_list, printable, write_json
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from flipflow.analyses.startup import RunUp
+    from flipflow.model.drive import Drive, SpeedProfile
+    from flipflow.model.project import Project
+
+RPM = 30.0 / math.pi
+WORDS = {
+    "main_amplitude": ("main frame, amplitude", 1e3, "mm"),
+    "relative_amplitude": ("relative, amplitude", 1e3, "mm"),
+    "foundation_force": ("force on the foundation", 1e-3, "kN"),
+    "stop_force": ("force on the stops of a side", 1e-3, "kN"),
+}
+
+
+def startup(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
+    ],
+    speed: Annotated[
+        str | None,
+        typer.Option("--speed", metavar="SPEED", help="Working speed: '850 rpm'."),
+    ] = None,
+    motor_power: Annotated[
+        str | None,
+        typer.Option("--motor-power", metavar="POWER", help="Rated power: '5.5 kW'."),
+    ] = None,
+    inertia: Annotated[
+        str | None,
+        typer.Option("--inertia", metavar="J", help="Inertia at the shaft: '0.9 kg m^2'."),
+    ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            "--profile", metavar="POINTS", help="Speed over time: '0 s: 0 rpm, 20 s: 850 rpm'."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures.")
+    ] = None,
+    json: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
+    ] = False,
+) -> None:
+    """Start a machine and let it coast down: reached, or captured; the peaks on the way."""
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.results import prepare_folder  # noqa: PLC0415
+
+    project = load_project(file, force=force)
+    project = replace(project, speed=_speed(speed, project))
+    drive = _drive(project, motor_power, inertia, profile)
+    if output is not None:
+        prepare_folder(output)
+    start, coast = _calculated(project, drive)
+
+    from flipflow.io.run_up import run_up_document  # noqa: PLC0415
+
+    runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
+    if json is not None:
+        parts = {name: run_up_document(run) for name, run in runs.items()}
+        write_json({"schema": "flipflow/startup/1", "name": project.name, **parts}, json)
+    if output is not None:
+        _figures(runs, output)
+    if json != "-":
+        _show(project, start, coast, console())
+
+
+def _speed(written: str | None, project: Project) -> float | None:
+    from flipflow.io.layout import SPEED  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.values import read_number  # noqa: PLC0415
+
+    return project.speed if written is None else read_number(written, SPEED, label="--speed")
+
+
+def _drive(
+    project: Project, power: str | None, inertia: str | None, profile: str | None
+) -> Drive | SpeedProfile | None:
+    """The drive the options ask for: a profile, the file's with changes, or one to be assumed."""
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.drive import parse_profile  # noqa: PLC0415
+    from flipflow.io.values import read_number  # noqa: PLC0415
+    from flipflow.model.drive import DRIVE_FIELDS, assumed_drive  # noqa: PLC0415
+
+    if profile is not None:
+        return parse_profile(profile, "--profile")
+    fields = {field.name: field for field in DRIVE_FIELDS}
+    given = {
+        name: read_number(text, fields[name], label=option)
+        for name, text, option in (
+            ("rated_power", power, "--motor-power"), ("inertia", inertia, "--inertia"),
+        )
+        if text is not None
+    }  # fmt: skip
+    if project.speed is None:
+        raise InputError("operation.speed", "(left out)", "give it, or --speed '850 rpm'")
+    drive = project.drive
+    if "rated_power" in given and (drive is None or drive.motor is None):
+        return assumed_drive(
+            project.screen.eccentric_moment, project.speed, given.pop("rated_power"), given
+        )
+    if drive is None and given:
+        raise InputError("--inertia", inertia, "give --motor-power with it")
+    if drive is not None and drive.motor is not None and "rated_power" in given:
+        motor = replace(drive.motor, rated_power=given.pop("rated_power"), breakdown_torque=None)
+        drive = replace(drive, motor=motor)
+    return drive if drive is None else replace(drive, **given)
+
+
+def _calculated(project: Project, drive: Drive | SpeedProfile | None) -> tuple[RunUp, RunUp | None]:
+    """Start, and coast down where working speed is reached, with progress on stderr."""
+    from rich.console import Console  # noqa: PLC0415  keeps --help quick
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
+
+    from flipflow.analyses.startup import coast_down, start_up  # noqa: PLC0415
+    from flipflow.model.drive import Drive  # noqa: PLC0415
+
+    terminal = Console(stderr=True)
+    progress = Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
+        console=terminal, transient=True, disable=not terminal.is_terminal,
+    )  # fmt: skip
+    with progress:
+        task = progress.add_task("start; the first run of a version compiles", total=1.0)
+
+        def tell(stage: str) -> Callable[[str, float], None]:
+            return lambda sentence, share: progress.update(
+                task, description=f"{stage}, {sentence}", completed=share
+            )
+
+        start = start_up(project.screen, drive, speed=project.speed, monitor=tell("start"))
+        if start.outcome != "reached" or not isinstance(start.drive, Drive):
+            return start, None
+        begin = start.final_speed
+        return start, coast_down(project.screen, begin, start.drive, monitor=tell("coast-down"))
+
+
+def _figures(runs: dict[str, RunUp], folder: Path) -> None:
+    from flipflow.figures.transient import run_up_figure  # noqa: PLC0415  keeps --help quick
+
+    for name, run in runs.items():
+        run_up_figure(run).write(folder / f"{name}.html")
+
+
+def _show(project: Project, start: RunUp, coast: RunUp | None, out: Console) -> None:
+    name = printable(project.document.name)
+    out.print(f"{name}: {start.verdict}.", style="bold")
+    _run(start, "On the way up", out)
+    if start.power:
+        parts = {"motor": "motor", "friction": "friction", "dampers": "dampers"}
+        shares = ", ".join(f"{word} {start.power[key] / 1e3:.3g} kW" for key, word in parts.items())
+        out.print(f"Mean power at the end: {shares}")
+    if coast is not None:
+        out.print(f"\nSwitched off, it {coast.verdict}.", style="bold")
+        _run(coast, "On the way down", out)
+    notes = dict.fromkeys((*start.notes, *(coast.notes if coast is not None else ())))
+    print_list(out, "Notes", notes)
+
+
+def _run(run: RunUp, title: str, out: Console) -> None:
+    """Peaks with the speeds at which they occur, and the time to pass the first resonance."""
+    out.print(f"{title:<30}{'greatest':>12}{'at rpm':>10}{'at s':>9}")
+    for key, peak in run.peaks.items():
+        word, scale, unit = WORDS[key]
+        value = f"{peak.value * scale:.3g} {unit}"
+        out.print(f"  {word:<28}{value:>12}{peak.omega * RPM:>10.0f}{peak.t:>9.2f}")
+    first = f"w01 = {run.first_frequency * RPM:.0f} rpm"
+    passed = f"passed in {run.passing:.2g} s" if run.passing is not None else "not passed"
+    out.print(f"First natural frequency {first}: {passed}")

@@ -1,0 +1,121 @@
+"""Start and coast-down over time: speed, amplitudes, torque or force on the foundation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.analyses.startup import RunUp, foundation_force
+from flipflow.analyses.transient import swings
+from flipflow.figures.palette import case_colour, case_symbol
+from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.figures.response import LABELS, SYMBOLS, coordinates, label
+from flipflow.figures.scales import KN, MM, RPM
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Coordinate
+
+Real = NDArray[np.float64]
+MOST_POINTS = 1500
+HEADROOM = 1.08
+
+
+def run_up_figure(run: RunUp) -> Figure:
+    """Speed, amplitudes and torque of a start or a coast-down, over time.
+
+    Parameters
+    ----------
+    run
+        What :func:`flipflow.start_up` or :func:`flipflow.coast_down` returns.
+
+    Returns
+    -------
+    Figure
+        Panels one below the other, over seconds; torque where a motor turns the shaft, else the
+        force on the foundation.
+    """
+    time = Axis("time", "s", (0.0, run.duration))
+    panels = [_speed(run, time), _amplitudes(run, time)]
+    if run.history.torque is not None and np.any(run.history.torque):
+        panels.append(_torque(run, time))
+    elif isinstance(run.machine, FlipFlowScreen):
+        panels.append(_foundation(run, run.machine, time))
+    title = "Coast-down" if run.outcome == "stopped" else "Start"
+    caption = (
+        f"The machine {run.verdict}. Amplitude is half the way from one turning point of the "
+        "motion to the next; w01 is the first natural frequency."
+    )
+    return Figure(title, caption, tuple(panels), height=60 + 170 * len(panels))
+
+
+def _speed(run: RunUp, time: Axis) -> Panel:
+    t, omega = _thinned(run.history.t, run.history.omega * RPM)
+    marks = (
+        (run.first_frequency * RPM, "w01", "mark"),
+        (run.speed * RPM, "working speed", "speed"),
+    )
+    top = HEADROOM * max(float(omega.max()), *(at for at, _, _ in marks))
+    return Panel(
+        time, Axis("shaft speed", "rpm", (min(0.0, float(omega.min())), top)),
+        traces=(Trace("shaft speed", t, omega, colour="relative", legend=False),),
+        lines=tuple(Line("y", at, text, colour) for at, text, colour in marks),
+    )  # fmt: skip
+
+
+def _amplitudes(run: RunUp, time: Axis) -> Panel:
+    traces = []
+    for index, which in enumerate(_shown(run)):
+        t, size = swings(
+            run.history.t, run.history.displacement(which), run.history.velocity(which)
+        )
+        t, size = _envelope(t, size * MM)
+        known = isinstance(which, str) and which in LABELS
+        traces.append(
+            Trace(
+                label(which), t, size, colour=str(which) if known else case_colour(index),
+                symbol=SYMBOLS.get(str(which)) if known else case_symbol(index),
+                bold=which == "relative",
+            )
+        )  # fmt: skip
+    top = max((float(trace.y.max()) for trace in traces if trace.y.size), default=1.0)
+    return Panel(time, Axis("amplitude", "mm", (0.0, HEADROOM * top)), tuple(traces))
+
+
+def _torque(run: RunUp, time: Axis) -> Panel:
+    history = run.history
+    torque = np.zeros(0) if history.torque is None else history.torque
+    t, values = _thinned(history.t, torque)
+    low = min(0.0, float(values.min()))
+    return Panel(
+        time, Axis("motor torque at the shaft", "N m", (low, HEADROOM * float(values.max()))),
+        traces=(Trace("motor torque", t, values, colour="input", legend=False),),
+    )  # fmt: skip
+
+
+def _foundation(run: RunUp, screen: FlipFlowScreen, time: Axis) -> Panel:
+    t, force = _envelope(run.history.t, foundation_force(screen, run.history) * KN)
+    return Panel(
+        time, Axis("foundation force", "kN", (0.0, HEADROOM * float(force.max(initial=1e-9)))),
+        traces=(Trace("foundation force", t, force, colour="isolation", legend=False),),
+    )  # fmt: skip
+
+
+def _shown(run: RunUp) -> tuple[Coordinate, ...]:
+    if isinstance(run.machine, FlipFlowScreen):
+        return ("main", "relative")
+    return coordinates(run.history.system)
+
+
+def _thinned(t: Real, values: Real) -> tuple[Real, Real]:
+    rows = np.unique(np.linspace(0, t.size - 1, MOST_POINTS).round().astype(int))
+    return t[rows], values[rows]
+
+
+def _envelope(t: Real, values: Real) -> tuple[Real, Real]:
+    """The greatest value of each of many short spans: thinned without losing a peak."""
+    if t.size <= MOST_POINTS:
+        return t, values
+    starts = np.linspace(0, t.size, MOST_POINTS, endpoint=False).astype(int)
+    rows = np.array(
+        [a + int(values[a:b].argmax()) for a, b in zip(starts, [*starts[1:], t.size], strict=True)]
+    )
+    return t[rows], values[rows]

@@ -1,0 +1,62 @@
+"""Every coexisting motion of FFS0827: at 203 rad/s three, elsewhere nothing that is not there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from reference import integrate
+
+
+@pytest.fixture(scope="module")
+def screen() -> ff.FlipFlowScreen:
+    return ff.load("ffs0827")
+
+
+@pytest.mark.parametrize("max_periods", [1, 6])
+def test_203_has_three_motions_one_unstable(screen, max_periods) -> None:
+    """Must show 4: all three motions at 203 rad/s."""
+    orbits = ff.periodic_orbits(screen, 203.0, max_periods)
+    assert [orbit.stability for orbit in orbits] == ["stable", "unstable", "stable"]
+    assert {orbit.periods for orbit in orbits} == {1}
+
+
+@pytest.mark.parametrize("omega", [20.0, 70.0, 110.0, 150.0, 190.0, 198.0, 207.0, 220.0])
+def test_nothing_that_is_not_there(screen, omega) -> None:
+    """Row 20: one motion outside the folds, no subharmonic, none that leans."""
+    orbits = ff.periodic_orbits(screen, omega, 6)
+    assert len(orbits) == 1
+    assert orbits[0].periods == 1
+    assert orbits[0].stable
+
+
+def test_leaning_motions_come_with_their_mirrors(screen) -> None:
+    """Row 25: e = 2 mm at 57.7 rad/s."""
+    leaning = screen.replace(clearance=2e-3)
+    stable = [o for o in ff.periodic_orbits(leaning, 57.7, 2) if o.stable]
+    ends = sorted(
+        (float(o.displacement("relative").max()), float(o.displacement("relative").min()))
+        for o in stable
+    )
+    assert len(ends) == 2
+    assert ends[0][0] == pytest.approx(2.024274e-3, abs=1e-6)
+    assert ends[1] == pytest.approx((-ends[0][1], -ends[0][0]), abs=1e-9)
+
+
+def test_motions_of_several_periods_far_above_the_resonance(screen) -> None:
+    """Must show 4: from 350 to 541 rad/s there are motions of three periods; as DOP853 says."""
+    machine = integrate.Machine.of(screen.system())
+    orbits = ff.periodic_orbits(screen, 450.0, 3)
+    several = [orbit for orbit in orbits if orbit.periods == 3]
+    assert {orbit.stability for orbit in several} == {"stable", "unstable"}
+    for orbit in several:
+        duration = 3 * 2.0 * np.pi / 450.0
+        back = integrate.flow(machine, orbit.state, 450.0, 0.0, duration).final
+        assert np.abs(back[:2] - orbit.state[:2]).max() < 1e-9
+
+
+@pytest.mark.parametrize("periods", [0, 7, 1.5, True])
+def test_periods_outside_the_search_are_refused(screen, periods) -> None:
+    with pytest.raises(ff.InputError, match="max_periods"):
+        ff.periodic_orbits(screen, 203.0, periods)

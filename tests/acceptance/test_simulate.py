@@ -1,0 +1,159 @@
+"""Motion in time at constant speed: against DOP853, with disturbances, with its energies."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from reference import integrate
+
+TURN = 2.0 * math.pi / 120.0
+BLOWS = (
+    ff.Impulse(10.3 * TURN, "main", 200.0),
+    ff.LoadStep(20.21 * TURN, ff.Load(stiffness_factor=1.3, main_mass=30.0)),
+    ff.Lump(30.77 * TURN, "floating", 15.0, velocity=1.0),
+    ff.Impulse(41.1 * TURN, "relative", -50.0),
+)
+
+
+@pytest.fixture(scope="module")
+def screen() -> ff.FlipFlowScreen:
+    return ff.load("ffs0827")
+
+
+def reference_run(screen, periods: float, blows=()) -> np.ndarray:
+    """State after ``periods`` by event-located DOP853, disturbances worked out by hand."""
+    z, t, end = np.zeros(4), 0.0, periods * TURN
+    for blow in (*blows, None):
+        until = end if blow is None else blow.t
+        machine = integrate.Machine.of(screen.system())
+        z = integrate.flow(machine, z, 120.0, t, until).final
+        t = until
+        m1, m2 = screen.main_mass, screen.floating_mass
+        if isinstance(blow, ff.Impulse):
+            share = {"main": (1.0, 0.0), "relative": (1.0, -1.0)}[blow.which]
+            z = z + blow.impulse * np.array([0.0, 0.0, share[0] / m1, share[1] / m2])
+        elif isinstance(blow, ff.LoadStep):
+            screen = screen.loaded(blow.load)
+        elif isinstance(blow, ff.Lump):
+            z[3] = (m2 * z[3] + blow.mass * blow.velocity) / (m2 + blow.mass)
+            screen = screen.replace(floating_mass=m2 + blow.mass)
+    return z
+
+
+@pytest.mark.parametrize("blows", [(), BLOWS], ids=["undisturbed", "disturbed"])
+def test_simulation_agrees_with_dop853_over_70_periods(screen, blows) -> None:
+    """Must show 2: DOP853 with events at 1e-11, to 1e-9 m over 70 periods."""
+    history = ff.simulate(screen, 120.0, 70, disturbances=blows)
+    z = reference_run(screen, 70.0, blows)
+    assert np.abs(history.x[-1] - z[:2]).max() < 1e-9
+    assert np.abs(history.v[-1] - z[2:]).max() < 1e-9 * 120.0
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only"])
+@pytest.mark.parametrize("blows", [(), BLOWS], ids=["undisturbed", "disturbed"])
+def test_energy_balances(screen, law, blows) -> None:
+    """Must show 2: energy balances to 1e-9 with impulses and load steps in it."""
+    history = ff.simulate(screen.replace(stop_law=law), 120.0, 70, disturbances=blows)
+    e = history.energy
+    gained = e["input"] + e["impulses"] + e["loads"]
+    assert abs(gained - e["dissipated"] - e["stored"]) < 1e-9 * e["input"], dict(e)
+    assert (e["impulses"] != 0.0) == bool(blows)
+
+
+def test_settles_on_the_exact_orbit(screen) -> None:
+    history = ff.simulate(screen, 120.0, 200)
+    exact = ff.frequency_response(screen, (100.0, 130.0)).orbits_at(120.0)[0]
+    assert history.settled
+    assert history.distance < 1e-12
+    assert np.abs(np.concatenate([history.x[-1], history.v[-1]]) - exact.state).max() < 1e-9
+
+
+def test_not_settled_says_how_far(screen) -> None:
+    history = ff.simulate(screen, 120.0, 20)
+    assert history.settled is False
+    exact = ff.frequency_response(screen, (100.0, 130.0)).orbits_at(120.0)[0]
+    gap = np.concatenate([history.x[-1], history.v[-1] / 120.0])
+    gap -= np.concatenate([exact.state[:2], exact.state[2:] / 120.0])
+    assert history.distance == pytest.approx(np.abs(gap).max(), rel=1e-9)
+
+
+def test_times_asked_for_do_not_change_the_motion(screen) -> None:
+    every = ff.simulate(screen, 150.0, 10)
+    t = np.sort(np.random.default_rng(1).uniform(0.0, 10 * 2 * math.pi / 150.0, 50))
+    some = ff.simulate(screen, 150.0, 10, t=t)
+    x = np.array([np.interp(t, every.t, every.x[:, k]) for k in range(2)]).T
+    assert np.abs(some.x - x).max() < 1e-4
+    derivative = np.gradient(every.x[:, 0], every.t)
+    assert np.abs(derivative - every.v[:, 0]).max() < 0.05
+
+
+def test_contact_forces_act_beyond_the_gap_only(screen) -> None:
+    history = ff.simulate(screen, 150.0, 40)
+    y = history.displacement("relative")
+    force = history.stop_force()
+    assert (force[np.abs(y) < 6e-3] == 0.0).all()
+    assert (force[np.abs(y) > 6.001e-3] != 0.0).all()
+    assert history.events
+    touched = history.events[-1]
+    k = int(np.searchsorted(history.t, touched.t))
+    assert abs(abs(np.interp(touched.t, history.t, y)) - 6e-3) < 2e-5, (k, touched)
+
+
+def test_normal_direction_reaches_its_closed_form(screen) -> None:
+    """y of (m1 + m2) y'' + c1n y' + k1n y = m0r w^2 sin(w t), after the start has died out."""
+    history = ff.simulate(screen, 90.0, 400)
+    m, k, c = 1226.0, 630e3, 9866.0
+    Y = -1j * 4.16825 * 90.0**2 / (k - m * 90.0**2 + 1j * c * 90.0)
+    assert history.normal[-1, 0] == pytest.approx(Y.real, rel=1e-9)
+    assert history.normal[-1, 1] == pytest.approx((1j * 90.0 * Y).real, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"omega": -5.0}, "omega"),
+        ({"periods": 0}, "periods"),
+        ({"periods": 10**9}, "periods"),
+        ({"initial": "asleep"}, "initial"),
+        ({"t": [2.0, 1.0]}, "t"),
+        ({"t": [0.0, 1e9]}, "t"),
+        ({"disturbances": (ff.Impulse(1e6, "main", 1.0),)}, "disturbances"),
+    ],
+)
+def test_bad_simulations_are_refused(screen, arguments, field) -> None:
+    given = {"omega": 120.0, "periods": 10} | arguments
+    with pytest.raises(ff.InputError, match=field):
+        ff.simulate(screen, **given)
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: ff.Impulse(1.0, "main", 1e12), "impulse"),
+        (lambda: ff.Impulse(-1.0, "main", 1.0), "t"),
+        (lambda: ff.Lump(1.0, "deck", 1.0), "frame"),
+        (lambda: ff.Lump(1.0, "main", 0.0), "mass"),
+        (lambda: ff.Lump(1.0, "main", 1.0, velocity=math.inf), "velocity"),
+    ],
+)
+def test_absurd_disturbances_are_refused(make, field) -> None:
+    with pytest.raises(ff.InputError, match=field):
+        make()
+
+
+def test_loads_need_a_screen(screen) -> None:
+    with pytest.raises(ff.InputError, match="screen"):
+        ff.simulate(
+            screen.system(), 120.0, 10, disturbances=(ff.LoadStep(0.1, ff.Load(main_mass=1.0)),)
+        )
+
+
+def test_without_damping_nothing_settles(screen) -> None:
+    """Bad input: no damping (never settles)."""
+    bare = screen.replace(isolation_damping=0.0, shear_damping=0.0)
+    with pytest.raises(ff.InputError, match="damping"):
+        ff.simulate(bare, 120.0, 10)

@@ -1,0 +1,82 @@
+"""Special points of random machines: none false, none stepped over, each branch to its end.
+
+The machines are those of benchmarks/random_machines.py, by number of seed 0; the whole run is in
+benchmarks/README.md.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+
+SEED = 0
+SPEC = importlib.util.spec_from_file_location(
+    "machine_draw", Path(__file__).parents[2] / "benchmarks" / "machine_draw.py"
+)
+PAIRS = {220: (25.99218, 26.00436), 283: (29.97380, 29.99874), 934: (31.79510, 31.79870)}
+FALSE = {143: (15.1200, 15.1204), 898: (14.8523, 14.8525)}
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    draw = importlib.util.module_from_spec(SPEC)
+    SPEC.loader.exec_module(draw)
+
+    def of(number, method=None):
+        screen = draw.draw(SEED, number)
+        return ff.frequency_response(screen, draw.speeds(screen), method)
+
+    return of
+
+
+def kinds_between(branch, kind, low, high):
+    return [point.omega for point in branch.points_of(kind) if low < point.omega < high]
+
+
+@pytest.mark.parametrize("number", PAIRS)
+def test_pair_of_symmetry_breakings_within_one_step_is_found(drawn, number):
+    """The series, which takes other steps, has the same pair, to its own error."""
+    low, high = PAIRS[number]
+    exact = kinds_between(drawn(number), "symmetry breaking", low - 5e-3, high + 5e-3)
+    series = drawn(number, ff.HarmonicBalance(25))
+    same = kinds_between(series, "symmetry breaking", low - 5e-3, high + 5e-3)
+    assert len(exact) == len(same) == 2
+    assert exact == pytest.approx(same, abs=2e-3)
+    assert exact == pytest.approx(PAIRS[number], abs=2e-3)
+
+
+@pytest.mark.parametrize("number", FALSE)
+def test_symmetry_breaking_of_the_series_alone_is_a_note(drawn, number):
+    low, high = FALSE[number]
+    series = drawn(number, ff.HarmonicBalance(25))
+    for branch in (series, drawn(number)):
+        assert branch.complete
+        assert not kinds_between(branch, "symmetry breaking", low, high)
+    said = [note for note in series.notes if note.startswith("symmetry breaking of the series")]
+    assert len(said) == 1
+    assert "raise the harmonics" in said[0]
+    said_at = [float(word) for word in re.findall(r"\d+\.\d+", said[0])]
+    assert any(low < omega < high for omega in said_at)
+
+
+@pytest.mark.parametrize("harmonics", [1, 3])
+def test_folds_of_a_short_series_are_kept(screen, harmonics):
+    branch = ff.frequency_response(screen, (5, 250), ff.HarmonicBalance(harmonics))
+    expected = {1: (206.453, 198.002), 3: (206.415, 198.661)}[harmonics]
+    assert [fold.omega for fold in branch.folds] == pytest.approx(expected, abs=2e-3)
+    assert branch.notes == ()
+
+
+def test_branch_with_folds_sharper_than_its_steps_reaches_the_end(drawn):
+    """Just past a new contact the branch turns within a billionth of its length."""
+    branch = drawn(840)
+    assert branch.complete, branch.status.value
+    assert len(branch.folds) % 2 == 0
+    rises = np.sign(np.diff(branch.omega))
+    assert np.count_nonzero(rises[1:] != rises[:-1]) == len(branch.folds)

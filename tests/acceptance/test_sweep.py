@@ -1,0 +1,96 @@
+"""Stepped sweeps: settled by the motion approached, jumps within one step of the exact folds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+
+FOLD_UP, FOLD_DOWN = 206.405559, 198.649272  # row 7
+
+
+@pytest.fixture(scope="module")
+def screen() -> ff.FlipFlowScreen:
+    return ff.load("ffs0827")
+
+
+@pytest.fixture(scope="module")
+def branch(screen):
+    return ff.frequency_response(screen, (130.0, 250.0))
+
+
+@pytest.mark.parametrize("step", [0.01, 0.05, 0.3, 2.0])
+@pytest.mark.parametrize("rising", [True, False], ids=["up", "down"])
+def test_sweeps_jump_within_one_step_of_the_exact_folds(screen, branch, step, rising) -> None:
+    """Must show 1: steps from 0.01 to 2 rad/s, both directions, 30 steps across the fold."""
+    fold = FOLD_UP if rising else FOLD_DOWN
+    sign = 1.0 if rising else -1.0
+    speeds = fold + sign * step * (np.arange(30) - 20.3)
+    start = next(orbit for orbit in branch.orbits_at(speeds[0]) if orbit.stable)
+    if not rising:
+        start = [orbit for orbit in branch.orbits_at(speeds[0]) if orbit.stable][-1]
+    swept = ff.sweep(screen, speeds, initial=start)
+    assert len(swept.jumps) == 1, swept.jumps
+    jump = swept.jumps[0]
+    assert sign * (fold - jump.omega_before) >= 0.0, f"jumped before the fold: {jump}"
+    assert abs(jump.omega_after - fold) <= step * (1.0 + 1e-9), f"jumped late: {jump}"
+    assert swept.settled.all(), swept.distance.max()
+
+
+def test_swept_amplitudes_are_those_of_exact_orbits(screen, branch) -> None:
+    """Must show 1: away from the jumps amplitudes agree with exact orbits to 1e-6."""
+    speeds = np.arange(150.0, 222.0, 4.0)
+    for order in (speeds, speeds[::-1]):
+        swept = ff.sweep(screen, order)
+        for omega, amplitude in zip(order, swept.amplitude("relative"), strict=True):
+            exact = [o.amplitude("relative") for o in branch.orbits_at(float(omega)) if o.stable]
+            nearest = min(exact, key=lambda one: abs(one - amplitude))
+            assert abs(amplitude / nearest - 1.0) < 1e-6, f"{omega}: {amplitude} against {nearest}"
+
+
+def test_up_and_down_differ_only_between_the_folds(screen) -> None:
+    """Row 20: two stable motions only between the folds."""
+    speeds = np.arange(190.0, 215.0, 1.0)
+    up = ff.sweep(screen, speeds).amplitude("relative")
+    down = ff.sweep(screen, speeds[::-1]).amplitude("relative")[::-1]
+    differ = speeds[np.abs(up - down) > 1e-6]
+    assert differ.min() == 199.0
+    assert differ.max() == 206.0
+
+
+def test_a_motion_that_never_settles_is_marked(screen) -> None:
+    """Too few turns just past the fold: the motion lingers, and is not called settled."""
+    near = ff.frequency_response(screen, (200.0, 230.0)).orbits_at(206.4)[0]
+    swept = ff.sweep(screen, [206.42], initial=near, most_turns=60)
+    assert not swept.settled[0]
+    assert swept.periods[0] == 0
+    assert swept.turns[0] == 60
+    longer = ff.sweep(screen, [206.42], initial=near)
+    assert longer.settled[0]
+    assert longer.amplitude("relative")[0] < 0.5 * near.amplitude("relative")
+
+
+@pytest.mark.parametrize(
+    ("omega", "options", "field"),
+    [
+        ([], {}, "omega"),
+        ([100.0, float("nan")], {}, "omega"),
+        ([100.0, -1.0], {}, "omega"),
+        (["fast"], {}, "omega"),
+        ([100.0], {"initial": "standing"}, "initial"),
+        ([100.0], {"initial": [0.0, 0.0]}, "initial"),
+        ([100.0], {"max_periods": 0}, "max_periods"),
+        ([100.0], {"most_turns": 1.5}, "most_turns"),
+    ],
+)
+def test_bad_sweeps_are_refused(screen, omega, options, field) -> None:
+    with pytest.raises(ff.InputError, match=field):
+        ff.sweep(screen, omega, **options)
+
+
+def test_without_damping_nothing_settles(screen) -> None:
+    """Bad input: no damping."""
+    bare = screen.replace(isolation_damping=0.0, shear_damping=0.0)
+    with pytest.raises(ff.InputError, match="damping"):
+        ff.sweep(bare, [100.0])
