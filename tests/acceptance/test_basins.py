@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 
 import numpy as np
@@ -11,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import flipflow as ff
 from flipflow.cli.main import main
+from flipflow.cli.progress import stoppable
 from flipflow.errors import Cancelled, InputError
 from flipflow.methods.exact import ExactSolver
 
@@ -377,3 +380,38 @@ def test_command_line_refuses_with_one_sentence(monkeypatch, tmp_path, capsys, w
     monkeypatch.chdir(tmp_path)
     assert run(monkeypatch, "basins", "ffs0827", *words) == 2
     assert capsys.readouterr().err.startswith("Error: ")
+
+
+def test_interrupt_keeps_cells_and_ends_other_stages():
+    """Ctrl-C while cells run becomes Cancelled at the next word; elsewhere it ends the program."""
+    before = signal.getsignal(signal.SIGINT)
+    with stoppable(lambda _sentence, _share: None, "cells") as told:
+        told("cells", 0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+        with pytest.raises(Cancelled):
+            told("cells", 0.2)
+    with stoppable(lambda _sentence, _share: None, "cells") as told:
+        told("motions", 0.0)
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_interrupted_command_writes_what_it_has(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    run_cells = ff.basins
+
+    def interrupted(*given, monitor, **options):
+        def told(sentence, share):
+            if sentence == "cells" and share > 0.3:
+                os.kill(os.getpid(), signal.SIGINT)
+            monitor(sentence, share)
+
+        return run_cells(*given, monitor=told, **options)
+
+    monkeypatch.setattr("flipflow.analyses.basins.basins", interrupted)
+    assert run(monkeypatch, "basins", "ffs0827", "--speed", "203 rad/s", "-o", "out") == 130
+    assert "Stopped by the user" in capsys.readouterr().err
+    document = json.loads((tmp_path / "out" / "basins.json").read_text())
+    assert not document["complete"]
+    assert document["jump_risk"] is None

@@ -305,5 +305,7 @@ def _notes(blows: Blows, others: tuple[Orbit, ...], found: list[Throw]) -> tuple
     ]
     if others and idle:
         names = " or ".join(map(str, idle))
-        notes.append(f"No impulse tried on {names}, and no lump, throws the motion onto another.")
+        notes.append(
+            f"No impulse or lump that was tried on {names} throws the motion onto another."
+        )
     return tuple(notes)

@@ -149,6 +149,8 @@ def _millimetres(orbit: Orbit) -> str:
 
 def risk_words(risk: JumpRisk) -> list[str]:
     """The jump risk in a plant's words."""
+    from flipflow.report.numbers import number  # noqa: PLC0415  keeps --help quick
+
     here = f"The working motion, {_millimetres(risk.orbit)}, is the one reached from below."
     words = [here]
     if not risk.others:
@@ -159,7 +161,7 @@ def risk_words(risk: JumpRisk) -> list[str]:
         words.append("No blow that was tried throws it onto another motion.")
     else:
         words.append(
-            f"A blow of {blow.size:.3g} kg m/s along the surface on the {blow.frame} frame throws "
+            f"A blow of {number(blow.size)} kg m/s along the surface on the {blow.frame} frame throws "
             f"it to {_millimetres(blow.lands)}, at the worst moment ({_degrees(blow.phase)} of the "
             "unbalance). It takes more at any other moment, or on the other frame."
         )
@@ -171,7 +173,7 @@ def risk_words(risk: JumpRisk) -> list[str]:
         )
     else:
         words.append(
-            f"So does a lump of {lump.size:.3g} kg that lands on the {lump.frame} frame at "
+            f"So does a lump of {number(lump.size)} kg that lands on the {lump.frame} frame at "
             f"{_degrees(lump.phase)} and leaves with the feed within the turn."
         )
     words += [f"Note: {note}" for note in risk.notes]

@@ -107,7 +107,7 @@ class Lanes:
             raise InputError("threads", threads, f"give a whole number from 1 to {MOST_THREADS}")
         self.builder = PlanBuilder(system)
         self.omega = float(omega)
-        self.threads = threads or len(os.sched_getaffinity(0))
+        self.threads = threads or os.cpu_count() or 1
         self._adding = threading.Lock()
 
     def settle(
