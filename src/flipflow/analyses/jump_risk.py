@@ -300,12 +300,9 @@ def _notes(blows: Blows, others: tuple[Orbit, ...], found: list[Throw]) -> tuple
         )
     if not all(throw.sharp for throw in found):
         notes.append("Close to a least blow the outcome changes more than once within 1 %.")
-    idle = [
-        f for f in dict.fromkeys(r.frame for r in blows.rows) if f not in {t.frame for t in found}
-    ]
+    hit = {throw.frame for throw in found}
+    idle = [f for f in dict.fromkeys(row.frame for row in blows.rows) if f not in hit]
     if others and idle:
         names = " or ".join(map(str, idle))
-        notes.append(
-            f"No impulse or lump that was tried on {names} throws the motion onto another."
-        )
+        notes.append(f"No impulse or lump tried on {names} throws the motion onto another.")
     return tuple(notes)

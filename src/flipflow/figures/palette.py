@@ -41,12 +41,12 @@ FILLS: Mapping[str, str] = {
 }
 TINTS: Mapping[str, str] = {
     "none": "#ffffff",
-    "case 0": "#c3c9cf",
-    "case 1": "#a9c8ee",
+    "case 0": "#eceef0",
+    "case 1": "#8fb7e6",
     "case 2": "#f6d9c4",
     "case 3": "#7fc4a6",
     "case 4": "#d9bfe2",
-    "case 5": "#e9ebee",
+    "case 5": "#b4bac0",
 }
 DASHES: Mapping[str, str] = {"unstable": "dash", "undetermined": "dot"}
 SYMBOLS = ("", "circle", "square", "triangle", "diamond", "cross")
