@@ -162,7 +162,8 @@ def risk_words(risk: JumpRisk) -> list[str]:
     else:
         words.append(
             f"A blow of {number(blow.size)} kg m/s along the surface on the {blow.frame} frame "
-            f"throws it to {_millimetres(blow.lands)}, at the worst moment ({_degrees(blow.phase)} of the "
+            f"throws it to {_millimetres(blow.lands)}, at the worst moment "
+            f"({_degrees(blow.phase)} of the "
             "unbalance). It takes more at any other moment, or on the other frame."
         )
     lump = risk.worst_lump
