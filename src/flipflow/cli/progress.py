@@ -1,9 +1,13 @@
-"""Progress of long work on stderr."""
+"""Progress of long work on stderr, and Ctrl-C that keeps what is finished."""
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+from flipflow.errors import Cancelled
 
 Tell = Callable[[str, float], None]
 
@@ -25,3 +29,29 @@ def progress(begin: str) -> Iterator[Tell]:
     with bar:
         task = bar.add_task(begin, total=1.0)
         yield lambda sentence, share: bar.update(task, description=sentence, completed=share)
+
+
+@contextmanager
+def stoppable(tell: Tell, stage: str) -> Iterator[Tell]:
+    """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
+
+    In other stages, and at the second time, Ctrl-C ends the program at once.
+    """
+    at = {"stage": "", "stop": ""}
+
+    def told(sentence: str, share: float) -> None:
+        at["stage"] = sentence
+        if at["stop"]:
+            raise Cancelled("stopped by the user")
+        tell(sentence, share)
+
+    def interrupted(_number: int, _frame: FrameType | None) -> None:
+        if at["stage"] != stage or at["stop"]:
+            raise KeyboardInterrupt
+        at["stop"] = "asked"
+
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield told
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -10,6 +10,7 @@ from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.basins import basins_figure
 from flipflow.figures.branches import branches_figure, field_branch_figure
 from flipflow.figures.history import history_figure
 from flipflow.figures.motion import orbit_figure
@@ -18,6 +19,7 @@ from flipflow.figures.response import branch_figure, cases_figure, linear_figure
 from flipflow.figures.sensitivity import sensitivity_figure
 from flipflow.figures.sweep import sweep_figure
 from flipflow.figures.transient import run_up_figure
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.field_branch import FieldBranch
 from flipflow.results.history import History
@@ -105,3 +107,8 @@ def _(result: RunUp) -> Figure:
 @figure.register
 def _(result: Sensitivity) -> Figure:
     return sensitivity_figure(result)
+
+
+@figure.register
+def _(result: Basins) -> Figure:
+    return basins_figure(result)

@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.reopen import branch_from
+from flipflow.analyses.reopen import basins_from, branch_from
 from flipflow.errors import InputError, StoreError
 from flipflow.io.run_up import run_up_document
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.document import (
+    BASINS,
     BRANCH,
+    basins_document,
     branch_document,
     field_branch_document,
     orbit_document,
@@ -74,8 +77,8 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         )  # fmt: skip
 
 
-def open_result(path: str | os.PathLike[str]) -> Branch | Sensitivity | dict[str, Any]:
-    """Open what :func:`save` wrote as JSON: branches and sensitivities as such, others as they are.
+def open_result(path: str | os.PathLike[str]) -> Branch | Basins | Sensitivity | dict[str, Any]:
+    """Open what :func:`save` wrote as JSON: branches, basins and sensitivities as such.
 
     Raises
     ------
@@ -99,6 +102,8 @@ def open_result(path: str | os.PathLike[str]) -> Branch | Sensitivity | dict[str
     try:
         if document["schema"] == SENSITIVITY:
             return sensitivity_from(document)
+        if document["schema"] == BASINS:
+            return basins_from(document)
         return branch_from(document) if document["schema"] == BRANCH else document
     except (KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path} is damaged: {error!r}") from None
@@ -114,6 +119,7 @@ def document_of(result: object) -> dict[str, Any]:
 document_of.register(Branch, branch_document)
 document_of.register(FieldBranch, field_branch_document)
 document_of.register(Orbit, orbit_document)
+document_of.register(Basins, basins_document)
 document_of.register(History, history_document)
 document_of.register(Sweep, sweep_document)
 document_of.register(RunUp, run_up_document)
