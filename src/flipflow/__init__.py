@@ -20,6 +20,9 @@ _HOME = {
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "start_up": "flipflow.analyses.startup",
     "coast_down": "flipflow.analyses.startup",
+    "continue_orbit": "flipflow.analyses.continue_orbit",
+    "switch_branch": "flipflow.analyses.continue_orbit",
+    "continue_fold": "flipflow.analyses.continue_field",
     "assess": "flipflow.analyses.assessment",
     "simulate": "flipflow.analyses.simulate",
     "sweep": "flipflow.analyses.sweep",
@@ -54,6 +57,9 @@ __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 if TYPE_CHECKING:
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
     from flipflow.analyses.assessment import assess as assess
+    from flipflow.analyses.continue_field import continue_fold as continue_fold
+    from flipflow.analyses.continue_orbit import continue_orbit as continue_orbit
+    from flipflow.analyses.continue_orbit import switch_branch as switch_branch
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.operating_region import operating_region as operating_region

@@ -18,10 +18,10 @@ from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced, eigenvalue
 from flipflow.methods.special import STABILITY_CHANGES, Found, find_special_points
 from flipflow.methods.stability import (
     UNDETERMINED,
+    beyond_where_rising,
     full_turn,
     saddle_side,
     stability_words,
-    starts_beyond,
 )
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.results.branch import Branch, SpecialPoint
@@ -90,13 +90,13 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
 
 
 def solver_for(
-    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None
+    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
 ) -> Solver:
     """The solver of a method. Without stops both are the closed form, which shooting meets."""
     symmetric = system.symmetric if half_turn is None else half_turn
     if isinstance(method, HarmonicBalance) and system.with_bonded().springs:
         return BalanceSolver(system, method.harmonics, half_turn=symmetric)
-    return ExactSolver(system, half_turn=symmetric)
+    return ExactSolver(system, half_turn=symmetric, turns=turns)
 
 
 def check_interval(omega: object) -> tuple[float, float]:
@@ -195,6 +195,7 @@ def _finished(
     if eigenvalues is None:
         eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
     side = saddle_side(traced.tangent[:, -1], eigenvalues) if eigenvalues.size else None
+    beyond = beyond_where_rising(traced.tangent[:, -1], eigenvalues)
     special = tuple(
         SpecialPoint(
             one.kind,
@@ -211,7 +212,7 @@ def _finished(
         solver=solver,
         traced=traced,
         return_maps=maps,
-        saddle_side_at_start=starts_beyond(eigenvalues),
+        saddle_side_at_start=beyond,
         multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
         stability=stability_words(eigenvalues, side),
         special_points=special,

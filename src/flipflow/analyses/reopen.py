@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from flipflow.analyses.frequency_response import solver_for
 from flipflow.errors import StoreError
 from flipflow.kernels import arclength
 from flipflow.methods.scratch import new_branch
-from flipflow.methods.solver import Point, Traced
+from flipflow.methods.solver import Point, Solver, Traced
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.document import BRANCH, machine_from, method_from
 from flipflow.results.orbit import Orbit
@@ -29,7 +30,14 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
     if document.get("schema") != BRANCH:
         raise StoreError(f"schema {document.get('schema')!r} is not a branch of this version")
     machine, method = machine_from(document["machine"]), method_from(document["method"])
-    solver = solver_for(machine.system(), method, half_turn=document["half_turn"])
+    system = machine.system()
+
+    @cache
+    def solver_of(half_turn: bool, turns: int) -> Solver:
+        return solver_for(system, method, half_turn=half_turn, turns=turns)
+
+    half_turn, turns = document["half_turn"], document.get("turns", 1)
+    solver = solver_of(half_turn, turns)
     u = np.asarray(document["unknowns"], dtype=float).reshape(-1, solver.unknowns)
     points = u.shape[0]
     record = new_branch(solver.unknowns, max(points, 1))
@@ -49,7 +57,8 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
             Orbit(
                 machine,
                 Point(
-                    solver,
+                    # Where a branch meets another, the point is one of the other's motions.
+                    solver_of(one.get("half_turn", half_turn), one.get("turns", turns)),
                     np.asarray(one["unknowns"]),
                     one["omega"],
                     known_map=np.asarray(one["return_map"]),

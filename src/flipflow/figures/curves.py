@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flipflow.model.system import Coordinate
 from flipflow.results.branch import Branch
+from flipflow.results.status import BranchStatus
 
 Real = NDArray[np.float64]
 
@@ -44,6 +45,8 @@ class Curve:
         amplitude = np.append(branch.amplitude(which), [p.amplitude(which) for p in special])
         phase = np.append(branch.phase(which), [p.orbit.phase(which) for p in special])
         following = [branch.stability[_next(point.position, branch)] for point in special]
+        if branch.status is BranchStatus.CLOSED:
+            order = np.append(order, order[0])
         return cls(
             omega[order],
             amplitude[order],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import singledispatch
 
 from flipflow.analyses.assessment import Assessment
@@ -9,6 +10,7 @@ from flipflow.analyses.linear import LinearResponse
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.branches import branches_figure, field_branch_figure
 from flipflow.figures.history import history_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
@@ -17,6 +19,7 @@ from flipflow.figures.sensitivity import sensitivity_figure
 from flipflow.figures.sweep import sweep_figure
 from flipflow.figures.transient import run_up_figure
 from flipflow.results.branch import Branch
+from flipflow.results.field_branch import FieldBranch
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
 from flipflow.results.run_up import RunUp
@@ -51,6 +54,17 @@ def figure(result: object) -> Figure:
 @figure.register
 def _(result: Branch) -> Figure:
     return branch_figure(result)
+
+
+@figure.register(list)
+@figure.register(tuple)
+def _(result: Sequence[Branch]) -> Figure:
+    return branches_figure(result)
+
+
+@figure.register
+def _(result: FieldBranch) -> Figure:
+    return field_branch_figure(result)
 
 
 @figure.register

@@ -17,7 +17,7 @@ from flipflow.figures.palette import CASES, case_colour, case_symbol
 from flipflow.figures.parts import Arrow, Axis, Band, Figure, Line, Panel, Trace
 from flipflow.figures.scales import DEGREES, HZ, MM, RPM
 from flipflow.model.system import Coordinate, MechanicalSystem
-from flipflow.results.branch import Branch
+from flipflow.results.branch import Branch, SpecialPoint
 
 Real = NDArray[np.float64]
 LABELS = {"main": "main frame (x1)", "floating": "floating frame (xf)", "relative": "relative (x2)"}
@@ -58,7 +58,7 @@ def branch_figure(branch: Branch, omega: float | None = None, title: str = "") -
     amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
     phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
     axis = speed_axis(branch.omega)
-    points = _special_points(branch, names[-1])
+    points = special_point_traces(branch.special_points, names[-1])
     jumps = curves[-1].jumps()
     top = Panel(
         axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
@@ -199,10 +199,12 @@ def curve_traces(
         legend = False
 
 
-def _special_points(branch: Branch, which: Coordinate) -> Iterator[Trace]:
+def special_point_traces(
+    special_points: Sequence[SpecialPoint], which: Coordinate
+) -> Iterator[Trace]:
     """Marks at special points, one entry of the legend for each kind."""
-    for kind in dict.fromkeys(point.kind for point in branch.special_points):
-        points = branch.points_of(kind)
+    for kind in dict.fromkeys(point.kind for point in special_points):
+        points = [point for point in special_points if point.kind == kind]
         omega = np.array([point.omega for point in points])
         yield Trace(
             KIND_WORDS.get(kind, kind), omega * RPM,

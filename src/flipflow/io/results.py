@@ -18,7 +18,14 @@ from flipflow.analyses.reopen import branch_from
 from flipflow.errors import InputError, StoreError
 from flipflow.io.run_up import run_up_document
 from flipflow.results.branch import Branch
-from flipflow.results.document import BRANCH, branch_document, orbit_document, plain
+from flipflow.results.document import (
+    BRANCH,
+    branch_document,
+    field_branch_document,
+    orbit_document,
+    plain,
+)
+from flipflow.results.field_branch import FieldBranch
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
 from flipflow.results.run_up import RunUp
@@ -105,6 +112,7 @@ def document_of(result: object) -> dict[str, Any]:
 
 
 document_of.register(Branch, branch_document)
+document_of.register(FieldBranch, field_branch_document)
 document_of.register(Orbit, orbit_document)
 document_of.register(History, history_document)
 document_of.register(Sweep, sweep_document)

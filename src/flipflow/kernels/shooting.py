@@ -1,7 +1,7 @@
 """Periodic motion as a zero of the flow: z = sign * flow(z) over a fraction of the forcing period.
 
 ``fraction`` 1 and ``sign`` +1 is one forcing period, ``fraction`` n is n of them; a motion that is
-its own mirror image after half a turn has ``fraction`` 1/2 and ``sign`` -1.
+its own mirror image after n / 2 of them, n odd, has ``fraction`` n / 2 and ``sign`` -1.
 """
 
 from __future__ import annotations
@@ -67,6 +67,12 @@ def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real
         end = problem.fraction * 2.0 * math.pi / omega
         J[k, size] = problem.sign * (U[k, size] - problem.rate[k] * end / omega)
     return status.OK
+
+
+@kernel(entry=True)
+def shooting_step(problem: Shooting, z: Real, omega: float, r: Real, J: Real) -> int:
+    """``shooting_residual`` for callers outside the kernels."""
+    return shooting_residual(problem, z, omega, r, J)
 
 
 @kernel

@@ -11,6 +11,7 @@ from flipflow.errors import IncompleteError
 from flipflow.kernels import status
 from flipflow.kernels.lanes import strobe
 from flipflow.kernels.observe import observe_flow
+from flipflow.kernels.shooting import shooting_step
 from flipflow.methods.motion import Motion, Pieces, PiecewiseMotion
 from flipflow.methods.scratch import new_gap_motion
 from flipflow.methods.solver import Complex, Real, Solver
@@ -20,7 +21,8 @@ from flipflow.model.system import MechanicalSystem
 class ExactSolver(Solver):
     """Unknown: the state (x, x') at t = 0, where the unbalance points along +x.
 
-    ``turns`` forcing periods pass before the motion repeats; with ``half_turn`` it is 1.
+    ``turns`` forcing periods pass before the motion repeats. With ``half_turn`` their number is
+    odd, and the motion is its own mirror image after half of them.
     """
 
     reads_jacobian = True
@@ -34,6 +36,15 @@ class ExactSolver(Solver):
         self._new_work()
         self.problem = self.shooting(half_turn=self.half_turn)
         self.turn = self.shooting(half_turn=False)
+
+    def residual(self, z: Real, omega: float) -> tuple[Real, Real] | None:
+        """r = sign flow(z) - z and [dr/dz, dr/d omega]; None where the flow does not end."""
+        r, J = np.empty(self.unknowns), np.empty((self.unknowns, self.unknowns + 1))
+        while True:
+            code = shooting_step(self.problem, np.array(z), omega, r, J)
+            if code != status.MISSING_CONFIGURATION:
+                return (r, J) if code == status.OK else None
+            self.add_missing_configuration()
 
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
         return np.asarray(jacobian + np.eye(self.unknowns))

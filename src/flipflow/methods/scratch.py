@@ -64,7 +64,7 @@ def new_flow(plan: Plan) -> Flow:
 
 
 def new_shooting(plan: Plan, *, half_turn: bool, length: float, turns: int = 1) -> Shooting:
-    """The shooting problem over half a turn (mirror-symmetric motion) or over whole turns."""
+    """The shooting problem over ``turns``, or half of them for a mirror-symmetric motion."""
     size = 2 * plan.direction.shape[1]
     return Shooting(
         plan=plan,
@@ -73,7 +73,7 @@ def new_shooting(plan: Plan, *, half_turn: bool, length: float, turns: int = 1) 
         map=np.zeros((size, size)),
         work=np.zeros((plan.rate.shape[1], size + 1), np.complex128),
         rate=np.zeros(size),
-        fraction=0.5 if half_turn else float(turns),
+        fraction=0.5 * turns if half_turn else float(turns),
         sign=-1.0 if half_turn else 1.0,
         length=length,
     )

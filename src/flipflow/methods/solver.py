@@ -67,7 +67,7 @@ class Traced:
         back = self.omega.size - 1
         turned = slice(back, 0, -1)
         points = back + ahead.omega.size
-        ends = (status.REACHED_UPPER, status.REACHED_LOWER)
+        ends = (status.REACHED_UPPER, status.REACHED_LOWER, status.FOLLOWED)
         code = self.code if self.code not in ends else ahead.code
         # What is told of a step stands at its end, which is its other point when read backwards.
         none = np.zeros(1, np.int64)
@@ -86,7 +86,7 @@ class Traced:
             rejected=rejected,
             reason=reason,
         )
-        code = status.REACHED_UPPER if code in ends else code
+        code = status.FOLLOWED if code in ends else code
         return Traced.recorded(record, points, code, ahead.course)
 
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,14 @@ SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Ne
 STABILITY_CHANGES = (FOLD, SYMMETRY, DOUBLING, NEIMARK_SACKER)
 
 
+class Follower(Protocol):
+    """Whatever can solve for a point between two of the branch it has followed."""
+
+    def between(self, traced: Any, p: int, share: float) -> Point:
+        """The branch's point at ``share`` of the way from point p to point p + 1."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Found:
     """A refined special point: after branch point ``index``, at ``share`` of the step."""
@@ -45,33 +55,43 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class _Test:
-    """One test function: its values at the branch points and anywhere between."""
+class Test:
+    """One test function: its values at the branch points and anywhere between.
+
+    ``suspects`` are steps without a change of sign that may hide two zeros all the same.
+    """
 
     kind: str
     values: Real
     evaluate: Callable[[Point], float]
     spring: int = -1
     side: int = 0
+    suspects: tuple[int, ...] = ()
 
 
 def find_special_points(
     solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
 ) -> tuple[list[Found], list[str]]:
     """All special points in branch order, and a sentence for each that could not be refined."""
+    tests = [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]
+    found, notes = zeros_of(tests, solver, traced)
+    if isinstance(solver, BalanceSolver):
+        side = saddle_side(traced.tangent[:, -1], eigenvalues)
+        return _confirmed(ExactBeside(solver, traced), found, notes, side)
+    return found, notes
+
+
+def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Found], list[str]]:
+    """Zeros of test functions in branch order, and a sentence for each that was not refined."""
     found: list[Found] = []
     notes: list[str] = []
-    arc = _arc(traced)
-    for test in [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]:
-        for p, low, high in _brackets(solver, traced, test, arc, notes):
+    for test in tests:
+        for p, low, high in _brackets(solver, traced, test, notes):
             try:
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
     kept = sorted((one for one in found if _is_real(one)), key=lambda one: (one.index, one.share))
-    if isinstance(solver, BalanceSolver):
-        side = saddle_side(traced.tangent[:, -1], eigenvalues)
-        return _confirmed(ExactBeside(solver, traced), kept, notes, side)
     return kept, notes
 
 
@@ -132,17 +152,24 @@ _TEST: dict[str, Callable[[Point], float]] = {
 
 def _map_tests(
     solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
-) -> list[_Test]:
+) -> list[Test]:
     fold = traced.tangent[:, -1] / traced.course.omega_step
+    flips = determinant_plus(maps)
+    hidden = partial(_plunges, arc=_arc(traced), signature=traced.signature)
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
-        _Test(FOLD, fold, lambda point: point.omega_tangent),
-        _Test(kind, determinant_plus(maps), _minus_one_test),
-        _Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
+        Test(
+            FOLD,
+            fold,
+            lambda point: point.omega_tangent,
+            suspects=_plunges(fold, arc, traced.signature),
+        ),
+        Test(kind, flips, _minus_one_test, suspects=_plunges(flips, arc, traced.signature)),
+        Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
     ]
 
 
-def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
+def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
     """Greatest depth beyond each gap over the turn; one side serves for a symmetric motion."""
     springs = solver.builder.springs
     if not springs:
@@ -159,20 +186,18 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[_Test]:
                 least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
                 return float((most[0, j] if side > 0 else -least[0, j]) - gap)
 
-            tests.append(_Test(CONTACT_BEGIN, depth, evaluate, j, side))
+            tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side))
     return tests
 
 
 def _brackets(
-    solver: Solver, traced: Traced, test: _Test, arc: Real, notes: list[str]
+    solver: Follower, traced: Any, test: Test, notes: list[str]
 ) -> list[tuple[int, float, float]]:
     """Steps (p, low share, high share) within which the test changes sign."""
     values = test.values
     sign = np.sign(values)
     brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
-    suspects: list[tuple[int, ...]] = [(p - 1, p) for p in _dips(values)]
-    if test.kind in (FOLD, SYMMETRY, DOUBLING):
-        suspects += [(p,) for p in _plunges(values, arc, traced.signature)]
+    suspects = [*((p - 1, p) for p in _dips(values)), *((p,) for p in test.suspects)]
     settled: set[int] = set()
     for steps in suspects:
         for start in steps:
@@ -190,7 +215,7 @@ def _brackets(
     return brackets
 
 
-def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> list[int]:
+def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> tuple[int, ...]:
     """Steps with contact and no change of sign which the slope at one end carries the test across.
 
     A motion without contact has the eigenvalues of the linear machine, all within the circle.
@@ -201,7 +226,7 @@ def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> list[int]
     ahead, behind = first + slope[:-2] * step, last - slope[2:] * step
     over = (first * last > 0.0) & ((ahead * first < 0.0) | (behind * last < 0.0))
     touches = (signature[1:-2] != 0) | (signature[2:-1] != 0)
-    return [int(p) + 1 for p in np.flatnonzero(over & touches)]
+    return tuple(int(p) + 1 for p in np.flatnonzero(over & touches))
 
 
 def _arc(traced: Traced) -> Real:
@@ -229,7 +254,7 @@ def _dips(values: Real) -> list[int]:
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
-def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, *, plunges: bool) -> float | None:
+def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool) -> float | None:
     """Share in step p where the test has the other sign, None when it never has.
 
     A plunge that has ended halfway, no lower than the ends, goes no further.
@@ -248,7 +273,7 @@ def _bottom(solver: Solver, traced: Traced, test: _Test, p: int, *, plunges: boo
     return float(best.x) if best.fun < 0.0 else None
 
 
-def _refine(solver: Solver, traced: Traced, test: _Test, p: int, low: float, high: float) -> Found:
+def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high: float) -> Found:
     """Root of the test on corrected points between two shares of step p."""
     last: dict[float, Point] = {}
 

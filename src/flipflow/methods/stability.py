@@ -53,16 +53,19 @@ def stability_words(
 
 def saddle_side(omega_tangent: Real, eigenvalues: Complex) -> NDArray[np.bool_]:
     """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
-    backwards = omega_tangent * np.sign(omega_tangent[0]) < 0.0
-    return np.asarray(backwards ^ starts_beyond(eigenvalues))
+    return np.asarray((omega_tangent < 0.0) ^ beyond_where_rising(omega_tangent, eigenvalues))
 
 
-def starts_beyond(eigenvalues: Complex) -> bool:
-    """Whether the first motion has an odd number of real eigenvalues beyond +1."""
+def beyond_where_rising(omega_tangent: Real, eigenvalues: Complex) -> bool:
+    """Whether an odd number of real eigenvalues lies beyond +1 where the branch rises in omega.
+
+    Read off the first motion: the number changes by one where d omega / ds changes sign.
+    """
     if eigenvalues.shape[0] == 0:
         return False
     first = eigenvalues[0]
-    return int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
+    beyond = int(np.sum((np.abs(first.imag) < 1e-9) & (first.real > 1.0))) % 2 == 1
+    return beyond ^ bool(omega_tangent[0] < 0.0)
 
 
 def determinant_plus(maps: Real) -> Real:

@@ -34,7 +34,8 @@ class SpecialPoint:
     orbit
         The motion at the point.
     position
-        Where it stands along the branch: point index plus share of the step.
+        Where it stands along the branch: point index plus share of the step; half a step beyond
+        an end where the branch meets the one from which it comes.
     spring, side
         The stop and its side (+1, -1) for contact; -1 and 0 otherwise.
     """
@@ -72,7 +73,8 @@ class Branch:
     """Periodic motions followed over frequency, in the order in which they hang together.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
-    points; it is what :func:`flipflow.frequency_response` returns.
+    points; it is what :func:`flipflow.frequency_response` returns, and
+    :func:`flipflow.continue_orbit` and :func:`flipflow.switch_branch` over frequency.
 
     Parameters
     ----------
@@ -121,6 +123,11 @@ class Branch:
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
         return self.solver.system
+
+    @property
+    def periods(self) -> int:
+        """Number of forcing periods after which the motions repeat."""
+        return self.solver.turns
 
     @property
     def omega(self) -> Real:
@@ -238,6 +245,8 @@ class Branch:
 
     def solve_in(self, run: slice, omega: float) -> Orbit | None:
         """The motion at exactly ``omega`` near a run of rising points."""
+        if run.stop - run.start < 2:
+            return None
         at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, run.stop - 1)
         before, after = int(at) - 1, int(at)
         span = self.omega[after] - self.omega[before]

@@ -19,6 +19,7 @@ from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
 
 Document = dict[str, Any]
@@ -27,6 +28,7 @@ METHODS: Mapping[str, type[PiecewiseExact | HarmonicBalance]] = {
     "HarmonicBalance": HarmonicBalance,
 }
 BRANCH, ORBIT = "flipflow/branch/1", "flipflow/orbit/1"
+FIELD_BRANCH = "flipflow/field-branch/1"
 
 
 def plain(value: object) -> Any:
@@ -66,6 +68,7 @@ def branch_document(branch: Branch) -> Document:
         "error": plain(branch.error),
         "special_points": [special_point_document(point) for point in branch.special_points],
         "half_turn": branch.solver.half_turn,
+        "turns": branch.solver.turns,
         "saddle_side_at_start": branch.saddle_side_at_start,
         "unknowns": plain(traced.u),
         "tangent": plain(traced.tangent),
@@ -79,6 +82,34 @@ def branch_document(branch: Branch) -> Document:
     }
 
 
+def field_branch_document(branch: FieldBranch) -> Document:
+    """A branch over a field: amplitudes, stability, and the state of every motion."""
+    system = branch.machine.system()
+    return {
+        "schema": FIELD_BRANCH,
+        "version": branch.version,
+        "machine": machine_document(branch.machine),
+        "field": branch.field,
+        "status": branch.status.name,
+        "status_sentence": branch.status.value,
+        "complete": branch.complete,
+        "notes": list(branch.notes),
+        "values": plain(branch.values),
+        "omega": plain(branch.omega),
+        "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
+        "phase": {str(which): plain(branch.phase(which)) for which in system.named},
+        "stability": branch.stability.tolist(),
+        "multipliers": plain(branch.multipliers),
+        "error": plain(branch.error),
+        "periods": [orbit.periods for orbit in branch.orbits],
+        "states": [plain(orbit.state) for orbit in branch.orbits],
+        "special_points": [
+            {"value": point.value, **special_point_document(point)}
+            for point in branch.special_points
+        ],
+    }
+
+
 def special_point_document(point: SpecialPoint) -> Document:
     """A special point: kind, frequency, amplitudes, the motion's unknowns."""
     system = point.orbit.system
@@ -89,6 +120,8 @@ def special_point_document(point: SpecialPoint) -> Document:
         "spring": point.spring,
         "side": point.side,
         "amplitude": {str(which): point.amplitude(which) for which in system.named},
+        "half_turn": point.orbit.point.solver.half_turn,
+        "turns": point.orbit.periods,
         "unknowns": plain(point.orbit.unknowns),
         "return_map": plain(point.orbit.return_map),
     }

@@ -20,6 +20,10 @@ class BranchStatus(Enum):
 
     COMPLETE = "The branch reached the end of the interval."
     CLOSED = "The branch is closed: it came back to where it started."
+    FOLLOWED = (
+        "The branch was followed to both its ends, where it leaves the interval or meets the "
+        "branch from which it comes."
+    )
     TURNED_BACK = (
         "The branch turned back and left the interval at its lower end; widen the interval to "
         "follow it."
@@ -40,7 +44,7 @@ class BranchStatus(Enum):
     @property
     def complete(self) -> bool:
         """Whether the branch was followed to both its ends, or all round."""
-        return self in (BranchStatus.COMPLETE, BranchStatus.CLOSED)
+        return self in (BranchStatus.COMPLETE, BranchStatus.FOLLOWED, BranchStatus.CLOSED)
 
     @classmethod
     def from_code(cls, code: int) -> Self:
@@ -50,6 +54,7 @@ class BranchStatus(Enum):
 
 _SENTENCE = {
     status.REACHED_UPPER: BranchStatus.COMPLETE.value,
+    status.FOLLOWED: BranchStatus.FOLLOWED.value,
     status.REACHED_LOWER: BranchStatus.TURNED_BACK.value,
     status.CLOSED: BranchStatus.CLOSED.value,
     status.STEP_TOO_SMALL: BranchStatus.STEP_TOO_SMALL.value,
