@@ -354,11 +354,11 @@ def _jacobian(problem: Balance, omega: float, J: Real) -> None:
                 for j in range(m):
                     G = problem.receptance[a, j, c]
                     unit = 1.0 if a == b and j == c else 0.0
-                    _write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
+                    write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
 
 
 @kernel
-def _write_block(
+def write_block(
     problem: Balance, a: int, j: int, b: int, c: int, direct: complex, mirror: complex,
     unit: float, J: Real,
 ) -> None:  # fmt: skip
