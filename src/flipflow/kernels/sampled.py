@@ -19,15 +19,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flipflow.kernels import status
 from flipflow.kernels.balance import (
     Balance,
     amplitude_of,
-    place,
     prepare_receptance,
     series_scale,
     set_series,
     write_block,
+    write_residual,
 )
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.plan import Complex, Int, Real
@@ -126,34 +125,11 @@ def _sum(sums: Complex, j: int, q: int) -> complex:
 @kernel
 def sampled_residual(problem: Sampled, u: Real, omega: float, r: Real, J: Real) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
-    balance = problem.balance
-    m, size = balance.linear.shape[0], r.shape[0]
-    set_series(balance, u)
-    prepare_receptance(balance, omega)
+    set_series(problem.balance, u)
+    prepare_receptance(problem.balance, omega)
     sampled_forces(problem, omega)
-    for a in range(balance.harmonics.shape[0]):
-        h = balance.harmonics[a]
-        for j in range(m):
-            value = amplitude_of(balance, a, j)
-            slope = 0j
-            if h == 1:
-                value -= balance.linear[j]
-                slope -= balance.linear_slope[j]
-            for c in range(m):
-                value += balance.receptance[a, j, c] * balance.force[a, c]
-                slope += balance.receptance_slope[a, j, c] * balance.force[a, c]
-                slope += balance.receptance[a, j, c] * balance.force_slope[a, c]
-            k = place(balance, a, j)
-            r[k] = value.real
-            J[k, size] = slope.real
-            if h > 0:
-                r[k + 1] = value.imag
-                J[k + 1, size] = slope.imag
     _jacobian(problem, omega, J)
-    for k in range(size):
-        if not math.isfinite(r[k]):
-            return status.NOT_FINITE
-    return status.OK
+    return write_residual(problem.balance, r, J)
 
 
 @kernel
