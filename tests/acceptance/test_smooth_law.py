@@ -76,7 +76,7 @@ def test_moderate_sharpness_converges_to_exact_contact(screen, response) -> None
 def test_paper_sharpness_converges_with_samples_away_from_trouble(screen, response) -> None:
     """At 1e6 per metre, 60 to 120 rad/s: amplitudes within a sample's share of the jump.
 
-    One sample on the wrong side of the gap moves Lambda by 2 c3 v / N, 6 N of 14 kN at N = 1024.
+    One sample on the wrong side of the gap moves Lambda_1 by 2 c3 v / N, 5 N at N = 1024.
     """
     balance = relative_amplitude(response(ff.HarmonicBalance(3)), 120.0)
     off = [
