@@ -56,9 +56,9 @@ class SampledHarmonicBalance:
     The paper's Eq. (3) replaces the switch at the gap by tanh(sharpness (x2 - e)), and the usual
     alternating frequency-time scheme samples it. Between two samples the motion passes the layer
     in which the law switches, of a few 1 / sharpness, unseen, and the force jumps when a sample
-    enters it. So the answer is wrong by about 1 / samples, and the branch may stall or show
-    turning points that the machine does not have. Every use warns; take
-    :class:`HarmonicBalance` for an answer.
+    enters it. The branch then shows turning points that the machine does not have, or stalls,
+    which its ``status`` says. Every use gives a
+    :class:`~flipflow.errors.SampledContactWarning`; take :class:`HarmonicBalance` for an answer.
 
     Parameters
     ----------
