@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 _HOME = {
     "HarmonicBalance": "flipflow.methods.options",
     "PiecewiseExact": "flipflow.methods.options",
+    "SampledHarmonicBalance": "flipflow.methods.options",
     "frequency_response": "flipflow.analyses.frequency_response",
     "linear_response": "flipflow.analyses.linear",
     "operating_region": "flipflow.analyses.operating_region",
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
     from flipflow.io.results import save as save
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
     from flipflow.methods.options import PiecewiseExact as PiecewiseExact
+    from flipflow.methods.options import SampledHarmonicBalance as SampledHarmonicBalance
     from flipflow.model.disturbance import Impulse as Impulse
     from flipflow.model.disturbance import LoadStep as LoadStep
     from flipflow.model.disturbance import Lump as Lump

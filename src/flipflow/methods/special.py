@@ -158,13 +158,8 @@ def _map_tests(
     hidden = partial(_plunges, arc=_arc(traced), signature=traced.signature)
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
-        Test(
-            FOLD,
-            fold,
-            lambda point: point.omega_tangent,
-            suspects=_plunges(fold, arc, traced.signature),
-        ),
-        Test(kind, flips, _minus_one_test, suspects=_plunges(flips, arc, traced.signature)),
+        Test(FOLD, fold, lambda point: point.omega_tangent, suspects=hidden(fold)),
+        Test(kind, flips, _minus_one_test, suspects=hidden(flips)),
         Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
     ]
 
