@@ -123,7 +123,7 @@ def operating_region(
         own = branch if loaded == screen else frequency_response(loaded, span, method)
         branches.append(own)
         cases.append(case_window(loaded, load, own, wanted, within))
-    marks = _landmarks(screen, branch)
+    marks = landmarks(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
     notes = {
         f"The limit on {QUANTITIES[name].label} is not checked: {why}."
@@ -137,7 +137,8 @@ def operating_region(
         for text in (*one.notes, *([] if one.complete else [one.status.value]))
     )
     return OperatingRegion(
-        screen, branch, *marks.frequencies, marks.lower, marks.upper, feasible, binding,
+        screen, branch, marks.omega_ea, marks.omega_ar, marks.omega_cs, marks.omega_lb,
+        marks.omega_ub, marks.lower, marks.upper, feasible, binding,
         tuple(cases), tuple(branches), (*sorted(notes), *unfinished, *marks.notes),
     )  # fmt: skip
 
@@ -155,15 +156,37 @@ def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[
 
 
 @dataclass(frozen=True)
-class _Landmarks:
-    frequencies: tuple[float | None, float | None, float | None, float | None, float | None]
+class Landmarks:
+    """Characteristic frequencies of a screen and its operating region, all in rad/s.
+
+    Parameters
+    ----------
+    omega_ea, omega_ar, omega_cs, omega_lb, omega_ub
+        As in :class:`OperatingRegion`.
+    lower, upper
+        The paper's operating region.
+    notes
+        What is to be kept in mind.
+    """
+
+    omega_ea: float | None
+    omega_ar: float | None
+    omega_cs: float | None
+    omega_lb: float | None
+    omega_ub: float | None
     lower: float
     upper: float
     notes: tuple[str, ...] = ()
 
 
-def _landmarks(screen: FlipFlowScreen, branch: Branch) -> _Landmarks:
-    """w_ea, w_ar, w_cs, w_lb, w_ub and the region between them."""
+def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
+    """Read w_ea, w_ar, w_cs, w_lb, w_ub and the region between them off a screen's branch.
+
+    Raises
+    ------
+    IncompleteError
+        When the branch has no points.
+    """
     effective = _bonded(screen)
     ea, ar = equal_amplitude_frequency(effective), antiresonance_frequency(effective)
     peak = branch.peak("relative")
@@ -174,13 +197,13 @@ def _landmarks(screen: FlipFlowScreen, branch: Branch) -> _Landmarks:
     touched = bool(np.any(branch.traced.signature != 0))
     upper = peak.omega if lb is None else lb
     if cs is not None:
-        return _Landmarks((ea, ar, cs, lb, ub), cs, upper)
+        return Landmarks(ea, ar, cs, lb, ub, cs, upper)
     if touched:
         note = "Contact begins below the speeds analysed: the region starts with them."
-        return _Landmarks((ea, ar, cs, lb, ub), span[0], upper, (note,))
+        return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
     reaches = screen.has_stop and effective is screen
     notes = ("The stop is not reached at any speed analysed.",) if reaches else ()
-    return _Landmarks((ea, ar, cs, lb, ub), ea or span[0], ar or span[1], notes)
+    return Landmarks(ea, ar, cs, lb, ub, ea or span[0], ar or span[1], notes)
 
 
 def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
