@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.special import SYMMETRY_BREAKING
+from flipflow.methods.special import SYMMETRY
 from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
 
@@ -38,7 +38,7 @@ def leaning_motions(branch: Branch) -> tuple[tuple[Orbit, ...], ...]:
         One tuple for each window of speed, rising in speed, solved for exactly; their
         displacement has a mean other than 0. Windows in which none was found are left out.
     """
-    points = branch.points_of(SYMMETRY_BREAKING)
+    points = branch.points_of(SYMMETRY)
     windows = (_followed(branch, a.omega, b.omega) for a, b in itertools.pairwise(points))
     return tuple(window for window in windows if window)
 
