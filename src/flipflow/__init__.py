@@ -16,9 +16,12 @@ _HOME = {
     "PiecewiseExact": "flipflow.methods.options",
     "frequency_response": "flipflow.analyses.frequency_response",
     "linear_response": "flipflow.analyses.linear",
+    "loading": "flipflow.analyses.loading",
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
+    "response_family": "flipflow.analyses.response_family",
     "assess": "flipflow.analyses.assessment",
+    "reproduce": "flipflow.paper.reproduce",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
@@ -41,8 +44,10 @@ if TYPE_CHECKING:
     from flipflow.analyses.assessment import assess as assess
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
     from flipflow.analyses.linear import linear_response as linear_response
+    from flipflow.analyses.loading import loading as loading
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.analyses.response_family import response_family as response_family
     from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
@@ -58,6 +63,7 @@ if TYPE_CHECKING:
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
+    from flipflow.paper.reproduce import reproduce as reproduce
 
 
 def __getattr__(name: str) -> object:

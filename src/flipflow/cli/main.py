@@ -11,6 +11,7 @@ from flipflow import __version__
 from flipflow.cli.analyze import analyze
 from flipflow.cli.check import check
 from flipflow.cli.new import new
+from flipflow.cli.reproduce import reproduce
 from flipflow.cli.schema import schema
 from flipflow.errors import FlipflowError
 
@@ -23,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for command in (analyze, check, new, schema):
+for command in (analyze, check, new, reproduce, schema):
     app.command()(command)
 
 

@@ -6,9 +6,13 @@ from functools import singledispatch
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
+from flipflow.analyses.loading import Loading
 from flipflow.analyses.operating_region import OperatingRegion
+from flipflow.analyses.response_family import ResponseFamily
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.family import family_figure
+from flipflow.figures.loading import loading_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
@@ -23,7 +27,8 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        A branch, an orbit, a linear response, an operating region or an assessment.
+        A branch, an orbit, a linear response, an operating region, an assessment, a loading or a
+        family of responses.
 
     Returns
     -------
@@ -63,3 +68,13 @@ def _(result: OperatingRegion) -> Figure:
 @figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@figure.register
+def _(result: Loading) -> Figure:
+    return loading_figure(result)
+
+
+@figure.register
+def _(result: ResponseFamily) -> Figure:
+    return family_figure(result)

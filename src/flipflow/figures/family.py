@@ -9,7 +9,7 @@ import numpy as np
 from flipflow.analyses.response_family import Member, ResponseFamily
 from flipflow.figures.curves import Curve
 from flipflow.figures.palette import case_colour, case_symbol
-from flipflow.figures.parts import Axis, Figure, Panel, Trace
+from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
 from flipflow.figures.response import LABELS, curve_traces
 from flipflow.figures.scales import MM
 from flipflow.model.fields import FIELD
@@ -18,7 +18,7 @@ from flipflow.results.orbit import Orbit
 
 HEIGHT = 180
 SPEED = "angular frequency"
-LAID_OVER = "third-order harmonic balance"
+BALANCE = "third-order harmonic balance"
 READING = "Solid: stable; dashed: unstable; dotted: on the edge. Circles: folds, where it jumps."
 
 
@@ -26,7 +26,7 @@ def family_figure(
     family: ResponseFamily,
     *,
     labels: Sequence[str] = (),
-    laid_over: ResponseFamily | None = None,
+    beneath: ResponseFamily | None = None,
     title: str = "",
     note: str = "",
 ) -> Figure:
@@ -38,19 +38,19 @@ def family_figure(
         What ``response_family`` returns.
     labels
         A word for each member; its value and unit where none are given.
-    laid_over
-        The same family by harmonic balance, drawn thin over it.
+    beneath
+        The same family by harmonic balance, drawn wide and pale beneath.
     title, note
         Title, and a sentence for the caption.
     """
     symbol = FIELD[family.field].symbol
     words = list(labels) or [_value(family.field, member.value) for member in family.members]
     panels = tuple(
-        _panel(which, family.members, words, laid_over, first=k == 0)
+        _panel(which, family.members, words, beneath, first=k == 0)
         for k, which in enumerate(("main", "floating", "relative"))
     )
-    over = f" Thin dotted: {LAID_OVER}." if laid_over is not None else ""
-    caption = f"Half the peak-to-peak motion. {READING}{over} {note}".strip()
+    under = f" Wide and pale beneath: {BALANCE}." if beneath is not None else ""
+    caption = f"Half the peak-to-peak motion. {READING}{under} {note}".strip()
     name = title or f"Response over {symbol}"
     return Figure(name, caption, panels, height=HEIGHT * len(panels) + 80)
 
@@ -72,12 +72,10 @@ def branch_traces(
         )
 
 
-def thin_traces(name: str, branch: Branch, which: str, *, legend: bool) -> Iterator[Trace]:
-    """A branch as one thin dotted line."""
+def beneath_traces(name: str, branch: Branch, which: str, *, legend: bool) -> Iterator[Trace]:
+    """A branch as one wide pale line that another is laid over."""
     curve = Curve.of(branch, which)
-    yield Trace(
-        name, curve.omega, curve.amplitude * MM, "motion", "limit", dash="dot", legend=legend
-    )
+    yield Trace(name, curve.omega, curve.amplitude * MM, "beneath", "beneath", legend=legend)
 
 
 def speed_axis_in_radians(low: float, high: float) -> Axis:
@@ -122,9 +120,10 @@ def leaning_panel(
             Trace(name, omega, side * MM, "stable", colour, legend=k == 0, bold=True)
             for side, name, colour in sides
         ]
+    gap = min(branch.system.springs[0].gaps) * MM
     return Panel(
         speed_axis_in_radians(low - reach, high + reach), Axis("excursion |x2|", "mm"),
-        tuple(traces), title=title,
+        tuple(traces), lines=(Line("y", gap, "gap (e)", "gap", text_at=1.0),), title=title,
     )  # fmt: skip
 
 
@@ -136,16 +135,15 @@ def _panel(
     which: str,
     members: Sequence[Member],
     labels: Sequence[str],
-    laid_over: ResponseFamily | None,
+    beneath: ResponseFamily | None,
     *,
     first: bool,
 ) -> Panel:
     traces: list[Trace] = []
+    for k, member in enumerate(() if beneath is None else beneath.members):
+        traces += beneath_traces(BALANCE, member.branch, which, legend=first and k == 0)
     for k, (member, label) in enumerate(zip(members, labels, strict=True)):
         traces += branch_traces(label, member.branch, which, k, legend=first)
-    if laid_over is not None:
-        for k, member in enumerate(laid_over.members):
-            traces += thin_traces(LAID_OVER, member.branch, which, legend=first and k == 0)
     ends = [member.branch.omega for member in members]
     top = max(float(trace.y.max()) for trace in traces)
     return Panel(

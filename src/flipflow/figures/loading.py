@@ -7,14 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from flipflow.analyses.loading import Loading, LoadedMachine, RegionChange
-from flipflow.figures.family import branch_traces, speed_axis_in_radians
+from flipflow.figures.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
 from flipflow.figures.parts import Axis, Band, Figure, Line, Panel, Trace
 from flipflow.figures.scales import MM
 
 WORDS = {"unloaded": "region of the empty machine", "loaded": "from the loaded machine's region"}
 
 
-def loading_figure(loading: Loading, title: str = "") -> Figure:
+def loading_figure(
+    loading: Loading, title: str = "", beneath: Loading | None = None
+) -> Figure:
     """Relative amplitude over rad/s and its change over the region, with and without stop.
 
     Parameters
@@ -23,6 +25,8 @@ def loading_figure(loading: Loading, title: str = "") -> Figure:
         What :func:`flipflow.loading` returns.
     title
         Title of the figure.
+    beneath
+        The same by harmonic balance, drawn beneath for the machine with stop.
 
     Returns
     -------
@@ -30,13 +34,13 @@ def loading_figure(loading: Loading, title: str = "") -> Figure:
         For each machine a panel of amplitudes beside one of changes.
     """
     machines = [("with stop", loading.with_stop), ("without stop", loading.without_stop)]
+    shown = [(name, machine) for name, machine in machines if machine is not None]
     panels = [
         panel
-        for name, machine in machines
-        if machine is not None
+        for name, machine in shown
         for panel in (
-            _amplitudes(name, machine, loading, first=name == machines[0][0]),
-            _changes(name, machine, first=name == machines[0][0]),
+            _amplitudes(name, machine, loading, beneath, first=machine is shown[0][1]),
+            _changes(name, machine, first=machine is shown[0][1]),
         )
     ]
     caption = (
@@ -50,9 +54,20 @@ def loading_figure(loading: Loading, title: str = "") -> Figure:
     )  # fmt: skip
 
 
-def _amplitudes(name: str, machine: LoadedMachine, loading: Loading, *, first: bool) -> Panel:
+def _amplitudes(
+    name: str, machine: LoadedMachine, loading: Loading, beneath: Loading | None, *, first: bool
+) -> Panel:
     word = loading.load.name or "loaded"
+    under = None if beneath is None else beneath.with_stop
+    pale = [
+        trace
+        for k, branch in enumerate(
+            (under.unloaded, under.loaded) if under and machine is loading.with_stop else ()
+        )
+        for trace in beneath_traces(BALANCE, branch, "relative", legend=first and k == 0)
+    ]
     traces = [
+        *pale,
         *branch_traces("empty", machine.unloaded, "relative", 0, legend=first, bold=True),
         *branch_traces(word, machine.loaded, "relative", 1, legend=first),
     ]
@@ -76,7 +91,7 @@ def _amplitudes(name: str, machine: LoadedMachine, loading: Loading, *, first: b
 def _changes(name: str, machine: LoadedMachine, *, first: bool) -> Panel:
     regions = [one for one in (machine.region, machine.from_loaded) if one is not None]
     traces = [
-        Trace("change", machine.region.omega, machine.region.change * MM, "motion", "relative",
+        Trace("loaded minus empty", machine.region.omega, machine.region.change * MM, "motion", "relative",
               bold=True, legend=first)
     ]  # fmt: skip
     for region in regions:

@@ -92,10 +92,10 @@ def family_paper_figure(
 
 
 def draw_family(pair: FamilyPair, title: str, note: str = "") -> Figure:
-    """Both frames and the relative motion; harmonic balance laid over."""
+    """Both frames and the relative motion; harmonic balance beneath."""
     return family_figure(
         _chosen(pair.exact, pair), labels=[pair.labels[k] for k in pair.drawn],
-        laid_over=_chosen(pair.balance, pair), title=title, note=note,
+        beneath=_chosen(pair.balance, pair), title=title, note=note,
     )  # fmt: skip
 
 

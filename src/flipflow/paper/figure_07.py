@@ -9,7 +9,7 @@ import numpy as np
 from flipflow.analyses.frequency_response import frequency_response
 from flipflow.analyses.linear import linear_response
 from flipflow.analyses.operating_region import Landmarks, analysed_range, landmarks
-from flipflow.figures.family import LAID_OVER, branch_traces, speed_axis_in_radians, thin_traces
+from flipflow.figures.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
 from flipflow.figures.parts import Axis, Band, Figure, Line, Panel
 from flipflow.figures.response import LABELS
 from flipflow.methods.options import HarmonicBalance
@@ -23,7 +23,7 @@ SAMPLES = 60
 SAME = 1e-6
 CAPTION = (
     "Half the peak-to-peak motion. Solid: stable; dashed: unstable; circles: folds, where the "
-    f"amplitude jumps. Thin dotted: {LAID_OVER}. Green: the paper's operating region."
+    f"amplitude jumps. Wide and pale beneath: {BALANCE}. Green: the paper's operating region."
 )
 
 
@@ -55,8 +55,8 @@ def draw(data: Responses) -> Figure:
 def _panel(data: Responses, which: str) -> Panel:
     first = which == "main"
     traces = (
+        *beneath_traces(BALANCE, data.balance, which, legend=first),
         *branch_traces("exact", data.exact, which, 0, legend=first, bold=True),
-        *thin_traces(LAID_OVER, data.balance, which, legend=first),
     )
     marks = data.marks
     named = (("w_cs", marks.omega_cs), ("w_lb", marks.omega_lb), ("w_ub", marks.omega_ub))

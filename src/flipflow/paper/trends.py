@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from flipflow.analyses.response_family import Member, ResponseFamily
 from flipflow.figures.scales import MM
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide, runs
+from flipflow.paper.claims import Claim, Evaluation, Number, Part, Verdict, decide, runs
 from flipflow.results.branch import SpecialPoint
 
 Real = NDArray[np.float64]
 NOTHING_NEW = 1e-9
 SLIGHT, LITTLE = 0.10, 0.05
 UP, DOWN = 1, -1
+BORN = (
+    "Where folds are born along the way, the region's upper end jumps from the peak of the "
+    "relative motion to w_lb."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,10 @@ class Trend:
         parts = list(runs(labels, [self._step(a, b) for a, b in _steps(values)]))
         if self.slight:
             parts.append(Part("slightly (by less than 10 %)", _within(values, SLIGHT)))
-        return decide(parts, _numbers(self.quantity, labels, values))
+        found = decide(parts, _numbers(self.quantity, labels, values))
+        if self.quantity is REGION and found.verdict is not Verdict.HOLDS and _folds_born(family):
+            return replace(found, where=f"{found.where} {BORN}")
+        return found
 
     def _step(self, before: float, after: float) -> bool | None:
         return _moves(before, after, self.direction)
@@ -199,6 +206,11 @@ def trend_claim(id_: str, where: str, statement: str, rule: Rule) -> Claim[Famil
         return replace(exact, where=f"{exact.where} {also}".strip())
 
     return Claim(id_, where, statement, evaluate)
+
+
+def _folds_born(family: ResponseFamily) -> bool:
+    zones = ZONE.along(family)
+    return bool(np.any(zones > 0.0) and np.any(zones == 0.0))
 
 
 def _steps(values: Real) -> Iterator[tuple[float, float]]:
