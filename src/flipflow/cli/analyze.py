@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+
 def analyze(
     file: Annotated[
         str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")

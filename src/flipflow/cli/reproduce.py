@@ -75,9 +75,9 @@ def _show(found: Reproduction, out: Console, folder: Path, written: tuple[str, .
     out.print(table)
     out.print()
     out.print(", ".join(f"{n} {verdict}" for verdict, n in found.counts.items() if n) + ".")
-    for one in found.figures:
-        if one.failure:
-            out.print(f"{one.name} is not drawn. {one.failure}", style="yellow")
+    for figure in found.figures:
+        if figure.failure:
+            out.print(f"{figure.name} is not drawn. {figure.failure}", style="yellow")
     pictures = (len(written) - 1) // 3
     out.print(
         f"Written to {folder}: {written[0]}, and {pictures} figures as HTML, SVG and PDF",

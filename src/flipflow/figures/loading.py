@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flipflow.analyses.loading import Loading, LoadedMachine, RegionChange
+from flipflow.analyses.loading import LoadedMachine, Loading, RegionChange
 from flipflow.figures.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
 from flipflow.figures.parts import Axis, Band, Figure, Line, Panel, Trace
 from flipflow.figures.scales import MM
@@ -14,9 +14,7 @@ from flipflow.figures.scales import MM
 WORDS = {"unloaded": "region of the empty machine", "loaded": "from the loaded machine's region"}
 
 
-def loading_figure(
-    loading: Loading, title: str = "", beneath: Loading | None = None
-) -> Figure:
+def loading_figure(loading: Loading, title: str = "", beneath: Loading | None = None) -> Figure:
     """Relative amplitude over rad/s and its change over the region, with and without stop.
 
     Parameters
@@ -91,8 +89,10 @@ def _amplitudes(
 def _changes(name: str, machine: LoadedMachine, *, first: bool) -> Panel:
     regions = [one for one in (machine.region, machine.from_loaded) if one is not None]
     traces = [
-        Trace("loaded minus empty", machine.region.omega, machine.region.change * MM, "motion", "relative",
-              bold=True, legend=first)
+        Trace(
+            "loaded minus empty", machine.region.omega, machine.region.change * MM, "motion",
+            "relative", bold=True, legend=first,
+        )
     ]  # fmt: skip
     for region in regions:
         traces += _lines(region, legend=first)

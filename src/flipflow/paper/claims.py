@@ -134,7 +134,7 @@ def _where(parts: Sequence[Part], verdict: Verdict) -> str:
         return ""
     words = {True: "Holds", False: "Does not hold", None: "Cannot be decided"}
     groups = {answer: [p.what for p in parts if p.answer is answer] for answer in words}
-    return " ".join(f"{words[key]}: {', '.join(found)}." for key, found in groups.items() if found)
+    return " ".join(f"{words[key]}: {'; '.join(found)}." for key, found in groups.items() if found)
 
 
 def runs(labels: Sequence[str], answers: Sequence[bool | None]) -> Iterator[Part]:

@@ -125,9 +125,7 @@ def family_tables(pair: FamilyPair) -> tuple[Table, ...]:
 
 
 def _chosen(family: ResponseFamily, pair: FamilyPair) -> ResponseFamily:
-    return ResponseFamily(
-        family.screen, family.field, tuple(family.members[k] for k in pair.drawn)
-    )
+    return ResponseFamily(family.screen, family.field, tuple(family.members[k] for k in pair.drawn))
 
 
 def _number(value: float | str | None) -> float | None:

@@ -20,7 +20,9 @@ TITLE = "Phase portraits of both frames, empty and loaded, without stop"
 OMEGA = 79.5
 LOAD = Load(stiffness_factor=1.1, name="k2 + 10 %")
 POINTS = 361
-CAPTION = f"Velocity over displacement at {OMEGA} rad/s; the load stiffens the shear springs by 10 %."
+CAPTION = (
+    f"Velocity over displacement at {OMEGA} rad/s; the load stiffens the shear springs by 10 %."
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,5 +88,5 @@ def linear_below_contact(data: Responses) -> Evaluation:
 
 FIGURE = PaperFigure(
     "figure-07", TITLE, compute, draw,
-    (Claim("N4", "4.1", "below w_cs the machine with stop moves as without", linear_below_contact),),
+    (Claim("N4", "4.1", "below w_cs the stop changes nothing", linear_below_contact),),
 )  # fmt: skip

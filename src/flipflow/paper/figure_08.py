@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decid
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.trends import SECOND, SECOND_PEAK, UP, Trend
 from flipflow.report.blocks import Cell, Column, Table, cells
+from flipflow.report.numbers import number
 
 TITLE = "Relative amplitude under load, with stop and without"
 LOAD = Load(stiffness_factor=1.3, name="k2 x 1.3")
@@ -25,6 +27,12 @@ WARMER = (0.7, 0.8, 0.9)
 PAST_CONTACT = 1.5
 ALMOST_EQUAL, FAR_SMALLER = 0.25, 0.5
 NO_STOP = "a stop that is reached"
+SAID = (
+    "Loaded minus empty relative amplitude, exact, as the speed rises slowly. Small: share of the "
+    "empty machine's amplitude, and the speed. Least and greatest are in size; 0 where the change "
+    "has both signs. A region starts where that of the unloaded or of the loaded machine does, and "
+    "ends where that of the unloaded one ends."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,25 +60,28 @@ def draw(data: Loads) -> Figure:
 
 
 def tables(data: Loads) -> tuple[Table, ...]:
-    """Changes at the ends of each region, least, greatest, and the straight lines."""
-    columns = (
-        Column("Machine, region from"), Column("Speeds", "rad/s"),
-        Column("Lower end", "mm", numeric=True), Column("Upper end", "mm", numeric=True),
-        Column("Least", "mm", numeric=True), Column("Greatest", "mm", numeric=True),
-        Column("Line through ends", "mm + um per rad/s", numeric=True),
-        Column("least squares", "mm + um per rad/s", numeric=True),
-    )  # fmt: skip
-    rows = tuple(
-        _row(f"{name}, {word}, {region.start}", region)
+    """Changes at the ends of each region, least, greatest; and the straight lines."""
+    found = [
+        (word, name, region)
         for word, one in (("k2 x 1.3", data.loading), *_warm(data))
         for name, region in _regions(one)
+    ]
+    head = (Column("Load"), Column("Machine"), Column("Region starts as"))
+    changes = (
+        *head, Column("Speeds", "rad/s"), Column("Lower end", "mm", numeric=True),
+        Column("Upper end", "mm", numeric=True), Column("Least", "mm", numeric=True),
+        Column("Greatest", "mm", numeric=True),
+    )  # fmt: skip
+    lines = (
+        *head, Column("Through the ends: intercept", "mm", numeric=True),
+        Column("slope", "mm per rad/s", numeric=True),
+        Column("Least squares: intercept", "mm", numeric=True),
+        Column("slope", "mm per rad/s", numeric=True),
+    )  # fmt: skip
+    return (
+        Table("Change of the relative amplitude", changes, tuple(_row(*o) for o in found), SAID),
+        Table("Straight lines of the change", lines, tuple(_line_row(*o) for o in found)),
     )
-    caption = (
-        "Loaded minus empty relative amplitude, exact, as the speed rises slowly. Small: share of "
-        "the empty machine's amplitude, and the speed. Regions start where that of the unloaded "
-        "or of the loaded machine does; both end where the unloaded machine's ends."
-    )
-    return (Table("Change of the relative amplitude", columns, rows, caption),)
 
 
 def _warm(data: Loads) -> Iterator[tuple[str, Loading]]:
@@ -78,7 +89,7 @@ def _warm(data: Loads) -> Iterator[tuple[str, Loading]]:
 
 
 def _regions(one: Loading) -> Iterator[tuple[str, RegionChange]]:
-    for name, machine in (("stop", one.with_stop), ("no stop", one.without_stop)):
+    for name, machine in (("with stop", one.with_stop), ("without", one.without_stop)):
         if machine is None:
             continue
         yield name, machine.region
@@ -86,22 +97,22 @@ def _regions(one: Loading) -> Iterator[tuple[str, RegionChange]]:
             yield name, machine.from_loaded
 
 
-def _row(name: str, region: RegionChange) -> tuple[Cell, ...]:
+def _row(word: str, name: str, region: RegionChange) -> tuple[Cell, ...]:
     return (
-        *cells(name, f"{region.lower:.4g} to {region.upper:.4g}"),
+        *cells(word, name, region.start, f"{region.lower:.4g} to {region.upper:.4g}"),
         *(_changed(c) for c in (region.at_lower, region.at_upper, region.least, region.greatest)),
-        *cells(
-            *(
-                f"{MM * line.intercept:.3f} {'+' if line.slope >= 0.0 else '-'} "
-                f"{1e6 * abs(line.slope):.3g}"
-                for line in (region.line_through_ends, region.line_of_least_squares)
-            )
-        ),
     )
 
 
+def _line_row(word: str, name: str, region: RegionChange) -> tuple[Cell, ...]:
+    lines = (region.line_through_ends, region.line_of_least_squares)
+    numbers = [MM * one for line in lines for one in (line.intercept, line.slope)]
+    return (*cells(word, name, region.start), *cells(*map(number, numbers)))
+
+
 def _changed(change: Change) -> Cell:
-    return Cell(f"{MM * change.change:.3f}", f"{100.0 * change.share:.1f} % at {change.omega:.4g}")
+    shown = f"{round(MM * change.change, 3) + 0.0:.3f}"
+    return Cell(shown, f"{100.0 * change.share:.1f} % at {change.omega:.4g}")
 
 
 def _numbers(name: str, change: Change) -> dict[str, Number]:
@@ -203,9 +214,7 @@ def straight_lines(data: Loads) -> Evaluation:
         if stopped is None:
             parts.append(Part(way, None))
             continue
-        lines = [
-            r.line_through_ends if ends else r.line_of_least_squares for r in (stopped, free)
-        ]
+        lines = [r.line_through_ends if ends else r.line_of_least_squares for r in (stopped, free)]
         for name, line in zip(("stop", "no stop"), lines, strict=True):
             numbers[f"intercept, {name}, {way}"] = Number(MM * line.intercept, "mm")
             numbers[f"slope, {name}, {way}"] = Number(MM * line.slope, "mm per rad/s")
@@ -281,7 +290,7 @@ def _is(change: Change, millimetres: float, percent: float) -> bool:
 
 
 def _rises(values: list[float], labels: list[str]) -> Iterator[Part]:
-    steps = zip(values[:-1], values[1:], strict=True)
+    steps = itertools.pairwise(values)
     yield from runs(labels, [b > a if math.isfinite(b - a) else None for a, b in steps])
 
 

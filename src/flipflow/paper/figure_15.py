@@ -5,15 +5,15 @@ from __future__ import annotations
 from flipflow.paper.families import NO_RANGE, SHOWN, WHOLE, FamilyPlan, family_paper_figure
 from flipflow.paper.trends import (
     DOWN,
-    UP,
     FIRST,
     FIRST_PEAK,
     SECOND,
     SECOND_PEAK,
-    Trend,
-    ZoneTrend,
+    UP,
     AmplitudeTrend,
+    Trend,
     Unchanged,
+    ZoneTrend,
     trend_claim,
 )
 
@@ -24,10 +24,22 @@ FIGURE = family_paper_figure(
     "Effect of the stiffness of the shear springs",
     PLAN,
     (
-        trend_claim("V4a", WHERE, "k2 acts to the right of w01, which it leaves alone", Unchanged((FIRST, FIRST_PEAK))),
+        trend_claim(
+            "V4a",
+            WHERE,
+            "k2 acts to the right of w01, which it leaves alone",
+            Unchanged((FIRST, FIRST_PEAK)),
+        ),
         trend_claim("V4b", WHERE, "as k2 grows, w02 moves right", Trend(SECOND, UP)),
         trend_claim("V4c", WHERE, "as k2 grows, the second peak grows", Trend(SECOND_PEAK, UP)),
-        trend_claim("V4d", WHERE, "as k2 grows, the zone of several solutions shrinks", ZoneTrend(DOWN)),
-        trend_claim("V4e", WHERE, "as k2 grows, the relative amplitude in the region falls", AmplitudeTrend(DOWN)),
+        trend_claim(
+            "V4d", WHERE, "as k2 grows, the zone of several solutions shrinks", ZoneTrend(DOWN)
+        ),
+        trend_claim(
+            "V4e",
+            WHERE,
+            "as k2 grows, the relative amplitude in the region falls",
+            AmplitudeTrend(DOWN),
+        ),
     ),
 )

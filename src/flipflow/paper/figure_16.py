@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from flipflow.paper.families import NO_RANGE, SHOWN, WHOLE, FamilyPlan, family_paper_figure
 from flipflow.paper.trends import (
+    ANTIRESONANCE,
     DOWN,
-    UP,
     SECOND,
     SECOND_PEAK,
-    ANTIRESONANCE,
+    UP,
     Trend,
     trend_claim,
 )
@@ -21,7 +21,14 @@ FIGURE = family_paper_figure(
     PLAN,
     (
         trend_claim("V5a", WHERE, "as c2 grows, the second peak falls", Trend(SECOND_PEAK, DOWN)),
-        trend_claim("V5b", WHERE, "as c2 grows, w02 moves slightly left", Trend(SECOND, DOWN, slight=True)),
-        trend_claim("V5c", WHERE, "as c2 grows, the main frame moves more at the anti-resonance", Trend(ANTIRESONANCE, UP)),
+        trend_claim(
+            "V5b", WHERE, "as c2 grows, w02 moves slightly left", Trend(SECOND, DOWN, slight=True)
+        ),
+        trend_claim(
+            "V5c",
+            WHERE,
+            "as c2 grows, the main frame moves more at the anti-resonance",
+            Trend(ANTIRESONANCE, UP),
+        ),
     ),
 )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from flipflow.paper.families import RISING, FamilyPlan, family_paper_figure
 from flipflow.paper.trends import (
     DOWN,
-    UP,
+    REGION,
     SECOND,
     SECOND_PEAK,
-    REGION,
+    UP,
+    AmplitudeTrend,
     Trend,
     ZoneTrend,
-    AmplitudeTrend,
     trend_claim,
 )
 
@@ -25,7 +25,9 @@ FIGURE = family_paper_figure(
         trend_claim("V6a", WHERE, "as m0r grows, w02 moves right", Trend(SECOND, UP)),
         trend_claim("V6b", WHERE, "as m0r grows, the second peak grows", Trend(SECOND_PEAK, UP)),
         trend_claim("V6c", WHERE, "as m0r grows, the relative amplitude grows", AmplitudeTrend(UP)),
-        trend_claim("V6d", WHERE, "as m0r grows, the zone of several solutions shrinks", ZoneTrend(DOWN)),
+        trend_claim(
+            "V6d", WHERE, "as m0r grows, the zone of several solutions shrinks", ZoneTrend(DOWN)
+        ),
         trend_claim("V6e", WHERE, "as m0r grows, the operating region widens", Trend(REGION, UP)),
     ),
 )

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from flipflow.paper.families import NO_RANGE, SHOWN, WHOLE, FamilyPlan, family_paper_figure
 from flipflow.paper.trends import (
-    UP,
+    ANTIRESONANCE,
     FIRST,
     FIRST_PEAK,
+    REGION,
+    RELATIVE_PEAK,
     SECOND,
     SECOND_PEAK,
-    RELATIVE_PEAK,
-    REGION,
-    ANTIRESONANCE,
+    UP,
     Trend,
     Unchanged,
     trend_claim,
@@ -26,6 +26,11 @@ FIGURE = family_paper_figure(
     (
         trend_claim("V7a", WHERE, "as k1 grows, w01 moves right", Trend(FIRST, UP)),
         trend_claim("V7b", WHERE, "as k1 grows, the first peak grows", Trend(FIRST_PEAK, UP)),
-        trend_claim("V7c", WHERE, "k1 changes little else", Unchanged((SECOND, SECOND_PEAK, RELATIVE_PEAK, REGION, ANTIRESONANCE))),
+        trend_claim(
+            "V7c",
+            WHERE,
+            "k1 changes little else",
+            Unchanged((SECOND, SECOND_PEAK, RELATIVE_PEAK, REGION, ANTIRESONANCE)),
+        ),
     ),
 )

@@ -5,12 +5,12 @@ from __future__ import annotations
 from flipflow.paper.families import RISING, FamilyPlan, family_paper_figure
 from flipflow.paper.trends import (
     DOWN,
-    UP,
     FIRST,
     FIRST_PEAK,
+    REGION,
     SECOND,
     SECOND_PEAK,
-    REGION,
+    UP,
     Trend,
     ZoneTrend,
     trend_claim,
@@ -27,7 +27,9 @@ FIGURE = family_paper_figure(
         trend_claim("V9b", WHERE, "as m1 grows, w02 moves left", Trend(SECOND, DOWN)),
         trend_claim("V9c", WHERE, "as m1 grows, the first peak falls", Trend(FIRST_PEAK, DOWN)),
         trend_claim("V9d", WHERE, "as m1 grows, the second peak falls", Trend(SECOND_PEAK, DOWN)),
-        trend_claim("V9e", WHERE, "as m1 grows, the zone of several solutions widens", ZoneTrend(UP)),
+        trend_claim(
+            "V9e", WHERE, "as m1 grows, the zone of several solutions widens", ZoneTrend(UP)
+        ),
         trend_claim("V9f", WHERE, "as m1 grows, the operating region narrows", Trend(REGION, DOWN)),
     ),
 )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from flipflow.paper.families import RISING, FamilyPlan, family_paper_figure
 from flipflow.paper.trends import (
     DOWN,
-    UP,
     FIRST,
     FIRST_PEAK,
     SECOND,
     SECOND_PEAK,
-    Trend,
+    UP,
     AmplitudeTrend,
+    Trend,
     trend_claim,
 )
 
@@ -24,8 +24,23 @@ FIGURE = family_paper_figure(
     (
         trend_claim("V10a", WHERE, "as m2 grows, w01 moves left", Trend(FIRST, DOWN)),
         trend_claim("V10b", WHERE, "as m2 grows, w02 moves left", Trend(SECOND, DOWN)),
-        trend_claim("V10c", WHERE, "as m2 grows, the first peak of the main frame falls", Trend(FIRST_PEAK, DOWN)),
-        trend_claim("V10d", WHERE, "as m2 grows, the second peak of the main frame grows", Trend(SECOND_PEAK, UP)),
-        trend_claim("V10e", WHERE, "as m2 grows, the relative amplitude in the region grows", AmplitudeTrend(UP)),
+        trend_claim(
+            "V10c",
+            WHERE,
+            "as m2 grows, the first peak of the main frame falls",
+            Trend(FIRST_PEAK, DOWN),
+        ),
+        trend_claim(
+            "V10d",
+            WHERE,
+            "as m2 grows, the second peak of the main frame grows",
+            Trend(SECOND_PEAK, UP),
+        ),
+        trend_claim(
+            "V10e",
+            WHERE,
+            "as m2 grows, the relative amplitude in the region grows",
+            AmplitudeTrend(UP),
+        ),
     ),
 )

@@ -95,12 +95,11 @@ def blocks(found: Reproduction) -> Iterator[Block]:
 
 def claims_table(claims: tuple[DecidedClaim, ...]) -> Table:
     """Every claim with its verdict and where it holds."""
-    columns = (Column("Claim"), Column("Place"), Column("Statement"), Column("Verdict"))
+    columns = (Column("Claim"), Column("Statement"), Column("Verdict"))
     rows = tuple(
         (
             Cell(one.claim.id),
-            Cell(one.claim.where),
-            Cell(_sentence(one.claim.statement), one.evaluation.where),
+            Cell(f"{_sentence(one.claim.statement)} ({one.claim.where})", one.evaluation.where),
             _verdict(one),
         )
         for one in claims
@@ -119,11 +118,11 @@ def _figure_blocks(one: ReproducedFigure) -> Iterator[Block]:
     columns = (Column("Claim"), Column("Verdict"), Column("Numbers"))
     rows = tuple(
         (
-            Cell(one_claim.claim.id, one_claim.claim.where),
-            _verdict(one_claim),
-            Cell(_sentence(one_claim.claim.statement), _numbers(one_claim)),
+            Cell(decided.claim.id),
+            _verdict(decided),
+            Cell(_sentence(decided.claim.statement), _numbers(decided)),
         )
-        for one_claim in one.claims
+        for decided in one.claims
     )
     yield Table("Numbers behind the verdicts", columns, rows)
 
@@ -144,4 +143,5 @@ def _shown(value: Number) -> str:
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
+    symbol = not text.split(maxsplit=1)[0].isalpha()
+    return f"{text if symbol else text[:1].upper() + text[1:]}."

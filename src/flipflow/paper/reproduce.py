@@ -115,9 +115,7 @@ def _reproduced(one: PaperFigure[Any], screen: FlipFlowScreen) -> ReproducedFigu
     try:
         data = one.compute(screen)
         picture, tables = one.draw(data), one.tables(data)
-        claims = tuple(
-            DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims
-        )
+        claims = tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims)
     except IncompleteError as error:
         return _without(one, f"a branch to its end ({error})")
     return ReproducedFigure(one.name, one.title, picture, tables, claims)

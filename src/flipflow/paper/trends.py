@@ -103,7 +103,9 @@ class Trend:
         values = self.quantity.along(family)
         parts = list(runs(labels, [self._step(a, b) for a, b in _steps(values)]))
         if self.slight:
-            parts.append(Part("slightly (by less than 10 %)", _within(values, SLIGHT)))
+            ends = _moves(float(values[0]), float(values[-1]), self.direction)
+            little = None if ends is None else ends and _within(values, SLIGHT)
+            parts.append(Part("slightly (by less than 10 %)", little))
         found = decide(parts, _numbers(self.quantity, labels, values))
         if self.quantity is REGION and found.verdict is not Verdict.HOLDS and _folds_born(family):
             return replace(found, where=f"{found.where} {BORN}")

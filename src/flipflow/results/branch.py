@@ -281,9 +281,7 @@ class Branch:
 
             def rise(share: float, p: int = p) -> float:
                 point = self.solver.between(self.traced, p, share)
-                low, high, _ = self.solver.extremes(
-                    point.u[None], np.array([point.omega]), vector
-                )
+                low, high, _ = self.solver.extremes(point.u[None], np.array([point.omega]), vector)
                 return sign * float(high[0, 0] - low[0, 0])
 
             share = float(
