@@ -18,13 +18,13 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from tests.judge import close
 
 import flipflow as ff
 from flipflow.analyses.lost_symmetry import leaning_motions
 from flipflow.cli.main import main
 from flipflow.errors import InputError
 from flipflow.paper.registry import FIGURES
+from judge import close
 
 IN_PART = {"M1", "M2", "M4", "M6", "V1g", "V9f"}
 CLAIMS = [

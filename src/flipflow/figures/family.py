@@ -19,7 +19,7 @@ from flipflow.results.orbit import Orbit
 HEIGHT = 180
 SPEED = "angular frequency"
 BALANCE = "third-order harmonic balance"
-READING = "Solid: stable; dashed: unstable; dotted: on the edge. Circles: folds, where it jumps."
+READING = "Solid: stable; dashed: unstable; dotted: on the edge. Crosses: folds, where it jumps."
 
 
 def family_figure(
@@ -68,7 +68,7 @@ def branch_traces(
         omega = np.array([fold.omega for fold in branch.folds])
         height = np.array([fold.amplitude(which) for fold in branch.folds]) * MM
         yield Trace(
-            "fold", omega, height, "point", case_colour(index), symbol="circle-open", legend=False
+            "fold", omega, height, "point", case_colour(index), symbol="cross", legend=False
         )
 
 

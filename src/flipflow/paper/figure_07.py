@@ -22,7 +22,7 @@ TITLE = "Amplitude over frequency of the machine with stop"
 SAMPLES = 60
 SAME = 1e-6
 CAPTION = (
-    "Half the peak-to-peak motion. Solid: stable; dashed: unstable; circles: folds, where the "
+    "Half the peak-to-peak motion. Solid: stable; dashed: unstable; crosses: folds, where the "
     f"amplitude jumps. Wide and pale beneath: {BALANCE}. Green: the paper's operating region."
 )
 
