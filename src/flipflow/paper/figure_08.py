@@ -73,9 +73,9 @@ def tables(data: Loads) -> tuple[Table, ...]:
         Column("Greatest", "mm", numeric=True),
     )  # fmt: skip
     lines = (
-        *head, Column("Through the ends: intercept", "mm", numeric=True),
+        *head, Column("Ends: intercept", "mm", numeric=True),
         Column("slope", "mm per rad/s", numeric=True),
-        Column("Least squares: intercept", "mm", numeric=True),
+        Column("Fit: intercept", "mm", numeric=True),
         Column("slope", "mm per rad/s", numeric=True),
     )  # fmt: skip
     return (
