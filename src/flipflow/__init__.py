@@ -17,6 +17,7 @@ _HOME = {
     "SampledHarmonicBalance": "flipflow.methods.options",
     "frequency_response": "flipflow.analyses.frequency_response",
     "linear_response": "flipflow.analyses.linear",
+    "loading": "flipflow.analyses.loading",
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "start_up": "flipflow.analyses.startup",
@@ -31,6 +32,8 @@ _HOME = {
     "sensitivity": "flipflow.analyses.sensitivity",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
+    "response_family": "flipflow.analyses.response_family",
+    "reproduce": "flipflow.paper.reproduce",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
@@ -63,9 +66,11 @@ if TYPE_CHECKING:
     from flipflow.analyses.continue_orbit import switch_branch as switch_branch
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
     from flipflow.analyses.linear import linear_response as linear_response
+    from flipflow.analyses.loading import loading as loading
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.analyses.ramp import ramp as ramp
+    from flipflow.analyses.response_family import response_family as response_family
     from flipflow.analyses.sensitivity import sensitivity as sensitivity
     from flipflow.analyses.simulate import simulate as simulate
     from flipflow.analyses.startup import coast_down as coast_down
@@ -96,6 +101,7 @@ if TYPE_CHECKING:
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
     from flipflow.model.vary import Choice as Choice
     from flipflow.model.vary import Normal as Normal
+    from flipflow.paper.reproduce import reproduce as reproduce
 
 
 def __getattr__(name: str) -> object:

@@ -12,6 +12,7 @@ from flipflow.cli.analyze import analyze
 from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
+from flipflow.cli.reproduce import reproduce
 from flipflow.cli.schema import schema
 from flipflow.cli.sensitivity import sensitivity
 from flipflow.cli.simulate import simulate
@@ -28,7 +29,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-COMMANDS = (analyze, check, new, schema, simulate, sweep, orbits, startup, sensitivity)
+COMMANDS = (analyze, check, new, schema, simulate, sweep, orbits, startup, sensitivity, reproduce)
 for command in COMMANDS:
     app.command()(command)
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
 
+Result = TypeVar("Result")
 Tell = Callable[[str, float], None]
 
 
@@ -25,3 +27,12 @@ def progress(begin: str) -> Iterator[Tell]:
     with bar:
         task = bar.add_task(begin, total=1.0)
         yield lambda sentence, share: bar.update(task, description=sentence, completed=share)
+
+
+def with_progress(run: Callable[[Tell], Result]) -> Result:
+    """Run with a bar, the kernels compiled ahead."""
+    from flipflow.methods.warm import compile_ahead  # noqa: PLC0415  keeps --help quick
+
+    with progress("starting") as tell:
+        compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
+        return run(tell)

@@ -7,11 +7,15 @@ from functools import singledispatch
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
+from flipflow.analyses.loading import Loading
 from flipflow.analyses.operating_region import OperatingRegion
+from flipflow.analyses.response_family import ResponseFamily
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
 from flipflow.figures.branches import branches_figure, field_branch_figure
+from flipflow.figures.family import family_figure
 from flipflow.figures.history import history_figure
+from flipflow.figures.loading import loading_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
@@ -105,3 +109,13 @@ def _(result: RunUp) -> Figure:
 @figure.register
 def _(result: Sensitivity) -> Figure:
     return sensitivity_figure(result)
+
+
+@figure.register
+def _(result: Loading) -> Figure:
+    return loading_figure(result)
+
+
+@figure.register
+def _(result: ResponseFamily) -> Figure:
+    return family_figure(result)
