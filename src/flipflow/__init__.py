@@ -20,6 +20,8 @@ _HOME = {
     "loading": "flipflow.analyses.loading",
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
+    "basins": "flipflow.analyses.basins",
+    "jump_risk": "flipflow.analyses.jump_risk",
     "start_up": "flipflow.analyses.startup",
     "coast_down": "flipflow.analyses.startup",
     "continue_orbit": "flipflow.analyses.continue_orbit",
@@ -61,10 +63,12 @@ __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 if TYPE_CHECKING:
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
     from flipflow.analyses.assessment import assess as assess
+    from flipflow.analyses.basins import basins as basins
     from flipflow.analyses.continue_field import continue_fold as continue_fold
     from flipflow.analyses.continue_orbit import continue_orbit as continue_orbit
     from flipflow.analyses.continue_orbit import switch_branch as switch_branch
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
+    from flipflow.analyses.jump_risk import jump_risk as jump_risk
     from flipflow.analyses.linear import linear_response as linear_response
     from flipflow.analyses.loading import loading as loading
     from flipflow.analyses.operating_region import operating_region as operating_region

@@ -68,7 +68,10 @@ def _settled(branch: Branch, solver: ExactSolver, omega: float) -> Orbit | None:
     push = PUSH * solver.length / np.abs(direction[: branch.system.size]).max()
     z = solver.settled(unstable[0].state + push * direction, omega, SETTLING_TURNS)
     point = solver.solve(z, omega)
-    return None if point is None or not _leans(Orbit(point), solver) else Orbit(point)
+    if point is None:
+        return None
+    orbit = Orbit(branch.machine, point)
+    return orbit if _leans(orbit, solver) else None
 
 
 def _marched(solver: ExactSolver, start: Orbit, speeds: Real) -> Iterator[Orbit]:
@@ -76,10 +79,13 @@ def _marched(solver: ExactSolver, start: Orbit, speeds: Real) -> Iterator[Orbit]
     guess = start.unknowns
     for omega in speeds:
         point = solver.solve(guess, float(omega))
-        if point is None or not _leans(Orbit(point), solver):
+        if point is None:
+            return
+        orbit = Orbit(start.machine, point)
+        if not _leans(orbit, solver):
             return
         guess = point.u
-        yield Orbit(point)
+        yield orbit
 
 
 def _leans(orbit: Orbit, solver: ExactSolver) -> bool:

@@ -1,4 +1,4 @@
-"""A branch from its document: nothing is computed again but what is asked for."""
+"""Branches and basins from their documents: nothing is computed again but what is asked for."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import numpy as np
 from flipflow.analyses.frequency_response import solver_for
 from flipflow.errors import StoreError
 from flipflow.kernels import arclength
+from flipflow.methods.exact import ExactSolver
 from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Point, Solver, Traced
+from flipflow.results.basins import Basins, GridAxis
 from flipflow.results.branch import Branch, SpecialPoint
-from flipflow.results.document import BRANCH, machine_from, method_from
+from flipflow.results.document import BASINS, BRANCH, machine_from, method_from
 from flipflow.results.orbit import Orbit
 from flipflow.results.status import BranchStatus
 
@@ -82,6 +84,38 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
         stability=np.asarray(document["stability"], dtype="<U12"),
         special_points=special,
         status=BranchStatus[document["status"]],
+        notes=tuple(document["notes"]),
+        version=document["version"],
+    )
+
+
+def basins_from(document: Mapping[str, Any]) -> Basins:
+    """The basins that :func:`flipflow.results.document.basins_document` wrote.
+
+    Raises
+    ------
+    StoreError
+        When the document is of another kind.
+    """
+    if document.get("schema") != BASINS:
+        raise StoreError(f"schema {document.get('schema')!r} is not basins of this version")
+    machine, omega = machine_from(document["machine"]), float(document["omega"])
+    orbits = []
+    for one in document["orbits"]:
+        solver = ExactSolver(machine.system(), half_turn=False, turns=one["periods"])
+        unknowns, known = np.asarray(one["unknowns"]), np.asarray(one["return_map"])
+        orbits.append(Orbit(machine, Point(solver, unknowns, omega, known_map=known)))
+    return Basins(
+        machine=machine,
+        omega=omega,
+        axes=tuple(
+            GridAxis(axis["kind"], axis["which"], np.asarray(axis["values"], float))
+            for axis in document["axes"]
+        ),
+        labels=np.asarray(document["labels"], np.int64),
+        turns=np.asarray(document["turns"], np.int64),
+        orbits=tuple(orbits),
+        most_turns=document["most_turns"],
         notes=tuple(document["notes"]),
         version=document["version"],
     )

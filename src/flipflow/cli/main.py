@@ -9,6 +9,7 @@ import typer
 
 from flipflow import __version__
 from flipflow.cli.analyze import analyze
+from flipflow.cli.basins import basins
 from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
@@ -29,7 +30,19 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-COMMANDS = (analyze, check, new, schema, simulate, sweep, orbits, startup, sensitivity, reproduce)
+COMMANDS = (
+    analyze,
+    basins,
+    check,
+    new,
+    schema,
+    simulate,
+    sweep,
+    orbits,
+    startup,
+    sensitivity,
+    reproduce,
+)
 for command in COMMANDS:
     app.command()(command)
 

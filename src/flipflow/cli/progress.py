@@ -1,10 +1,14 @@
-"""Progress of long work on stderr."""
+"""Progress of long work on stderr, and Ctrl-C that keeps what is finished."""
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import TypeVar
+
+from flipflow.errors import Cancelled
 
 Result = TypeVar("Result")
 Tell = Callable[[str, float], None]
@@ -36,3 +40,29 @@ def with_progress(run: Callable[[Tell], Result]) -> Result:
     with progress("starting") as tell:
         compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
         return run(tell)
+
+
+@contextmanager
+def stoppable(tell: Tell, stage: str) -> Iterator[Tell]:
+    """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
+
+    In other stages, and at the second time, Ctrl-C ends the program at once.
+    """
+    at = {"stage": "", "stop": ""}
+
+    def told(sentence: str, share: float) -> None:
+        at["stage"] = sentence
+        if at["stop"]:
+            raise Cancelled("stopped by the user")
+        tell(sentence, share)
+
+    def interrupted(_number: int, _frame: FrameType | None) -> None:
+        if at["stage"] != stage or at["stop"]:
+            raise KeyboardInterrupt
+        at["stop"] = "asked"
+
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield told
+    finally:
+        signal.signal(signal.SIGINT, before)

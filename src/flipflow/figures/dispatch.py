@@ -12,6 +12,7 @@ from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.analyses.response_family import ResponseFamily
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
+from flipflow.figures.basins import basins_figure
 from flipflow.figures.branches import branches_figure, field_branch_figure
 from flipflow.figures.family import family_figure
 from flipflow.figures.history import history_figure
@@ -22,6 +23,7 @@ from flipflow.figures.response import branch_figure, cases_figure, linear_figure
 from flipflow.figures.sensitivity import sensitivity_figure
 from flipflow.figures.sweep import sweep_figure
 from flipflow.figures.transient import run_up_figure
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.field_branch import FieldBranch
 from flipflow.results.history import History
@@ -119,3 +121,8 @@ def _(result: Loading) -> Figure:
 @figure.register
 def _(result: ResponseFamily) -> Figure:
     return family_figure(result)
+
+
+@figure.register
+def _(result: Basins) -> Figure:
+    return basins_figure(result)

@@ -40,6 +40,15 @@ FILLS: Mapping[str, str] = {
     "contact": "rgba(90,98,105,0.24)",
     "contact minus": "rgba(90,98,105,0.13)",
 }
+TINTS: Mapping[str, str] = {
+    "none": "#ffffff",
+    "case 0": "#eceef0",
+    "case 1": "#8fb7e6",
+    "case 2": "#f6d9c4",
+    "case 3": "#7fc4a6",
+    "case 4": "#d9bfe2",
+    "case 5": "#b4bac0",
+}
 DASHES: Mapping[str, str] = {"unstable": "dash", "undetermined": "dot"}
 SYMBOLS = ("", "circle", "square", "triangle", "diamond", "cross")
 HATCHES = ("", "/", "\\", "x", "-", ".")

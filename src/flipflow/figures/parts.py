@@ -82,6 +82,26 @@ class Trace:
     x_also: tuple[tuple[str, Real], ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A grid of cells, each filled with the colour of its kind.
+
+    Parameters
+    ----------
+    x, y
+        Edges of the cells, (n + 1,) and (m + 1,), rising.
+    kind
+        Index into ``colours`` of each cell, (m, n).
+    colours
+        Names in the palette of fills for cells.
+    """
+
+    x: Real
+    y: Real
+    kind: NDArray[np.int64]
+    colours: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Bar:
     """A horizontal bar from ``low`` to ``high`` at height ``y``; ``thickness`` in units of y."""
@@ -158,6 +178,7 @@ class Panel:
     lines: tuple[Line, ...] = ()
     arrows: tuple[Arrow, ...] = ()
     notes: tuple[Note, ...] = ()
+    cells: tuple[Cells, ...] = ()
     title: str = ""
     equal: bool = False
 

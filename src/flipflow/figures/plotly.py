@@ -27,8 +27,8 @@ from flipflow.figures.layout import (
     arrange,
     legend_names,
 )
-from flipflow.figures.palette import COLOURS, DASHES, FAINT, FILLS, INK, STABILITY_WORDS
-from flipflow.figures.parts import Axis, Bar, Figure, Line, Panel, Trace
+from flipflow.figures.palette import COLOURS, DASHES, FAINT, FILLS, INK, STABILITY_WORDS, TINTS
+from flipflow.figures.parts import Axis, Bar, Cells, Figure, Line, Panel, Trace
 
 Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
@@ -90,6 +90,7 @@ def described(figure: Figure) -> Json:
             layout[f"xaxis{key}"]["constrain"] = "domain"
         layout["shapes"] += _shapes(panel, key)
         layout["annotations"] += _annotations(panel, key, geometry, k)
+        data += [_cells(cells, key) for cells in panel.cells]
         data += [item for trace in panel.traces for item in _trace(trace, panel, key)]
         data += _bars(panel.bars, key)
     _legend_once(data)
@@ -152,6 +153,20 @@ def _trace(trace: Trace, panel: Panel, key: str) -> Iterator[Json]:
             "hovertemplate": _hover(trace, panel),
         }
     )
+
+
+def _cells(cells: Cells, key: str) -> Json:
+    """One image; the colour scale has a step for each kind."""
+    count = len(cells.colours)
+    scale = [
+        [(k + end) / count, TINTS[name]] for k, name in enumerate(cells.colours) for end in (0, 1)
+    ]
+    return {
+        "type": "heatmap", "name": "", "x": _plain(cells.x), "y": _plain(cells.y),
+        "z": cells.kind.tolist(), "zmin": -0.5, "zmax": count - 0.5, "colorscale": scale,
+        "showscale": False, "showlegend": False, "hoverinfo": "skip", "xaxis": f"x{key}",
+        "yaxis": f"y{key}",
+    }  # fmt: skip
 
 
 def _look(trace: Trace, colour: str) -> Json:

@@ -17,8 +17,8 @@ from flipflow.figures.layout import (
     legend_columns,
     legend_names,
 )
-from flipflow.figures.palette import COLOURS, DASHES, FAINT, FILLS, INK
-from flipflow.figures.parts import Axis, Bar, Figure, Line, Panel, Trace
+from flipflow.figures.palette import COLOURS, DASHES, FAINT, FILLS, INK, TINTS
+from flipflow.figures.parts import Axis, Bar, Cells, Figure, Line, Panel, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,6 +106,8 @@ def _draw_panel(axes: Axes, panel: Panel, handles: dict[str, Any]) -> None:
     for band in panel.bands:
         span = axes.axvspan if band.axis == "x" else axes.axhspan
         span(band.low, band.high, facecolor=_rgba(FILLS[band.role]), edgecolor="none", zorder=0.5)
+    for cells in panel.cells:
+        _draw_cells(axes, cells)
     for trace in panel.traces:
         _draw_trace(axes, trace, handles)
     for bar in panel.bars:
@@ -143,6 +145,16 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
                   "markevery": max(trace.x.size // MARKS_SHOWN, 1)}  # fmt: skip
     (handle,) = axes.plot(trace.x, trace.y, marker=MARKS.get(trace.symbol or "", ""), **style)
     handles.setdefault(trace.name, handle)
+
+
+def _draw_cells(axes: Axes, cells: Cells) -> None:
+    from matplotlib.colors import ListedColormap  # noqa: PLC0415  slow to import
+
+    colours = ListedColormap([TINTS[name] for name in cells.colours])
+    axes.pcolormesh(
+        cells.x, cells.y, cells.kind, cmap=colours, vmin=-0.5, vmax=len(cells.colours) - 0.5,
+        rasterized=True, zorder=0.4,
+    )  # fmt: skip
 
 
 def _draw_bar(axes: Axes, bar: Bar, handles: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ import csv
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.reopen import branch_from
+from flipflow.analyses.reopen import basins_from, branch_from
 from flipflow.errors import InputError, StoreError
 from flipflow.io.run_up import run_up_document
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.document import (
+    BASINS,
     BRANCH,
+    basins_document,
     branch_document,
     field_branch_document,
     orbit_document,
@@ -42,6 +45,12 @@ if TYPE_CHECKING:
     import xarray
 
 RPM = 30.0 / np.pi
+Opened = Branch | Basins | Sensitivity | dict[str, Any]
+OPENERS: Mapping[str, Callable[[dict[str, Any]], Opened]] = {
+    BRANCH: branch_from,
+    BASINS: basins_from,
+    SENSITIVITY: sensitivity_from,
+}
 COORDINATES = ("main", "floating", "relative")
 
 
@@ -74,8 +83,8 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         )  # fmt: skip
 
 
-def open_result(path: str | os.PathLike[str]) -> Branch | Sensitivity | dict[str, Any]:
-    """Open what :func:`save` wrote as JSON: branches and sensitivities as such, others as they are.
+def open_result(path: str | os.PathLike[str]) -> Opened:
+    """Open what :func:`save` wrote as JSON: as the result where that is known, else as it is.
 
     Raises
     ------
@@ -97,9 +106,7 @@ def open_result(path: str | os.PathLike[str]) -> Branch | Sensitivity | dict[str
     if not isinstance(document, dict) or not str(document.get("schema")).startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
-        if document["schema"] == SENSITIVITY:
-            return sensitivity_from(document)
-        return branch_from(document) if document["schema"] == BRANCH else document
+        return OPENERS.get(document["schema"], dict)(document)
     except (KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path} is damaged: {error!r}") from None
 
@@ -114,6 +121,7 @@ def document_of(result: object) -> dict[str, Any]:
 document_of.register(Branch, branch_document)
 document_of.register(FieldBranch, field_branch_document)
 document_of.register(Orbit, orbit_document)
+document_of.register(Basins, basins_document)
 document_of.register(History, history_document)
 document_of.register(Sweep, sweep_document)
 document_of.register(RunUp, run_up_document)

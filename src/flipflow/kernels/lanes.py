@@ -20,7 +20,22 @@ def next_turn(problem: Shooting, omega: float) -> int:
     code = run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
     for k in range(problem.flow.z.shape[0]):
         problem.flow.z[k] *= problem.sign
+        if code == status.OK and not math.isfinite(problem.flow.z[k]):
+            code = status.NOT_FINITE
     return code
+
+
+@kernel
+def finish_turn(problem: Shooting, omega: float, begin: float) -> int:
+    """Carry flow.z from time ``begin`` to the end of the turn; at the start of it, nothing."""
+    flow = problem.flow
+    for k in range(flow.z.shape[0]):
+        if not math.isfinite(flow.z[k]):
+            return status.NOT_FINITE
+    if begin == 0.0:
+        return status.OK
+    duration = 2.0 * math.pi / omega - begin
+    return run_flow(problem.plan, flow, omega, begin, duration, problem.rate)
 
 
 @kernel(entry=True)
@@ -42,6 +57,7 @@ def strobe(problem: Shooting, z: Real, omega: float, record: Real) -> int:
 def settle_lanes(
     problem: Shooting,
     states: Real,
+    begin: Real,
     omega: float,
     centre: Real,
     form: Real,
@@ -53,18 +69,21 @@ def settle_lanes(
 ) -> None:
     """Run every state (L, 2 N) until it is caught: label (L,) is the owner of what caught it.
 
-    Motion a catches what lies within (z - centre_a)^T form_a (z - centre_a) <= 1. A lane that
-    nothing catches within ``most`` turns keeps the label NOT_SETTLED. States end where they were
-    caught.
+    Each state holds at its time ``begin`` (L,) within the first turn, and is first carried to the
+    end of that turn. Motion a catches what lies within (z - centre_a)^T form_a (z - centre_a) <= 1
+    at the end of a turn. A lane that nothing catches within ``most`` turns keeps the label
+    NOT_SETTLED. States end where they were caught.
     """
     flow = problem.flow
     for lane in range(states.shape[0]):
         for k in range(states.shape[1]):
             flow.z[k] = states[lane, k]
-        label[lane] = caught(flow.z, centre, form, owner)
         turns[lane] = 0
-        code[lane] = status.OK
-        while label[lane] == NOT_SETTLED and turns[lane] < most:
+        label[lane] = NOT_SETTLED
+        code[lane] = finish_turn(problem, omega, begin[lane])
+        if code[lane] == status.OK:
+            label[lane] = caught(flow.z, centre, form, owner)
+        while code[lane] == status.OK and label[lane] == NOT_SETTLED and turns[lane] < most:
             code[lane] = next_turn(problem, omega)
             if code[lane] != status.OK:
                 break
@@ -88,6 +107,7 @@ def caught(z: Real, centre: Real, form: Real, owner: Int) -> int:
                 row += form[a, i, j] * (z[j] - centre[a, j])
             value += row * (z[i] - centre[a, i])
             if not math.isfinite(value):
+                value = math.inf
                 break
         if value <= 1.0:
             return int(owner[a])

@@ -65,6 +65,11 @@ class PlanBuilder:
                 self._rows.setdefault(code, self._configuration(code))
         self.plan = self._assemble()
 
+    def add_contact_state(self, state: NDArray[np.int64]) -> None:
+        """Prepare the configuration of a flow's contact state (m,)."""
+        digits = np.select([state == 1, state == -1], [1, 2], 0)
+        self.add([int(digits @ 3 ** np.arange(digits.size))])
+
     def _digits(self, code: int) -> list[int]:
         return [code // 3**j % 3 for j in range(len(self.springs))]
 

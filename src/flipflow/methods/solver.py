@@ -185,8 +185,7 @@ class Solver(ABC):
 
     def add_configuration(self, flow: Flow) -> None:
         """Prepare the configuration at which a flow stopped, and the problem anew."""
-        digits = np.select([flow.state == 1, flow.state == -1], [1, 2], 0)
-        self.builder.add([int(digits @ 3 ** np.arange(digits.size))])
+        self.builder.add_contact_state(flow.state)
         self._prepare()
 
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:

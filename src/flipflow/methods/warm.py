@@ -18,32 +18,35 @@ import numpy as np
 from flipflow.kernels import arclength
 from flipflow.kernels.compile import cache_folder
 from flipflow.methods.exact import ExactSolver
+from flipflow.methods.lanes import Lanes
 from flipflow.methods.solver import STEP_SHARE
 from flipflow.model.elements import ClearanceSpring, Unbalance
 from flipflow.model.system import MechanicalSystem
 
 logger = logging.getLogger("flipflow")
-MARK = "exact-compiled"
 POLL_SECONDS = 0.2
 
 
-def compile_ahead(tell: Callable[[float], None]) -> None:
+def compile_ahead(tell: Callable[[float], None], also: tuple[str, ...] = ()) -> None:
     """Compile what an exact analysis needs, unless it is in the cache already.
 
     Parameters
     ----------
     tell
         Called every fraction of a second with the seconds passed.
+    also
+        Further parts: "lanes" for basins.
     """
-    mark = cache_folder() / MARK
-    if mark.exists():
+    marks = {part: cache_folder() / f"{part}-compiled" for part in (*ANALYSIS, *also)}
+    parts = [part for part, mark in marks.items() if not mark.exists()]
+    if not parts:
         return
     command = [sys.executable, "-m", "flipflow.methods.warm"]
     # The kernels run as fast with light optimisation, and are compiled in four fifths of the time.
     environment = {**os.environ, "NUMBA_OPT": "1"}
     workers = [
         subprocess.Popen([*command, part], stdout=subprocess.DEVNULL, env=environment)  # noqa: S603  our own module
-        for part in PARTS
+        for part in parts
     ]
     begin = time.monotonic()
     try:
@@ -53,9 +56,10 @@ def compile_ahead(tell: Callable[[float], None]) -> None:
     finally:
         for worker in workers:
             worker.kill()
-    if all(worker.returncode == 0 for worker in workers):
-        mark.touch()
-    else:
+    for part, worker in zip(parts, workers, strict=True):
+        if worker.returncode == 0:
+            marks[part].touch()
+    if any(worker.returncode != 0 for worker in workers):
         logger.warning("compiling ahead failed; kernels are compiled as they are needed")
 
 
@@ -72,6 +76,11 @@ def _observe_part() -> None:
     solver.errors(state, omega)
 
 
+def _lanes_part() -> None:
+    states = np.zeros((1, 2))
+    Lanes(_small_solver().system, 1.0, 1).carry(states, 1)
+
+
 def _small_solver() -> ExactSolver:
     """One mass and one stop: kernels do not depend on the machine, only on the types."""
     stop = ClearanceSpring([1.0], 1.0, 0.1, 10.0)
@@ -79,7 +88,8 @@ def _small_solver() -> ExactSolver:
     return ExactSolver(system, half_turn=True)
 
 
-PARTS = {"trace": _trace_part, "observe": _observe_part}
+ANALYSIS = ("trace", "observe")
+PARTS = {"trace": _trace_part, "observe": _observe_part, "lanes": _lanes_part}
 
 if __name__ == "__main__":
     PARTS[sys.argv[1]]()

@@ -23,6 +23,7 @@ from flipflow.methods.options import (
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
@@ -33,7 +34,7 @@ METHODS: Mapping[str, type[Method]] = {
     "HarmonicBalance": HarmonicBalance,
     "SampledHarmonicBalance": SampledHarmonicBalance,
 }
-BRANCH, ORBIT = "flipflow/branch/1", "flipflow/orbit/1"
+BRANCH, ORBIT, BASINS = "flipflow/branch/1", "flipflow/orbit/1", "flipflow/basins/1"
 FIELD_BRANCH = "flipflow/field-branch/1"
 
 
@@ -149,6 +150,38 @@ def orbit_document(orbit: Orbit) -> Document:
         "amplitude": {str(which): orbit.amplitude(which) for which in system.named},
         "stop_force": [plain(orbit.stop_force(j)) for j in range(len(system.springs))],
         "contacts": [plain(dataclasses.asdict(touch)) for touch in orbit.contact_intervals],
+    }
+
+
+def basins_document(basins: Basins) -> Document:
+    """Labels, shares and motions of a grid of initial states; what it takes to open it again."""
+    system = basins.machine.system()
+    return {
+        "schema": BASINS,
+        "version": basins.version,
+        "machine": machine_document(basins.machine),
+        "omega": basins.omega,
+        "axes": [
+            {"kind": axis.kind, "which": axis.which, "values": plain(axis.values)}
+            for axis in basins.axes
+        ],
+        "labels": plain(basins.labels),
+        "turns": plain(basins.turns),
+        "most_turns": basins.most_turns,
+        "complete": basins.complete,
+        "shares": plain(basins.shares),
+        "share_intervals": plain(basins.share_intervals),
+        "unsettled": basins.unsettled,
+        "orbits": [
+            {
+                "periods": orbit.periods,
+                "amplitude": {str(which): orbit.amplitude(which) for which in system.named},
+                "unknowns": plain(orbit.unknowns),
+                "return_map": plain(orbit.return_map),
+            }
+            for orbit in basins.orbits
+        ],
+        "notes": list(basins.notes),
     }
 
 
