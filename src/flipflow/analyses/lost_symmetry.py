@@ -55,7 +55,7 @@ def _followed(branch: Branch, first: float, last: float) -> tuple[Orbit, ...]:
         return ()
     below = list(_marched(solver, start, speeds[:middle][::-1]))[::-1]
     above = list(_marched(solver, start, speeds[middle + 1 :]))
-    return (*below, Orbit(start.point), *above)
+    return (*below, start, *above)
 
 
 def _settled(branch: Branch, solver: ExactSolver, omega: float) -> Orbit | None:
