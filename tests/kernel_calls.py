@@ -9,6 +9,7 @@ from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
 from flipflow.kernels.flow import saltation
 from flipflow.kernels.gapmotion import extremes, next_change, prepare_search
+from flipflow.kernels.sampled import sampled_residual
 from flipflow.kernels.shooting import shooting_residual
 
 
@@ -44,6 +45,12 @@ def shoot(problem, z, omega, r, J):
 def balance(problem, u, omega, r, J):
     """``balance_residual``."""
     return balance_residual(problem, u, omega, r, J)
+
+
+@kernel(entry=True)
+def sampled(problem, u, omega, r, J):
+    """``sampled_residual``."""
+    return sampled_residual(problem, u, omega, r, J)
 
 
 @kernel(entry=True)

@@ -14,8 +14,10 @@ __version__ = "0.1.0"
 _HOME = {
     "HarmonicBalance": "flipflow.methods.options",
     "PiecewiseExact": "flipflow.methods.options",
+    "SampledHarmonicBalance": "flipflow.methods.options",
     "frequency_response": "flipflow.analyses.frequency_response",
     "linear_response": "flipflow.analyses.linear",
+    "loading": "flipflow.analyses.loading",
     "operating_region": "flipflow.analyses.operating_region",
     "periodic_orbits": "flipflow.analyses.periodic_orbits",
     "basins": "flipflow.analyses.basins",
@@ -32,6 +34,8 @@ _HOME = {
     "sensitivity": "flipflow.analyses.sensitivity",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
+    "response_family": "flipflow.analyses.response_family",
+    "reproduce": "flipflow.paper.reproduce",
     "figure": "flipflow.figures.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
@@ -66,9 +70,11 @@ if TYPE_CHECKING:
     from flipflow.analyses.frequency_response import frequency_response as frequency_response
     from flipflow.analyses.jump_risk import jump_risk as jump_risk
     from flipflow.analyses.linear import linear_response as linear_response
+    from flipflow.analyses.loading import loading as loading
     from flipflow.analyses.operating_region import operating_region as operating_region
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.analyses.ramp import ramp as ramp
+    from flipflow.analyses.response_family import response_family as response_family
     from flipflow.analyses.sensitivity import sensitivity as sensitivity
     from flipflow.analyses.simulate import simulate as simulate
     from flipflow.analyses.startup import coast_down as coast_down
@@ -82,6 +88,7 @@ if TYPE_CHECKING:
     from flipflow.io.results import save as save
     from flipflow.methods.options import HarmonicBalance as HarmonicBalance
     from flipflow.methods.options import PiecewiseExact as PiecewiseExact
+    from flipflow.methods.options import SampledHarmonicBalance as SampledHarmonicBalance
     from flipflow.model.disturbance import Impulse as Impulse
     from flipflow.model.disturbance import LoadStep as LoadStep
     from flipflow.model.disturbance import Lump as Lump
@@ -98,6 +105,7 @@ if TYPE_CHECKING:
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
     from flipflow.model.vary import Choice as Choice
     from flipflow.model.vary import Normal as Normal
+    from flipflow.paper.reproduce import reproduce as reproduce
 
 
 def __getattr__(name: str) -> object:

@@ -57,6 +57,10 @@ class MissingExtra(FlipflowError, ImportError):  # noqa: N818  fixed by the publ
     exit_code = 2
 
 
+class SampledContactWarning(UserWarning):
+    """A contact force was sampled at fixed times: the answer reproduces that method, no more."""
+
+
 def _shown(value: object) -> str:
     text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -77,7 +77,7 @@ def test_ffs0827_project():
 
 
 def test_every_bundled_value_has_a_source():
-    """A paper value names its table or section; all else is marked as assumed."""
+    """A paper value names its table or section; all else is marked as assumed or identified."""
     for name in bundled_names():
         project = ff.load_project(name)
         for key in project.written:
@@ -87,8 +87,9 @@ def test_every_bundled_value_has_a_source():
                 or key.startswith("load case ")
             )
             assert named, key
-        assert project.sources["frames.main_mass"] == "Minerals 2024, 14, 406, Table 1"
-        assert project.sources["limits"] == "assumed for demonstration"
+        if name.startswith("ffs0827"):
+            assert project.sources["frames.main_mass"] == "Minerals 2024, 14, 406, Table 1"
+            assert project.sources["limits"] == "assumed for demonstration"
         for case in project.load_cases:
             assert f"load_cases.{case.name}" in project.sources
 

@@ -9,9 +9,9 @@ import pytest
 
 import flipflow as ff
 from flipflow.methods.plan import PlanBuilder
-from flipflow.methods.scratch import new_balance, new_shooting
+from flipflow.methods.scratch import new_balance, new_sampled, new_shooting
 from judge import close
-from kernel_calls import balance, central_differences, jump, residual_of, shoot
+from kernel_calls import balance, central_differences, jump, residual_of, sampled, shoot
 from reference import integrate
 
 LAWS = ("paper", "compression-only")
@@ -76,6 +76,31 @@ def test_jacobian_of_harmonic_balance(screen, law: str, case: str, order: int) -
     _, J = evaluate(u, 120.0)
     assert problem.flow.segments[0] > 1, "there is contact in this test"
     F = central_differences(evaluate, u, 120.0, np.append(np.full(unknowns, 1e-9), 1e-4))
+    off = np.abs(F - J).max(axis=0) / np.abs(J).max(axis=0)
+    assert np.all(off < 1e-5), f"relative differences {off}"
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("order", [1, 5, 12])
+@pytest.mark.parametrize("sharpness", [300.0, 3e4])
+def test_jacobian_of_sampled_balance(screen, case: str, order: int, sharpness: float) -> None:
+    """dr/du and dr/d omega of the smooth law, in and beside its layer: 1e-5 of each column.
+
+    The switch has curvature sharpness^2, so that the differences step by 1e-4 of its layer.
+    """
+    symmetric = CASES[case] is None
+    plan = PlanBuilder(machine(screen, "paper", CASES[case])).plan
+    balanced = new_balance(plan, order, half_turn=symmetric, length=LENGTH)
+    problem = new_sampled(balanced, 256, sharpness)
+    kept = balanced.harmonics
+    unknowns = 2 * np.count_nonzero(kept) + np.count_nonzero(kept == 0)
+    u = np.random.default_rng(order).normal(size=unknowns) * 1.0e-3
+    u[0 if symmetric else 1] = 9e-3
+    evaluate = residual_of(sampled, problem, unknowns)
+    _, J = evaluate(u, 120.0)
+    assert problem.beyond[0] > 0, "there is contact in this test"
+    step = min(1e-7, 1e-4 / sharpness)
+    F = central_differences(evaluate, u, 120.0, np.append(np.full(unknowns, step), 1e-3))
     off = np.abs(F - J).max(axis=0) / np.abs(J).max(axis=0)
     assert np.all(off < 1e-5), f"relative differences {off}"
 

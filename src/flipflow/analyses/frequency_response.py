@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
-from flipflow.errors import InputError
+from flipflow.errors import InputError, SampledContactWarning
 from flipflow.kernels import arclength, status
-from flipflow.methods.balance import BalanceSolver
+from flipflow.methods.balance import BalanceSolver, SampledSolver
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
+from flipflow.methods.options import (
+    HarmonicBalance,
+    Method,
+    PiecewiseExact,
+    SampledHarmonicBalance,
+)
 from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced, eigenvalues_of
 from flipflow.methods.special import STABILITY_CHANGES, Found, find_special_points
 from flipflow.methods.stability import (
@@ -31,6 +37,10 @@ from flipflow.results.status import BranchStatus
 SETTLING_TURNS = 4000
 OMEGA_MOST = 1e6
 SCAN_POINTS = 2000
+SAMPLED = (
+    "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
+    "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
+)
 
 
 def frequency_response(
@@ -50,7 +60,8 @@ def frequency_response(
     omega
         The interval (low, high) in rad/s.
     method
-        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`.
+        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`;
+        :class:`~flipflow.SampledHarmonicBalance` only to reproduce what others do.
 
     Returns
     -------
@@ -61,15 +72,22 @@ def frequency_response(
     ------
     InputError
         For an interval that is empty, reversed or absurd, and for a machine without damping.
+
+    Warns
+    -----
+    SampledContactWarning
+        When the method samples the contact force; the branch has the same sentence as a note.
     """
     low, high = check_interval(omega)
     method = method or PiecewiseExact()
-    if not isinstance(method, (PiecewiseExact, HarmonicBalance)):
+    if not isinstance(method, Method):
         raise InputError("method", method, "give ff.PiecewiseExact() or ff.HarmonicBalance(3)")
     solver = solver_for(system_of(machine), method)
     course = arclength.Course(
         low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK
     )
+    if isinstance(solver, SampledSolver):
+        warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
     return followed(machine, method, solver, course)
 
 
@@ -94,8 +112,17 @@ def solver_for(
 ) -> Solver:
     """The solver of a method. Without stops both are the closed form, which shooting meets."""
     symmetric = system.symmetric if half_turn is None else half_turn
-    if isinstance(method, HarmonicBalance) and system.with_bonded().springs:
+    springs = system.with_bonded().springs
+    if isinstance(method, HarmonicBalance) and springs:
         return BalanceSolver(system, method.harmonics, half_turn=symmetric)
+    if isinstance(method, SampledHarmonicBalance) and springs:
+        if any(spring.law != "paper" for spring in springs):
+            raise InputError(
+                "law", "compression-only", "only the paper's law has a smooth form to sample"
+            )
+        return SampledSolver(
+            system, method.harmonics, method.samples, method.sharpness, half_turn=symmetric
+        )
     return ExactSolver(system, half_turn=symmetric, turns=turns)
 
 
@@ -194,8 +221,8 @@ def _finished(
 ) -> Branch:
     if eigenvalues is None:
         eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
-    tangent = traced.tangent[:, -1]
-    side = saddle_side(tangent, eigenvalues) if eigenvalues.size else None
+    side = saddle_side(traced.tangent[:, -1], eigenvalues) if eigenvalues.size else None
+    beyond = beyond_where_rising(traced.tangent[:, -1], eigenvalues)
     special = tuple(
         SpecialPoint(
             one.kind,
@@ -212,12 +239,12 @@ def _finished(
         solver=solver,
         traced=traced,
         return_maps=maps,
-        saddle_side_at_start=beyond_where_rising(tangent, eigenvalues),
+        saddle_side_at_start=beyond,
         multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
         stability=stability_words(eigenvalues, side),
         special_points=special,
         status=BranchStatus.from_code(traced.code),
-        notes=tuple(notes),
+        notes=(*([SAMPLED] if isinstance(solver, SampledSolver) else []), *notes),
         version=__version__,
     )
 

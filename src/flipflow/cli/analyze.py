@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from flipflow.errors import InputError
-
-if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
-    from flipflow.analyses.assessment import Assessment
-    from flipflow.model.project import Project
 
 FILE_HELP = "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without)."
 
@@ -50,7 +44,10 @@ def analyze(
 
     options = _options(speeds, harmonics)
     prepare_folder(folder)
-    assessment = _assessed(project, options)
+    from flipflow.analyses.assessment import assess  # noqa: PLC0415
+    from flipflow.cli.progress import with_progress  # noqa: PLC0415
+
+    assessment = with_progress(lambda monitor: assess(project, monitor, **options))
 
     from flipflow.io.results import assessment_document, write_response  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
@@ -85,34 +82,3 @@ def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str,
     if harmonics is not None:
         options["method"] = HarmonicBalance(harmonics)
     return options
-
-
-def _assessed(project: Project, options: dict[str, Any]) -> Assessment:
-    """Analyse with progress on stderr."""
-    from rich.console import Console  # noqa: PLC0415  keeps --help quick
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
-
-    terminal = Console(stderr=True)
-    progress = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
-        console=terminal, transient=True, disable=not terminal.is_terminal,
-    )  # fmt: skip
-    with progress:
-        task = progress.add_task("starting", total=1.0)
-        return _run(project, options, progress, task)
-
-
-def _run(project: Project, options: dict[str, Any], progress: Progress, task: TaskID) -> Assessment:
-    from flipflow.analyses.assessment import assess  # noqa: PLC0415  keeps --help quick
-    from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
-
-    compile_ahead(
-        lambda seconds: progress.update(
-            task, description=f"compiling, once per version: {seconds:.0f} s"
-        )
-    )
-    return assess(
-        project,
-        lambda sentence, share: progress.update(task, description=sentence, completed=share),
-        **options,
-    )

@@ -163,8 +163,9 @@ def risk_words(risk: JumpRisk) -> list[str]:
         words.append(
             f"A blow of {number(blow.size)} kg m/s along the surface on the {blow.frame} frame "
             f"throws it to {_millimetres(blow.lands)}, at the worst moment "
-            f"({_degrees(blow.phase)} of the "
-            "unbalance). It takes more at any other moment, or on the other frame."
+            f"({_degrees(blow.phase)} of the unbalance, towards "
+            f"{'+x' if blow.impulse > 0 else '-x'}"
+            "). At no other moment, and on neither frame, was a lighter one found."
         )
     lump = risk.worst_lump
     if lump is None:

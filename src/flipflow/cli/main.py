@@ -13,6 +13,7 @@ from flipflow.cli.basins import basins
 from flipflow.cli.check import check
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
+from flipflow.cli.reproduce import reproduce
 from flipflow.cli.schema import schema
 from flipflow.cli.sensitivity import sensitivity
 from flipflow.cli.simulate import simulate
@@ -40,6 +41,7 @@ COMMANDS = (
     orbits,
     startup,
     sensitivity,
+    reproduce,
 )
 for command in COMMANDS:
     app.command()(command)

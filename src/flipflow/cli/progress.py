@@ -6,9 +6,11 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TypeVar
 
 from flipflow.errors import Cancelled
 
+Result = TypeVar("Result")
 Tell = Callable[[str, float], None]
 
 
@@ -29,6 +31,15 @@ def progress(begin: str) -> Iterator[Tell]:
     with bar:
         task = bar.add_task(begin, total=1.0)
         yield lambda sentence, share: bar.update(task, description=sentence, completed=share)
+
+
+def with_progress(run: Callable[[Tell], Result]) -> Result:
+    """Run with a bar, the kernels compiled ahead."""
+    from flipflow.methods.warm import compile_ahead  # noqa: PLC0415  keeps --help quick
+
+    with progress("starting") as tell:
+        compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
+        return run(tell)
 
 
 @contextmanager

@@ -7,12 +7,16 @@ from functools import singledispatch
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.linear import LinearResponse
+from flipflow.analyses.loading import Loading
 from flipflow.analyses.operating_region import OperatingRegion
+from flipflow.analyses.response_family import ResponseFamily
 from flipflow.errors import InputError
 from flipflow.figures.bars import region_figure
 from flipflow.figures.basins import basins_figure
 from flipflow.figures.branches import branches_figure, field_branch_figure
+from flipflow.figures.family import family_figure
 from flipflow.figures.history import history_figure
+from flipflow.figures.loading import loading_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
@@ -36,7 +40,7 @@ def figure(result: object) -> Figure:
     Parameters
     ----------
     result
-        What an analysis returns: a branch or a list of branches over frequency, an orbit, ...
+        What an analysis returns: a branch, an orbit, a sweep, an assessment, ...
 
     Returns
     -------
@@ -107,6 +111,16 @@ def _(result: RunUp) -> Figure:
 @figure.register
 def _(result: Sensitivity) -> Figure:
     return sensitivity_figure(result)
+
+
+@figure.register
+def _(result: Loading) -> Figure:
+    return loading_figure(result)
+
+
+@figure.register
+def _(result: ResponseFamily) -> Figure:
+    return family_figure(result)
 
 
 @figure.register

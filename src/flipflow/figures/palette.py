@@ -27,6 +27,7 @@ COLOURS: Mapping[str, str] = {
     "mark": "#6b7278",
     "jump": "#1c2126",
     "allowed": "#2f8f6b",
+    "beneath": "#eadfbf",
     "input": "#4b545c",
     "isolation": "#1f5fa8",
     "shear": "#c9571a",

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from flipflow.errors import InputError, StoreError
 
 Real = NDArray[np.float64]
-Role = Literal["stable", "unstable", "undetermined", "case band", "limit", "motion", "point"]
+Role = Literal[
+    "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"
+]
 BandRole = Literal["allowed", "contact", "contact minus"]
 FORMATS = (".html", ".svg", ".pdf", ".png")
 
@@ -49,7 +51,8 @@ class Trace:
         Coordinates (n,) in the units of the axes.
     role
         "stable" is drawn solid, "unstable" dashed, "undetermined" dotted; "case band" is the area
-        between ``lower`` and ``y``; "point" is drawn as symbols only.
+        between ``lower`` and ``y``; "point" is drawn as symbols only; "beneath" is wide and pale,
+        for a line that another is laid over.
     colour
         Name in the palette.
     symbol

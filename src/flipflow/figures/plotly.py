@@ -173,7 +173,7 @@ def _look(trace: Trace, colour: str) -> Json:
     if trace.role == "point":
         mark = {"symbol": SYMBOLS.get(trace.symbol or "", trace.symbol), "size": 7, "color": colour}
         return {"mode": "markers", "marker": mark | {"line": {"width": 1.5, "color": colour}}}
-    width = 2.2 if trace.bold else 1.4
+    width = 6.0 if trace.role == "beneath" else 2.2 if trace.bold else 1.4
     look: Json = {
         "mode": "lines",
         "line": {

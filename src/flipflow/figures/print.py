@@ -139,7 +139,8 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
     if trace.role == "point":
         style |= {"ls": "none", "ms": 5.0, "zorder": 3.0, "mfc": "none" if hollow else colour}
     else:
-        style |= {"lw": 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
+        beneath = trace.role == "beneath"
+        style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
                   "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
                   "markevery": max(trace.x.size // MARKS_SHOWN, 1)}  # fmt: skip
     (handle,) = axes.plot(trace.x, trace.y, marker=MARKS.get(trace.symbol or "", ""), **style)

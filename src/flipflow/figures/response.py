@@ -15,7 +15,7 @@ from flipflow.figures.curves import Curve, Jump
 from flipflow.figures.layout import LEGEND_ROW, legend_rows
 from flipflow.figures.palette import CASES, case_colour, case_symbol
 from flipflow.figures.parts import Arrow, Axis, Band, Figure, Line, Panel, Trace
-from flipflow.figures.scales import DEGREES, HZ, MM, RPM
+from flipflow.figures.scales import DEGREES, HZ, MM, RPM, SPEEDS
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.results.branch import Branch, SpecialPoint
 
@@ -186,15 +186,15 @@ def _traces(which: Coordinate, curve: Curve, quantity: str) -> Iterator[Trace]:
 
 def curve_traces(
     name: str, curve: Curve, y: Real, *, colour: str, symbol: str | None, bold: bool,
-    legend: bool = True,
+    legend: bool = True, unit: str = "rpm",
 ) -> Iterator[Trace]:  # fmt: skip
     """One trace for each run of equal stability; the first stands in the legend."""
     for stability, run in curve.runs():
         omega = curve.omega[run]
         yield Trace(
-            name, omega * RPM, y[run], stability, colour,  # type: ignore[arg-type]
+            name, omega * SPEEDS[unit], y[run], stability, colour,  # type: ignore[arg-type]
             symbol=symbol if stability == "stable" else None, bold=bold, legend=legend,
-            x_also=(("Hz", omega * HZ), ("rad/s", omega)),
+            x_also=tuple((u, omega * scale) for u, scale in SPEEDS.items() if u != unit),
         )  # fmt: skip
         legend = False
 

@@ -9,3 +9,5 @@ HZ = 0.5 / math.pi
 MM = 1e3
 KN = 1e-3
 DEGREES = 180.0 / math.pi
+
+SPEEDS = {"rpm": RPM, "Hz": HZ, "rad/s": 1.0}

@@ -25,7 +25,7 @@ def load(name_or_path: str | os.PathLike[str], *, force: bool = False) -> FlipFl
     Parameters
     ----------
     name_or_path
-        ``"ffs0827"``, ``"ffs0827-linear"``, or the path of a ``.toml`` file.
+        ``"ffs0827"``, ``"ffs0827-linear"``, ``"rig-lin2024"``, or the path of a ``.toml`` file.
     force
         Let values through that are possible but look like a slip of units.
 
@@ -48,7 +48,7 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
     Parameters
     ----------
     name_or_path
-        ``"ffs0827"``, ``"ffs0827-linear"``, or the path of a ``.toml`` file.
+        ``"ffs0827"``, ``"ffs0827-linear"``, ``"rig-lin2024"``, or the path of a ``.toml`` file.
     force
         Let values through that are possible but look like a slip of units; they are then listed
         in ``warnings``.

@@ -6,7 +6,7 @@ import csv
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,6 +45,12 @@ if TYPE_CHECKING:
     import xarray
 
 RPM = 30.0 / np.pi
+Opened = Branch | Basins | Sensitivity | dict[str, Any]
+OPENERS: Mapping[str, Callable[[dict[str, Any]], Opened]] = {
+    BRANCH: branch_from,
+    BASINS: basins_from,
+    SENSITIVITY: sensitivity_from,
+}
 COORDINATES = ("main", "floating", "relative")
 
 
@@ -77,8 +83,8 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         )  # fmt: skip
 
 
-def open_result(path: str | os.PathLike[str]) -> Branch | Basins | Sensitivity | dict[str, Any]:
-    """Open what :func:`save` wrote as JSON: branches, basins and sensitivities as such.
+def open_result(path: str | os.PathLike[str]) -> Opened:
+    """Open what :func:`save` wrote as JSON: as the result where that is known, else as it is.
 
     Raises
     ------
@@ -100,11 +106,7 @@ def open_result(path: str | os.PathLike[str]) -> Branch | Basins | Sensitivity |
     if not isinstance(document, dict) or not str(document.get("schema")).startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
-        if document["schema"] == SENSITIVITY:
-            return sensitivity_from(document)
-        if document["schema"] == BASINS:
-            return basins_from(document)
-        return branch_from(document) if document["schema"] == BRANCH else document
+        return OPENERS.get(document["schema"], dict)(document)
     except (KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path} is damaged: {error!r}") from None
 

@@ -294,7 +294,6 @@ def contact_forces(problem: Balance, omega: float) -> None:
 @kernel
 def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
-    m = problem.linear.shape[0]
     set_series(problem, u)
     prepare_receptance(problem, omega)
     code = record_contacts(problem, omega)
@@ -302,7 +301,14 @@ def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) 
         return code
     contact_integrals(problem, omega)
     contact_forces(problem, omega)
-    size = r.shape[0]
+    _jacobian(problem, omega, J)
+    return write_residual(problem, r, J)
+
+
+@kernel
+def write_residual(problem: Balance, r: Real, J: Real) -> int:
+    """r and dr/d omega, the last column of J, from the forces of the series last set."""
+    m, size = problem.linear.shape[0], r.shape[0]
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for j in range(m):
@@ -321,7 +327,6 @@ def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) 
             if h > 0:
                 r[k + 1] = value.imag
                 J[k + 1, size] = slope.imag
-    _jacobian(problem, omega, J)
     for k in range(size):
         if not math.isfinite(r[k]):
             return status.NOT_FINITE
@@ -354,11 +359,11 @@ def _jacobian(problem: Balance, omega: float, J: Real) -> None:
                 for j in range(m):
                     G = problem.receptance[a, j, c]
                     unit = 1.0 if a == b and j == c else 0.0
-                    _write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
+                    write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
 
 
 @kernel
-def _write_block(
+def write_block(
     problem: Balance, a: int, j: int, b: int, c: int, direct: complex, mirror: complex,
     unit: float, J: Real,
 ) -> None:  # fmt: skip

@@ -18,6 +18,7 @@ from flipflow.kernels.dense import lu_factor, lu_solve
 from flipflow.kernels.flow import run_flow, segment_state
 from flipflow.kernels.gapmotion import GapMotion, exponential, extremes, prepare_search
 from flipflow.kernels.plan import Complex, Int, Real
+from flipflow.kernels.sampled import Sampled, sampled_forces
 from flipflow.kernels.shooting import Shooting, shoot
 
 ROUNDING = 1e-9
@@ -156,6 +157,16 @@ def describe_balance(problem: Balance, u: Real, omega: Real, series: Complex, co
         contact_integrals(problem, omega[p])
         contact_forces(problem, omega[p])
         _displacements(problem, omega[p], series[p])
+
+
+@kernel(entry=True)
+def describe_sampled(problem: Sampled, u: Real, omega: Real, series: Complex) -> None:
+    """Displacement harmonics (P, n_h, N) of points under the sampled force."""
+    for p in range(omega.shape[0]):
+        set_series(problem.balance, u[p])
+        prepare_receptance(problem.balance, omega[p])
+        sampled_forces(problem, omega[p])
+        _displacements(problem.balance, omega[p], series[p])
 
 
 @kernel(inline=True)

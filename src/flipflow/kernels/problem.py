@@ -13,11 +13,16 @@ from numba.extending import overload
 
 from flipflow.kernels.balance import Balance, balance_residual, contact_count, series_scale
 from flipflow.kernels.plan import Real
+from flipflow.kernels.sampled import Sampled, passages, sampled_residual, sampled_scale
 from flipflow.kernels.shooting import Shooting, crossings, shooting_residual, state_scale
 
-_RESIDUAL: dict[type, Any] = {Shooting: shooting_residual, Balance: balance_residual}
-_SIGNATURE: dict[type, Any] = {Shooting: crossings, Balance: contact_count}
-_SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale}
+_RESIDUAL: dict[type, Any] = {
+    Shooting: shooting_residual,
+    Balance: balance_residual,
+    Sampled: sampled_residual,
+}
+_SIGNATURE: dict[type, Any] = {Shooting: crossings, Balance: contact_count, Sampled: passages}
+_SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale, Sampled: sampled_scale}
 
 
 def residual(problem: Any, u: Real, omega: float, r: Real, J: Real) -> int:

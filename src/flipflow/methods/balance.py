@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from flipflow.kernels import status
 from flipflow.kernels.balance import Balance
-from flipflow.kernels.observe import describe_balance, observe_series
+from flipflow.kernels.flow import Flow
+from flipflow.kernels.observe import describe_balance, describe_sampled, observe_series
+from flipflow.kernels.sampled import Sampled
 from flipflow.methods.motion import Motion, Pieces, SeriesMotion
-from flipflow.methods.scratch import new_balance, new_gap_motion
+from flipflow.methods.scratch import new_balance, new_gap_motion, new_sampled
 from flipflow.methods.solver import Complex, Real, Solver
 from flipflow.model.system import MechanicalSystem
 
@@ -24,15 +26,24 @@ class BalanceSolver(Solver):
         super().__init__(system, half_turn=half_turn)
 
     def _prepare(self) -> None:
-        self.problem = new_balance(
+        self.balance = new_balance(
             self.builder.plan, self.order, half_turn=self.half_turn, length=self.length
         )
-        self.harmonics = self.problem.harmonics
+        self.problem = self._formulated()
+        self.harmonics = self.balance.harmonics
         kept = int(2 * np.count_nonzero(self.harmonics) + np.count_nonzero(self.harmonics == 0))
         self.unknowns = kept * len(self.builder.springs)
         self._new_work()
         empty = np.zeros(0)
         self._last = empty, empty, empty.astype(np.complex128)
+
+    def _formulated(self) -> Balance | Sampled:
+        """The equations that are solved, over the present balance."""
+        return self.balance
+
+    @property
+    def flow(self) -> Flow:
+        return self.balance.flow
 
     def _describe(self, u: Real, omega: Real) -> Complex:
         """Displacement harmonics (P, n_h, N).
@@ -42,7 +53,7 @@ class BalanceSolver(Solver):
         """
         kept_u, kept_omega, series = self._last
         if not (np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega)):
-            series = self._read_off(self.problem, np.ascontiguousarray(u), omega)
+            series = self._read_off(self.balance, np.ascontiguousarray(u), omega)
             self._last = u.copy(), omega.copy(), series
         return series
 
@@ -92,16 +103,16 @@ class BalanceSolver(Solver):
         """Least and greatest value and first harmonic (P, G) of series (P, G, n_h)."""
         moving = self.harmonics > 0
         rate = 1j * self.harmonics[moving].astype(np.complex128)
-        scratch = new_gap_motion(1, rate, spacing=int(self.problem.motion.spacing[0]))
+        scratch = new_gap_motion(1, rate, spacing=int(self.balance.motion.spacing[0]))
         offset = np.ascontiguousarray(seen[:, :, ~moving].real.sum(axis=2))
         low, high = np.empty(offset.shape), np.empty(offset.shape)
         observe_series(scratch, offset, np.ascontiguousarray(seen[:, :, moving]), low, high)
         return low, high, seen[:, :, self.harmonics == 1][:, :, 0]
 
     def motion(self, u: Real, omega: float) -> Motion:
-        whole = self.problem._replace(walk=2.0 * np.pi)
+        whole = self.balance._replace(walk=2.0 * np.pi)
         series = self._read_off(whole, u[None], np.array([omega]))
-        flow = self.problem.flow
+        flow = self.flow
         pieces = Pieces.recorded(flow, np.zeros((flow.start.size, 0), np.complex128))
         return SeriesMotion(
             self.system, omega, 2.0 * np.pi / omega, pieces, self.harmonics, series[0]
@@ -119,6 +130,34 @@ class BalanceSolver(Solver):
                 pairs = 2.0 * np.stack([spectrum[h].real, spectrum[h].imag], axis=1)
                 parts += [pairs.ravel()]
         return np.concatenate(parts)
+
+
+class SampledSolver(BalanceSolver):
+    """The same unknowns, with the smooth contact law sampled at fixed times.
+
+    What is read off a motion besides its displacements is exact: the contacts of its series, and
+    the return maps of the exact flow beside it.
+    """
+
+    def __init__(
+        self,
+        system: MechanicalSystem,
+        harmonics: int,
+        samples: int,
+        sharpness: float,
+        *,
+        half_turn: bool,
+    ) -> None:
+        self.samples, self.sharpness = samples, sharpness
+        super().__init__(system, harmonics, half_turn=half_turn)
+
+    def _formulated(self) -> Sampled:
+        return new_sampled(self.balance, self.samples, self.sharpness)
+
+    def _read_off(self, problem: Balance, u: Real, omega: Real) -> Complex:
+        series = super()._read_off(problem, u, omega)
+        describe_sampled(self.problem, u, omega, series)
+        return series
 
 
 def _states(series: Complex, harmonics: NDArray[np.int64], omega: Real) -> Real:

@@ -10,6 +10,7 @@ from flipflow.kernels.balance import Balance
 from flipflow.kernels.flow import Flow
 from flipflow.kernels.gapmotion import Contact, GapMotion
 from flipflow.kernels.plan import Plan
+from flipflow.kernels.sampled import Sampled
 from flipflow.kernels.shooting import Shooting
 
 MOST_SEGMENTS = 600
@@ -142,4 +143,17 @@ def new_balance(plan: Plan, harmonics: int, *, half_turn: bool, length: float) -
         force_slope=np.zeros((kept.size, m), np.complex128),
         walk=np.pi if half_turn else 2.0 * np.pi,
         length=length,
+    )
+
+
+def new_sampled(balance: Balance, samples: int, sharpness: float) -> Sampled:
+    """The same with the smooth law sampled at fixed times."""
+    m, most = balance.integral.shape
+    return Sampled(
+        balance=balance,
+        turn=np.exp(2j * np.pi * np.arange(samples) / samples),
+        stiffness=np.zeros((m, most), np.complex128),
+        damping=np.zeros((m, most), np.complex128),
+        beyond=np.zeros(m, np.int64),
+        sharpness=float(sharpness),
     )

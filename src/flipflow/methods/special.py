@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -55,13 +56,17 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Test:
-    """One test function: its values at the branch points and anywhere between."""
+    """One test function: its values at the branch points and anywhere between.
+
+    ``suspects`` are steps without a change of sign that may hide two zeros all the same.
+    """
 
     kind: str
     values: Real
     evaluate: Callable[[Point], float]
     spring: int = -1
     side: int = 0
+    suspects: tuple[int, ...] = ()
 
 
 def find_special_points(
@@ -69,24 +74,19 @@ def find_special_points(
 ) -> tuple[list[Found], list[str]]:
     """All special points in branch order, and a sentence for each that could not be refined."""
     tests = [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]
-    found, notes = zeros_of(tests, solver, traced, _arc(traced))
+    found, notes = zeros_of(tests, solver, traced)
     if isinstance(solver, BalanceSolver):
         side = saddle_side(traced.tangent[:, -1], eigenvalues)
         return _confirmed(ExactBeside(solver, traced), found, notes, side)
     return found, notes
 
 
-def zeros_of(
-    tests: list[Test], solver: Follower, traced: Any, arc: Real | None = None
-) -> tuple[list[Found], list[str]]:
-    """Zeros of test functions in branch order, and a sentence for each that was not refined.
-
-    With the length along the branch at its points, pairs within a step are looked for by slopes.
-    """
+def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Found], list[str]]:
+    """Zeros of test functions in branch order, and a sentence for each that was not refined."""
     found: list[Found] = []
     notes: list[str] = []
     for test in tests:
-        for p, low, high in _brackets(solver, traced, test, arc, notes):
+        for p, low, high in _brackets(solver, traced, test, notes):
             try:
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
@@ -154,10 +154,12 @@ def _map_tests(
     solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
 ) -> list[Test]:
     fold = traced.tangent[:, -1] / traced.course.omega_step
+    flips = determinant_plus(maps)
+    hidden = partial(_plunges, arc=_arc(traced), signature=traced.signature)
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
-        Test(FOLD, fold, lambda point: point.omega_tangent),
-        Test(kind, determinant_plus(maps), _minus_one_test),
+        Test(FOLD, fold, lambda point: point.omega_tangent, suspects=hidden(fold)),
+        Test(kind, flips, _minus_one_test, suspects=hidden(flips)),
         Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
     ]
 
@@ -184,15 +186,13 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
 
 
 def _brackets(
-    solver: Follower, traced: Any, test: Test, arc: Real | None, notes: list[str]
+    solver: Follower, traced: Any, test: Test, notes: list[str]
 ) -> list[tuple[int, float, float]]:
     """Steps (p, low share, high share) within which the test changes sign."""
     values = test.values
     sign = np.sign(values)
     brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
-    suspects: list[tuple[int, ...]] = [(p - 1, p) for p in _dips(values)]
-    if arc is not None and test.kind in (FOLD, SYMMETRY, DOUBLING):
-        suspects += [(p,) for p in _plunges(values, arc, traced.signature)]
+    suspects = [*((p - 1, p) for p in _dips(values)), *((p,) for p in test.suspects)]
     settled: set[int] = set()
     for steps in suspects:
         for start in steps:
@@ -210,7 +210,7 @@ def _brackets(
     return brackets
 
 
-def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> list[int]:
+def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> tuple[int, ...]:
     """Steps with contact and no change of sign which the slope at one end carries the test across.
 
     A motion without contact has the eigenvalues of the linear machine, all within the circle.
@@ -221,7 +221,7 @@ def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> list[int]
     ahead, behind = first + slope[:-2] * step, last - slope[2:] * step
     over = (first * last > 0.0) & ((ahead * first < 0.0) | (behind * last < 0.0))
     touches = (signature[1:-2] != 0) | (signature[2:-1] != 0)
-    return [int(p) + 1 for p in np.flatnonzero(over & touches)]
+    return tuple(int(p) + 1 for p in np.flatnonzero(over & touches))
 
 
 def _arc(traced: Traced) -> Real:

@@ -59,7 +59,7 @@ def saddle_side(omega_tangent: Real, eigenvalues: Complex) -> NDArray[np.bool_]:
 def beyond_where_rising(omega_tangent: Real, eigenvalues: Complex) -> bool:
     """Whether an odd number of real eigenvalues lies beyond +1 where the branch rises in omega.
 
-    Read off the first motion.
+    Read off the first motion: the number changes by one where d omega / ds changes sign.
     """
     if eigenvalues.shape[0] == 0:
         return False

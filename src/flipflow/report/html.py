@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.errors import MissingExtra, StoreError
 from flipflow.figures.plotly import START, element, library
+from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
 
 TEMPLATES = "templates"
@@ -36,10 +38,20 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
     StoreError
         When the file cannot be written.
     """
+    return write_page(html(assessment), path)
+
+
+def write_page(text: str, path: str | os.PathLike[str]) -> Path:
+    """Write a page to a file.
+
+    Raises
+    ------
+    StoreError
+        When the file cannot be written.
+    """
     target = Path(path)
-    page = html(assessment)
     try:
-        target.write_text(page, encoding="utf-8")
+        target.write_text(text, encoding="utf-8")
     except OSError as error:
         raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
     return target
@@ -47,6 +59,31 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
 
 def html(assessment: Assessment) -> str:
     """The report as text."""
+    return page(
+        blocks_of(assessment),
+        title=assessment.project.document.name or assessment.project.name,
+        kind="vibration report",
+        footer=f"flipflow {assessment.version}, input {assessment.input_hash}",
+    )
+
+
+def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
+    """Blocks as one self-contained HTML page.
+
+    Parameters
+    ----------
+    blocks
+        What stands on it.
+    title, kind
+        Name of the page, and what it is; the latter stands small behind a title block's title.
+    footer
+        At the foot of every printed sheet.
+
+    Raises
+    ------
+    MissingExtra
+        When jinja2 is not installed.
+    """
     try:
         import jinja2  # noqa: PLC0415  an extra
     except ImportError as error:
@@ -59,10 +96,10 @@ def html(assessment: Assessment) -> str:
         undefined=jinja2.StrictUndefined,
     )
     return environment.get_template("report.html").render(
-        blocks=blocks_of(assessment),
-        title=assessment.project.document.name or assessment.project.name,
-        version=assessment.version,
-        input_hash=assessment.input_hash,
+        blocks=blocks,
+        title=title,
+        kind=kind,
+        footer=footer,
         style=_template("report.css"),
         library=library(),
         start=START,

@@ -267,29 +267,41 @@ class Branch:
         """The motion of largest amplitude on the branch, refined between its points."""
         if self.omega.size == 0:
             raise IncompleteError(f"the branch has no points: {self.status.value}")
-        values = self.amplitude(which)
-        top = int(values.argmax())
-        best = SpecialPoint("peak", self.orbit(top), float(top))
+        return self._refined(which, int(self.amplitude(which).argmax()), "peak")
+
+    def peaks(self, which: Coordinate) -> tuple[SpecialPoint, ...]:
+        """Every resonance peak: local maxima of the amplitude in branch order, refined."""
+        tops = _inner_maxima(self.amplitude(which))
+        return tuple(self._refined(which, int(top), "peak") for top in tops)
+
+    def troughs(self, which: Coordinate) -> tuple[SpecialPoint, ...]:
+        """Every local minimum of the amplitude in branch order, refined: antiresonances."""
+        feet = _inner_maxima(-self.amplitude(which))
+        return tuple(self._refined(which, int(foot), "trough") for foot in feet)
+
+    def _refined(self, which: Coordinate, top: int, kind: str) -> SpecialPoint:
+        """The peak or trough near point ``top``, searched in the steps on both sides of it."""
+        sign = -1.0 if kind == "peak" else 1.0
+        vector = self.system.coordinate(which)[None]
+        best = SpecialPoint(kind, self.orbit(top), float(top))
         for p in (top - 1, top):
-            if not 0 <= p < values.size - 1:
+            if not 0 <= p < self.omega.size - 1:
                 continue
 
-            def fall(share: float, p: int = p) -> float:
+            def rise(share: float, p: int = p) -> float:
                 point = self.solver.between(self.traced, p, share)
-                low, high, _ = self.solver.extremes(
-                    point.u[None], np.array([point.omega]), self.system.coordinate(which)[None]
-                )
-                return float(low[0, 0] - high[0, 0])
+                low, high, _ = self.solver.extremes(point.u[None], np.array([point.omega]), vector)
+                return sign * float(high[0, 0] - low[0, 0])
 
             share = float(
                 minimize_scalar(
-                    fall, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
+                    rise, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
                 ).x
             )
             point = self.solver.between(self.traced, p, share)
             orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
-            if orbit.amplitude(which) > best.amplitude(which):
-                best = SpecialPoint("peak", orbit, p + share)
+            if sign * orbit.amplitude(which) < sign * best.amplitude(which):
+                best = SpecialPoint(kind, orbit, p + share)
         return best
 
     def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
@@ -302,3 +314,9 @@ class Branch:
     @cached_property
     def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real, NDArray[np.complex128]]]:
         return {}
+
+
+def _inner_maxima(values: Real) -> NDArray[np.intp]:
+    """Indices of local maxima, ends left out."""
+    inner = (values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])
+    return np.flatnonzero(inner) + 1

@@ -14,7 +14,12 @@ from typing import Any
 import numpy as np
 
 from flipflow.errors import StoreError
-from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
+from flipflow.methods.options import (
+    HarmonicBalance,
+    Method,
+    PiecewiseExact,
+    SampledHarmonicBalance,
+)
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
@@ -24,12 +29,13 @@ from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
 
 Document = dict[str, Any]
-METHODS: Mapping[str, type[PiecewiseExact | HarmonicBalance]] = {
+METHODS: Mapping[str, type[Method]] = {
     "PiecewiseExact": PiecewiseExact,
     "HarmonicBalance": HarmonicBalance,
+    "SampledHarmonicBalance": SampledHarmonicBalance,
 }
-BRANCH, ORBIT = "flipflow/branch/1", "flipflow/orbit/1"
-FIELD_BRANCH, BASINS = "flipflow/field-branch/1", "flipflow/basins/1"
+BRANCH, ORBIT, BASINS = "flipflow/branch/1", "flipflow/orbit/1", "flipflow/basins/1"
+FIELD_BRANCH = "flipflow/field-branch/1"
 
 
 def plain(value: object) -> Any:

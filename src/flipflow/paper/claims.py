@@ -1,0 +1,150 @@
+"""What the paper says, and how a statement is decided by computed numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Generic, TypeVar
+
+Data = TypeVar("Data")
+AGREEMENT = 0.02
+
+
+class Verdict(StrEnum):
+    """What became of a claim."""
+
+    HOLDS = "holds"
+    IN_PART = "holds in part"
+    FAILS = "does not hold"
+    UNDECIDED = "cannot be decided"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A computed number in the unit the paper uses; None where there is none."""
+
+    value: float | None
+    unit: str = ""
+
+
+Numbers = Mapping[str, Number]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One thing a claim says; ``answer`` is None where it cannot be decided."""
+
+    what: str
+    answer: bool | None
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The verdict on a claim, the numbers it rests on, and a sentence on where it holds."""
+
+    verdict: Verdict
+    numbers: Numbers = field(default_factory=dict)
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Claim(Generic[Data]):
+    """A statement of the paper.
+
+    Parameters
+    ----------
+    id
+        Its number in the list of claims, for example "M1".
+    where
+        Place in the paper.
+    statement
+        What is claimed, in a sentence.
+    evaluate
+        From what a figure computed to the verdict.
+    """
+
+    id: str
+    where: str
+    statement: str
+    evaluate: Callable[[Data], Evaluation]
+
+
+@dataclass(frozen=True)
+class DecidedClaim:
+    """A claim with its evaluation on one machine."""
+
+    claim: Claim[Any]
+    figure: str
+    evaluation: Evaluation
+
+    def document(self) -> dict[str, Any]:
+        """JSON types: id, verdict, statement, numbers, and where in paper and range."""
+        return {
+            "id": self.claim.id,
+            "verdict": str(self.evaluation.verdict),
+            "statement": self.claim.statement,
+            "where": self.claim.where,
+            "figure": self.figure,
+            "holds_where": self.evaluation.where,
+            "numbers": {
+                name: {"value": _finite(one.value), "unit": one.unit}
+                for name, one in self.evaluation.numbers.items()
+            },
+        }
+
+
+def decide(parts: Sequence[Part], numbers: Numbers | None = None) -> Evaluation:
+    """The verdict on a claim from its parts: all, some or none of them hold.
+
+    Parts that cannot be decided count only where nothing else is known.
+    """
+    known = [part for part in parts if part.answer is not None]
+    if not known:
+        verdict = Verdict.UNDECIDED
+    elif all(part.answer for part in known):
+        verdict = Verdict.HOLDS if len(known) == len(parts) else Verdict.IN_PART
+    else:
+        verdict = Verdict.IN_PART if any(part.answer for part in known) else Verdict.FAILS
+    return Evaluation(verdict, numbers or {}, _where(parts, verdict))
+
+
+def undecided(missing: str) -> Evaluation:
+    """A claim that cannot be decided; ``missing`` says what it would take."""
+    return Evaluation(Verdict.UNDECIDED, {}, f"Missing: {missing}.")
+
+
+def agrees(computed: float, published: float, digits: int) -> bool:
+    """Whether a number is the published one: it rounds to it, or differs by less than 2 %.
+
+    Parameters
+    ----------
+    computed, published
+        In the same unit.
+    digits
+        Digits of the published number behind the decimal point.
+    """
+    rounding = 0.5 * 10.0**-digits
+    return abs(computed - published) <= max(rounding, AGREEMENT * abs(published))
+
+
+def _where(parts: Sequence[Part], verdict: Verdict) -> str:
+    if verdict is Verdict.HOLDS or len(parts) == 1:
+        return ""
+    words = {True: "Holds", False: "Does not hold", None: "Cannot be decided"}
+    groups = {answer: [p.what for p in parts if p.answer is answer] for answer in words}
+    return " ".join(f"{words[key]}: {'; '.join(found)}." for key, found in groups.items() if found)
+
+
+def runs(labels: Sequence[str], answers: Sequence[bool | None]) -> Iterator[Part]:
+    """Steps between labelled values, one fewer than labels; equal neighbours become one part."""
+    start = 0
+    for k, answer in enumerate(answers):
+        if k + 1 == len(answers) or answers[k + 1] is not answer:
+            yield Part(f"{labels[start]} to {labels[k + 1]}", answer)
+            start = k + 1
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

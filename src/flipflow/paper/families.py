@@ -1,0 +1,136 @@
+"""The paper's parameter studies: families of machines, their pictures and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from flipflow.analyses.response_family import ResponseFamily, response_family
+from flipflow.figures.family import family_figure
+from flipflow.figures.parts import Figure
+from flipflow.io.units import shown
+from flipflow.methods.options import HarmonicBalance
+from flipflow.model.fields import FIELD
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.paper.claims import Claim
+from flipflow.paper.figure import PaperFigure
+from flipflow.paper.trends import FamilyPair
+from flipflow.report.blocks import Column, Table, cells
+from flipflow.report.numbers import NOTHING, quantity
+
+HARMONICS = 3
+WHOLE = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
+SHOWN = (0.7, 0.9, 1.0, 1.1, 1.3)
+RISING = (0.7, 0.8, 0.9, 1.0)
+NO_RANGE = "The paper's text gives no range; 0.7 to 1.3 times the nominal value is taken."
+COLUMNS = (
+    ("first_peak_omega", "First peak", "rad/s"),
+    ("first_peak_main", "main frame", "mm"),
+    ("second_peak_omega", "Second peak", "rad/s"),
+    ("second_peak_main", "main frame", "mm"),
+    ("relative_peak", "Relative peak", "mm"),
+    ("omega_cs", "w_cs", "rad/s"),
+    ("omega_lb", "w_lb", "rad/s"),
+    ("omega_ub", "w_ub", "rad/s"),
+    ("lower", "Region from", "rad/s"),
+    ("upper", "to", "rad/s"),
+    ("relative_at_middle", "Relative amplitude", "mm"),
+)
+
+
+@dataclass(frozen=True)
+class FamilyPlan:
+    """Which field is varied: multiples of ``base``, or of 1 mm where that is None.
+
+    Parameters
+    ----------
+    field
+        What is varied.
+    factors, drawn
+        Multiples that are computed, and those that the figure shows.
+    base
+        Field whose nominal value the factors multiply.
+    note
+        Said below the figure.
+    """
+
+    field: str
+    factors: tuple[float, ...]
+    drawn: tuple[float, ...]
+    base: str | None
+    note: str = ""
+
+    def compute(self, screen: FlipFlowScreen) -> FamilyPair:
+        """Both methods over one interval."""
+        unit = 1e-3 if self.base is None else float(getattr(screen, self.base))
+        vary = {self.field: [factor * unit for factor in self.factors]}
+        exact = response_family(screen, vary)
+        balance = response_family(screen, vary, method=HarmonicBalance(HARMONICS))
+        drawn = tuple(k for k, f in enumerate(self.factors) if f in self.drawn)
+        return FamilyPair(exact, balance, tuple(map(self.label, self.factors)), drawn)
+
+    def label(self, factor: float) -> str:
+        """A value as the paper writes it: "2 mm", "0.7 m1"."""
+        if self.base is None:
+            return f"{factor:g} mm"
+        return f"{factor:g} {FIELD[self.base].symbol}"
+
+
+def family_paper_figure(
+    name: str,
+    title: str,
+    plan: FamilyPlan,
+    claims: Sequence[Claim[FamilyPair]],
+    draw: Callable[[FamilyPair], Figure] | None = None,
+) -> PaperFigure[FamilyPair]:
+    """A figure of amplitudes over frequency for several values of one field."""
+
+    def drawn(pair: FamilyPair) -> Figure:
+        return draw_family(pair, title, plan.note)
+
+    return PaperFigure(name, title, plan.compute, draw or drawn, tuple(claims), family_tables)
+
+
+def draw_family(pair: FamilyPair, title: str, note: str = "") -> Figure:
+    """Both frames and the relative motion; harmonic balance beneath."""
+    return family_figure(
+        _chosen(pair.exact, pair), labels=[pair.labels[k] for k in pair.drawn],
+        beneath=_chosen(pair.balance, pair), title=title, note=note,
+    )  # fmt: skip
+
+
+def family_tables(pair: FamilyPair) -> tuple[Table, ...]:
+    """Peaks, folds and region of every member."""
+    table = pair.exact.table()
+    symbol = FIELD[pair.exact.field].symbol
+    columns = (Column(symbol), *(Column(title, unit, numeric=True) for _, title, unit in COLUMNS))
+    rows = []
+    for k, label in enumerate(pair.labels):
+        words = [
+            quantity(_number(table[key][k]), unit, _si(unit), with_unit=False)
+            for key, _, unit in COLUMNS
+        ]
+        failure = table["failure"][k]
+        rows.append(cells(f"{label}: {failure}" if failure else label, *words))
+    field = FIELD[pair.exact.field]
+    nominal = shown(getattr(pair.exact.screen, field.name), field.file_unit, field.unit)
+    region = pair.exact.common_region
+    middle = NOTHING if region is None else f"{sum(region) / 2.0:.4g} rad/s"
+    caption = (
+        f"Exact solution; nominal {symbol} = {nominal}. The relative amplitude is that at "
+        f"{middle}, in the middle of the region that all rows share. A row without folds has its "
+        "region up to the peak of the relative motion."
+    )
+    return (Table("Peaks, folds and operating region", columns, tuple(rows), caption),)
+
+
+def _chosen(family: ResponseFamily, pair: FamilyPair) -> ResponseFamily:
+    return ResponseFamily(family.screen, family.field, tuple(family.members[k] for k in pair.drawn))
+
+
+def _number(value: float | str | None) -> float | None:
+    return value if isinstance(value, float) else None
+
+
+def _si(unit: str) -> str:
+    return "m" if unit == "mm" else unit

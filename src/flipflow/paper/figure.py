@@ -1,0 +1,48 @@
+"""What every figure of the paper is here: how it is computed, drawn, and what it claims."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from flipflow.figures.parts import Figure
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.paper.claims import Claim
+from flipflow.report.blocks import Table
+
+Data = TypeVar("Data")
+
+
+def no_tables(_data: object) -> tuple[Table, ...]:
+    """For figures without tables."""
+    return ()
+
+
+@dataclass(frozen=True)
+class PaperFigure(Generic[Data]):
+    """A figure of the paper.
+
+    Parameters
+    ----------
+    name
+        "figure-08"; files and the command line use it.
+    title
+        What it shows.
+    compute
+        From the machine to the data that picture, tables and claims share.
+    draw, tables
+        From the data to the neutral figure and to tables for the page.
+    claims
+        What the paper says of it.
+    needs_stop
+        Whether it is about the machine with stop.
+    """
+
+    name: str
+    title: str
+    compute: Callable[[FlipFlowScreen], Data]
+    draw: Callable[[Data], Figure]
+    claims: tuple[Claim[Data], ...]
+    tables: Callable[[Data], tuple[Table, ...]] = no_tables
+    needs_stop: bool = True

@@ -1,0 +1,54 @@
+"""The figures of the paper that can be reproduced, by name. A new one is a module and a line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flipflow.errors import InputError
+from flipflow.paper import (
+    figure_02c,
+    figure_04,
+    figure_07,
+    figure_08,
+    figure_12,
+    figure_13,
+    figure_14,
+    figure_15,
+    figure_16,
+    figure_17,
+    figure_18,
+    figure_19,
+    figure_20,
+    figure_21,
+)
+from flipflow.paper.figure import PaperFigure
+
+MODULES = (
+    figure_02c, figure_04, figure_07, figure_08, figure_12, figure_13, figure_14, figure_15,
+    figure_16, figure_17, figure_18, figure_19, figure_20, figure_21,
+)  # fmt: skip
+FIGURES: Mapping[str, PaperFigure[Any]] = {m.FIGURE.name: m.FIGURE for m in MODULES}
+
+
+def chosen(names: tuple[str, ...]) -> tuple[PaperFigure[Any], ...]:
+    """Figures by name, each once, in the paper's order; all where none is named.
+
+    ``figure-08``, ``08`` and ``8`` mean the same.
+
+    Raises
+    ------
+    InputError
+        For a name that is not known.
+    """
+    short = {_short(name): name for name in FIGURES}
+    wanted = set()
+    for name in names:
+        if _short(name) not in short:
+            raise InputError("FIGURE", name, f"choose from {', '.join(FIGURES)}")
+        wanted.add(short[_short(name)])
+    return tuple(one for name, one in FIGURES.items() if name in wanted or not names)
+
+
+def _short(name: str) -> str:
+    return name.lower().removeprefix("figure-").lstrip("0")

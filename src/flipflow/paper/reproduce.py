@@ -1,0 +1,127 @@
+"""``flipflow.reproduce``: the paper's figures computed, drawn, and every claim decided."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flipflow import __version__
+from flipflow.errors import IncompleteError, InputError
+from flipflow.figures.parts import Figure
+from flipflow.io.project import load
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.paper.claims import DecidedClaim, Evaluation, Verdict, undecided
+from flipflow.paper.figure import PaperFigure
+from flipflow.paper.registry import chosen
+from flipflow.report.blocks import Table
+from flipflow.results.document import machine_document, plain
+
+Monitor = Callable[[str, float], None]
+SCHEMA = "flipflow/claims/1"
+PAPER = "Lin, Wang, Xu, Zuo, Liang, Minerals 2024, 14, 406"
+MACHINE = "ffs0827"
+
+
+@dataclass(frozen=True, eq=False)
+class ReproducedFigure:
+    """One figure of the paper: picture, tables, claims.
+
+    Parameters
+    ----------
+    name, title
+        "figure-08", and what it shows.
+    figure
+        None where it could not be computed; ``failure`` says why.
+    """
+
+    name: str
+    title: str
+    figure: Figure | None
+    tables: tuple[Table, ...]
+    claims: tuple[DecidedClaim, ...]
+    failure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """Figures and claims of the paper on one machine; returned by :func:`flipflow.reproduce`."""
+
+    screen: FlipFlowScreen
+    figures: tuple[ReproducedFigure, ...]
+
+    @property
+    def claims(self) -> tuple[DecidedClaim, ...]:
+        """Every claim with its verdict, in the paper's order."""
+        return tuple(claim for figure in self.figures for claim in figure.claims)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many claims have each verdict."""
+        found = Counter(claim.evaluation.verdict for claim in self.claims)
+        return {str(verdict): found[verdict] for verdict in Verdict}
+
+    def document(self) -> dict[str, Any]:
+        """The claims as JSON types."""
+        return {
+            "schema": SCHEMA,
+            "version": __version__,
+            "paper": PAPER,
+            "machine": plain(machine_document(self.screen)),
+            "claims": [claim.document() for claim in self.claims],
+            "counts": self.counts,
+        }
+
+
+def reproduce(
+    screen: FlipFlowScreen | None = None,
+    figures: Sequence[str] = (),
+    monitor: Monitor | None = None,
+) -> Reproduction:
+    """Compute the figures of the paper and decide its claims by the numbers found.
+
+    Parameters
+    ----------
+    screen
+        The machine; the paper's, FFS0827, where none is given. Another machine has other
+        verdicts: nothing is written down but the paper's own numbers.
+    figures
+        Names such as "figure-08"; all where none is given.
+    monitor
+        Called with a sentence and the share done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        For an unknown figure, and for anything but a screen.
+    """
+    machine = load(MACHINE) if screen is None else screen
+    if not isinstance(machine, FlipFlowScreen):
+        raise InputError("screen", type(machine).__name__, "give a FlipFlowScreen")
+    say = monitor or (lambda _sentence, _share: None)
+    wanted = chosen(tuple(figures))
+    made = []
+    for k, one in enumerate(wanted):
+        say(one.name, k / len(wanted))
+        made.append(_reproduced(one, machine))
+    say("done", 1.0)
+    return Reproduction(machine, tuple(made))
+
+
+def _reproduced(one: PaperFigure[Any], screen: FlipFlowScreen) -> ReproducedFigure:
+    if one.needs_stop and not screen.has_stop:
+        return _without(one, "a machine with stop")
+    try:
+        data = one.compute(screen)
+        picture, tables = one.draw(data), one.tables(data)
+        claims = tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims)
+    except IncompleteError as error:
+        return _without(one, f"a branch to its end ({error})")
+    return ReproducedFigure(one.name, one.title, picture, tables, claims)
+
+
+def _without(one: PaperFigure[Any], missing: str) -> ReproducedFigure:
+    evaluation: Evaluation = undecided(missing)
+    claims = tuple(DecidedClaim(claim, one.name, evaluation) for claim in one.claims)
+    return ReproducedFigure(one.name, one.title, None, (), claims, f"It needs {missing}.")
