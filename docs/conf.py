@@ -40,7 +40,7 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_in_temp = True
 nb_merge_streams = True
-nb_execution_timeout = 150
+nb_execution_timeout = 600  # the first cell to need a kernel compiles it
 nb_ipywidgets_js = {}
 
 # The public face.
