@@ -22,7 +22,8 @@ def section_figure(section: Section) -> Figure:
         panels.append(Panel(Axis(label(which), "mm"), Axis("velocity", "m/s"), (points,)))
     caption = (
         f"{section.states.shape[0]} turns, a point whenever the unbalance points along +x. A "
-        "motion that repeats after n turns shows n points, one that never repeats shows closed curves."
+        "motion that repeats after n turns shows n points, one that never repeats "
+        "shows closed curves."
     )
     columns = min(len(panels), 3)
     return Figure("Poincare section", caption, tuple(panels), columns=columns, height=260)
