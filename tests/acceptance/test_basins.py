@@ -114,6 +114,15 @@ def test_motions_of_several_periods_are_found_by_the_lanes():
         assert np.abs(states - end).max(axis=1).min() < 1e-7
 
 
+def test_motion_of_three_periods_beside_one_that_newton_reaches_first(screen):
+    """FFS0827 at 446 rad/s: from every start Newton over one turn also finds the common motion."""
+    x = np.linspace(-0.02, 0.02, 7)
+    here = ff.basins(screen, 446.0, {"relative": x}, {"relative": 446.0 * x})
+    assert sorted(orbit.periods for orbit in here.orbits) == [1, 3]
+    assert here.unsettled == 0.0
+    assert here.shares.min() > 0.3
+
+
 @pytest.mark.parametrize(
     ("given", "state"),
     [

@@ -225,6 +225,9 @@ def test_detached_branch_of_three_periods(screen, subharmonic) -> None:
         for orbit in orbits:
             end = integrate.flow(machine, orbit.state, omega, 0.0, orbit.period).final
             close("DOP853 after three turns", end[:2], orbit.state[:2], abs=1e-9)
+    for orbit in branch.orbits_at(low + 0.01):
+        again = ff.continue_orbit(orbit, "omega", (300.0, 600.0))
+        assert kinds(again) == ["fold", "fold"], "closed by the strand beside the first motion"
     inside = ff.continue_orbit(subharmonic, "omega", (350.0, 541.0))
     assert inside.status.complete
     close("its fold", inside.folds[0].omega, low, abs=1e-8)

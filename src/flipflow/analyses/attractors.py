@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.periodic_orbits import periodic_orbits
+from flipflow.analyses.periodic_orbits import MOST_PERIODS, periodic_orbits
 from flipflow.kernels import status
 from flipflow.kernels.lanes import NOT_SETTLED
 from flipflow.methods.capture import capture_of
@@ -17,7 +17,6 @@ from flipflow.methods.solver import Point, Real
 from flipflow.model.system import Machine, system_of
 from flipflow.results.orbit import Orbit
 
-MOST_PERIODS = 4
 TRIED_STATES = 16
 FIRST_SHARE = 64
 
@@ -128,8 +127,8 @@ class Attractors:
         ends = run.states[_unsettled(run)]
         before = len(self.orbits)
         for z in ends[:: max(ends.shape[0] // TRIED_STATES, 1)]:
-            point = next(self._stable_near(z), None)
-            if point is not None:
+            # Newton over one turn may reach a motion far from z that is known: all are tried.
+            for point in self._stable_near(z):
                 self.add(point)
         return len(self.orbits) > before
 

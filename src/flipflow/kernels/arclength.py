@@ -314,7 +314,10 @@ def trace(
         branch.iterations[p] = iterations
         distance = from_start(work, branch)
         travelled = max(travelled, distance)
-        ended = arrival(branch, course, p, ends, travelled > AWAY and distance < BACK * step)
+        # Beside a fold the other strand passes the first point, too, with omega the other way.
+        same_way = branch.tangent[p, n] * branch.tangent[0, n] > 0.0
+        back = travelled > AWAY and distance < BACK * step and same_way
+        ended = arrival(branch, course, p, ends, back)
         if ended != status.OK:
             return ended, p + 1
         if p > 0 and iterations <= NEWTON_FEW:
