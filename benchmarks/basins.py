@@ -11,7 +11,7 @@ import statistics
 import time
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy_flow import carried
 
 import flipflow as ff
 from flipflow.analyses.attractors import Attractors
@@ -40,52 +40,6 @@ def ours(screen, cells, threads, runs):
     return statistics.median(seconds), found
 
 
-def right_hand_side(system, side):
-    (spring,) = system.springs
-    inverse, edge = np.linalg.inv(system.M), side * spring.gaps[0]
-
-    def rate(t, z):
-        x, v = z[:2], z[2:]
-        force = (system.excitation.vector * OMEGA**2 * np.exp(1j * OMEGA * t)).real
-        force = force - system.C @ v - system.K @ x
-        if side:
-            depth, speed = spring.direction @ x - edge, spring.direction @ v
-            force -= spring.direction * (spring.stiffness * depth + spring.damping * speed)
-        return np.concatenate([v, inverse @ force])
-
-    return rate
-
-
-def events(spring, side):
-    """Where the gaps are met: outwards when the stop is open, inwards when it is engaged."""
-    made = []
-    for sign in (1, -1) if side == 0 else (side,):
-
-        def gap(_t, z, sign=sign):
-            return sign * (spring.direction @ z[:2]) - spring.gaps[0]
-
-        gap.terminal, gap.direction = True, 1.0 if side == 0 else -1.0
-        made.append(gap)
-    return made
-
-
-def peer_state(system, z, turns):
-    """The state after a number of turns, by solve_ivp."""
-    (spring,) = system.springs
-    y = spring.direction @ z[:2]
-    side = int(np.sign(y)) if abs(y) > spring.gaps[0] else 0
-    t, end = 0.0, turns * 2.0 * np.pi / OMEGA
-    while t < end:
-        met = events(spring, side)
-        done = solve_ivp(
-            right_hand_side(system, side), (t, end), z, "DOP853", rtol=RTOL, atol=ATOL, events=met
-        )
-        t, z = done.t[-1], done.y[:, -1]
-        if done.status == 1:
-            side = int(np.sign(spring.direction @ z[:2])) if side == 0 else 0
-    return z
-
-
 def peer(screen, found):
     """Seconds a cell of solve_ivp, and whether it is nearest to the motion of our label."""
     system = screen.system()
@@ -96,7 +50,8 @@ def peer(screen, found):
     for i, j in rng.integers(0, x.size, (PEER_CELLS, 2)):
         turns += int(found.turns[i, j])
         start = time.perf_counter()
-        end = peer_state(system, np.array([0.0, -x[i], 0.0, -v[j]]), int(found.turns[i, j]))
+        begin = np.array([0.0, -x[i], 0.0, -v[j]])
+        end = carried(system, begin, OMEGA, int(found.turns[i, j]), RTOL, ATOL)
         seconds.append(time.perf_counter() - start)
         away = [np.abs((end - orbit.state) / scale).max() for orbit in found.orbits]
         agree += int(np.argmin(away) == found.labels[i, j])

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 from one_core import stay_on_one_core
-from scipy.integrate import solve_ivp
+from scipy_flow import carried
 
 import flipflow as ff
 from flipflow.methods.exact import ExactSolver
@@ -39,40 +39,9 @@ def stepped(system, start, setting):
 
 
 def by_scipy(system, start, tolerance):
-    """The same by solve_ivp, each smooth piece ended by a terminal event."""
-    M, C, K, force = system.M, system.C, system.K, system.excitation.vector.real * OMEGA**2
-    stop = system.springs[0]
-    inverse, d, e = np.linalg.inv(M), stop.direction, stop.clearance
-
-    def slope(t, z, side):
-        x, v = z[:2], z[2:]
-        f = force * np.cos(OMEGA * t) - C @ v - K @ x
-        if side:
-            f = f - d * (stop.stiffness * (d @ x - side * e) + stop.damping * (d @ v))
-        return np.concatenate([v, inverse @ f])
-
-    def crossing(level, direction):
-        def gap(_t, z, _side):
-            return d @ z[:2] - level
-
-        gap.terminal, gap.direction = True, direction
-        return gap
-
-    t, end, z = 0.0, TURNS * TURN, start
-    y = d @ z[:2]
-    side = float(np.sign(y)) if abs(y) > e else 0.0
-    while t < end:
-        watched = [crossing(side * e, -side)] if side else [crossing(e, 1.0), crossing(-e, -1.0)]
-        scale = np.array([1.0, 1.0, OMEGA, OMEGA])
-        piece = solve_ivp(
-            slope, (t, end), z, "DOP853", events=watched, args=(side,),
-            rtol=tolerance, atol=6e-3 * tolerance * scale,
-        )  # fmt: skip
-        t, z = piece.t[-1], piece.y[:, -1]
-        if piece.status == 1:
-            fired = [bool(times.size) for times in piece.t_events]
-            side = 0.0 if side else (1.0 if fired[0] else -1.0)
-    return z[:2]
+    """The same by solve_ivp."""
+    atol = 6e-3 * tolerance * np.array([1.0, 1.0, OMEGA, OMEGA])
+    return carried(system, start, OMEGA, TURNS, tolerance, atol)[:2]
 
 
 def cheapest(call, ladder, exact, target, runs):

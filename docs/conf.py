@@ -53,7 +53,9 @@ napoleon_attr_annotations = False
 html_theme = "pydata_sphinx_theme"
 html_title = "flipflow"
 html_static_path = ["_static"]
-html_sidebars = {page: [] for page in ("index", "conventions", "why-exact", "coexistence", "tutorials/*")}
+html_sidebars = {
+    page: [] for page in ("index", "conventions", "why-exact", "coexistence", "tutorials/*")
+}
 html_css_files = ["flipflow.css"]
 html_copy_source = False
 html_show_sourcelink = False

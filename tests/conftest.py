@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Callable
 
 import pytest
 
 import flipflow as ff
+from flipflow.cli.main import main
 from flipflow.results.branch import Branch
 
 LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
@@ -38,3 +40,24 @@ def response(screen: ff.FlipFlowScreen) -> Callable[..., Branch]:
 def exact(response: Callable[..., Branch]) -> Branch:
     """The exact branch of FFS0827, 5 to 250 rad/s."""
     return response()
+
+
+@pytest.fixture
+def command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
+    """``command("sweep", "ffs0827", ...)``: exit code, stdout and stderr, in this process."""
+
+    def call(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setenv("COLUMNS", "80")
+        monkeypatch.setattr(sys, "argv", ["flipflow", *map(str, words)])
+        try:
+            main()
+            code = 0
+        except SystemExit as ended:
+            code = ended.code or 0
+        told = capsys.readouterr()
+        assert "Traceback" not in told.err
+        return code, told.out, told.err
+
+    return call

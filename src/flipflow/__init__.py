@@ -31,6 +31,8 @@ _HOME = {
     "simulate": "flipflow.analyses.simulate",
     "sweep": "flipflow.analyses.sweep",
     "ramp": "flipflow.analyses.ramp",
+    "poincare_section": "flipflow.analyses.section",
+    "spectrum": "flipflow.analyses.section",
     "sensitivity": "flipflow.analyses.sensitivity",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
@@ -75,6 +77,8 @@ if TYPE_CHECKING:
     from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.analyses.ramp import ramp as ramp
     from flipflow.analyses.response_family import response_family as response_family
+    from flipflow.analyses.section import poincare_section as poincare_section
+    from flipflow.analyses.section import spectrum as spectrum
     from flipflow.analyses.sensitivity import sensitivity as sensitivity
     from flipflow.analyses.simulate import simulate as simulate
     from flipflow.analyses.startup import coast_down as coast_down

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 import time
 
 import numpy as np
@@ -16,7 +15,6 @@ import flipflow as ff
 from flipflow.analyses.feasible import working_motion
 from flipflow.analyses.linear_motions import LINEAR
 from flipflow.analyses.quantities import QUANTITIES
-from flipflow.cli.main import main
 from flipflow.errors import Cancelled, InputError, StoreError
 from flipflow.figures.sensitivity import tornado_figure
 from flipflow.report import summary
@@ -389,87 +387,6 @@ def test_figures_and_blocks(tmp_path, figure_3, with_stop):
         tornado_figure(over)
     (block,) = tornado(with_stop)
     assert block.figure.title == "Sensitivity of relative amplitude at 1146 rpm"
-
-
-def run(monkeypatch, *words):
-    monkeypatch.setattr(sys, "argv", ["flipflow", "sensitivity", *map(str, words)])
-    try:
-        main()
-    except SystemExit as ended:
-        return ended.code or 0
-    return 0
-
-
-def test_command(monkeypatch, capsys, tmp_path):
-    words = (
-        "ffs0827", "--vary", "clearance=5.4 mm..6.6 mm", "--vary", "frames.floating_mass=+-5 %",
-        "--vary", "shear_stiffness=2700 kN/m +/- 90 kN/m", "--speed", "1100 rpm", "--n", "16",
-        "--json", tmp_path / "s.json", "-o", tmp_path / "out",
-    )  # fmt: skip
-    assert run(monkeypatch, *words) == 0
-    out = capsys.readouterr().out
-    assert max(map(len, out.replace(str(tmp_path), "").splitlines())) <= 80
-    rows = [line for line in out.splitlines() if line.startswith(("clear", "float", "shear"))]
-    assert rows[0].startswith("clearance")
-    assert len(rows) == 3
-    names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["results.json", "sensitivity.html", "tornado.html"]
-    result = ff.open_result(tmp_path / "s.json")
-    assert result.names == ("clearance", "floating_mass", "shear_stiffness")
-    assert result.ends[1] == pytest.approx((294.5, 325.5))
-    assert result.distributions[2] == ff.Normal(2.7e6, 9e4)
-
-
-def test_command_over_speeds_and_for_whole_responses(monkeypatch, capsys):
-    words = ("ffs0827-linear", "--vary", "floating_mass=+-5 %", "--n", "16", "--json", "-")
-    assert run(monkeypatch, *words, "--speeds", "300 rpm", "1000 rpm") == 0
-    document = json.loads(capsys.readouterr().out)
-    assert len(document["omega"]) == len(document["total"]) == 100
-    assert run(monkeypatch, *words, "--quantity", "omega_ar") == 0
-    assert json.loads(capsys.readouterr().out)["interval"] is True
-    assert run(monkeypatch, *words[:-2], "--speeds", "300 rpm", "1000 rpm") == 0
-    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ((), ("--vary", "left out")),
-        (("--vary", "clearance"), ("--vary", "5.4 mm..6.6 mm")),
-        (("--vary", "clearance=5.4 mm"), ("--vary", "5.4 mm..6.6 mm")),
-        (("--vary", "clearance=5,4 mm..6 mm"), ("--vary clearance", "no commas")),
-        (("--vary", "clearance=5.4..6.6"), ("--vary clearance", "unit")),
-        (("--vary", "clearance=6 mm..5 mm"), ("clearance", "reversed")),
-        (("--vary", "clearence=5 mm..6 mm"), ("'clearence'", "'clearance'")),
-        (("--vary", "clearance=+-500 %"), ("between 0 % and 100 %",)),
-        (("--vary", "clearance_minus=+-5 %"), ("no value to vary about",)),
-        (("--vary", "clearance=+-5%", "--vary", "clearance=+-5%"), ("twice",)),
-        (("--vary", "clearance=+-5%", "--quantity", "size"), ("quantity", "'size'")),
-        (("--vary", "clearance=+-5%", "--n", "1"), ("n = 1", "from 2")),
-        (("--vary", "clearance=+-5%", "--seed", "-1"), ("rng = -1",)),
-        (("--vary", "clearance=+-5%", "--speed", "850"), ("--speed", "unit")),
-        (("--vary", "clearance=+-5%", "--speeds", "9 Hz", "5 Hz"), ("reversed",)),
-        (("--vary", "clearance=+-5%", "--speed", "9 Hz", "--speeds", "5 Hz", "9 Hz"), ("--speed",)),
-        (("--vary", "clearance=+-5%", "--branch", "middle"), ("branch", "from-below")),
-    ],
-)
-def test_bad_words_at_the_command(monkeypatch, capsys, options, words):
-    assert run(monkeypatch, "ffs0827", *options) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert captured.err.startswith("Error: ")
-    for word in words:
-        assert word in captured.err
-
-
-def test_command_is_cancelled_without_a_traceback(monkeypatch, capsys):
-    def interrupted(*_args, **_options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("flipflow.analyses.sensitivity.sensitivity", interrupted)
-    assert run(monkeypatch, "ffs0827", "--vary", "clearance=+-5%") == 130
-    assert "Traceback" not in capsys.readouterr().err
 
 
 def test_summary_is_what_the_section_says(capsys, with_stop):

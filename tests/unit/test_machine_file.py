@@ -225,7 +225,12 @@ def _toml(tables):
     return "\n".join(lines)
 
 
-ANY_FILE = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+# No deadline: the first file read also imports pint and pydantic.
+ANY_FILE = settings(
+    max_examples=100,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 
 
 @ANY_FILE

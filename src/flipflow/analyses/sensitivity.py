@@ -26,7 +26,7 @@ from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.sobol import LEAST_GROUPS, SobolIndices, saltelli_sample, sobol_indices
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Variation, Vary, variations
-from flipflow.results.sensitivity import Sensitivity
+from flipflow.results.sensitivity import OneAtATime, Sensitivity
 
 Real = NDArray[np.float64]
 N_MOST = 2**20
@@ -120,6 +120,45 @@ def sensitivity(
     rows = _ends(machine, varied)
     ends = np.concatenate(list(_values(question, rows, nominal, workers, None)), axis=1)
     return _result(question, varied, groups, found, failed, nominal, ends, omega)
+
+
+def one_at_a_time(
+    machine: FlipFlowScreen,
+    vary: Vary,
+    quantity: str,
+    omega: float,
+    *,
+    branch: BranchWord = "from-below",
+) -> OneAtATime:
+    """Move each field alone to the ends of its range: what a tornado chart shows.
+
+    Parameters
+    ----------
+    machine, vary, quantity, branch
+        As for :func:`sensitivity`.
+    omega
+        One frequency in rad/s.
+
+    Raises
+    ------
+    InputError
+        As for :func:`sensitivity`.
+    """
+    question = _question(machine, quantity, omega, branch)
+    varied = variations(vary, machine)
+    nominal = _nominal(question)
+    rows = _ends(machine, varied)
+    ends = np.concatenate(list(_values(question, rows, nominal, 1, None)), axis=1)[:, 0]
+    return OneAtATime(
+        screen=machine,
+        quantity=quantity,
+        names=tuple(variation.name for variation in varied),
+        distributions=tuple(variation.distribution for variation in varied),
+        omega=float(omega),
+        nominal=float(nominal[0, 0]),
+        at_low=ends[: len(varied)],
+        at_high=ends[len(varied) :],
+    )
 
 
 def _question(machine: object, name: str, omega: object, branch: BranchWord) -> Question:

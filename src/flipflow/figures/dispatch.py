@@ -20,6 +20,7 @@ from flipflow.figures.loading import loading_figure
 from flipflow.figures.motion import orbit_figure
 from flipflow.figures.parts import Figure
 from flipflow.figures.response import branch_figure, cases_figure, linear_figure
+from flipflow.figures.section import section_figure, spectrum_figure
 from flipflow.figures.sensitivity import sensitivity_figure
 from flipflow.figures.sweep import sweep_figure
 from flipflow.figures.transient import run_up_figure
@@ -29,6 +30,7 @@ from flipflow.results.field_branch import FieldBranch
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
 from flipflow.results.run_up import RunUp
+from flipflow.results.section import Section, Spectrum
 from flipflow.results.sensitivity import Sensitivity
 from flipflow.results.sweep import Sweep
 
@@ -126,3 +128,13 @@ def _(result: ResponseFamily) -> Figure:
 @figure.register
 def _(result: Basins) -> Figure:
     return basins_figure(result)
+
+
+@figure.register
+def _(result: Section) -> Figure:
+    return section_figure(result)
+
+
+@figure.register
+def _(result: Spectrum) -> Figure:
+    return spectrum_figure(result)

@@ -14,7 +14,7 @@ from flipflow.figures.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.figures.parts import Axis, Bar, Figure, Line, Panel, Trace
 from flipflow.figures.scales import DEGREES, HZ, KN, MM, RPM
 from flipflow.model.fields import FIELD
-from flipflow.results.sensitivity import Sensitivity
+from flipflow.results.sensitivity import OneAtATime, Sensitivity
 
 Real = NDArray[np.float64]
 SHOWN: Mapping[str, float] = {
@@ -43,7 +43,7 @@ def sensitivity_figure(result: Sensitivity) -> Figure:
     return Figure(_title(result, None), caption, (indices, changes), height=230 + 64 * rows)
 
 
-def tornado_figure(result: Sensitivity, omega: float | None = None) -> Figure:
+def tornado_figure(result: Sensitivity | OneAtATime, omega: float | None = None) -> Figure:
     """Signed change of the quantity with each field at the low and the high end of its range.
 
     Parameters
@@ -71,7 +71,7 @@ def index_order(result: Sensitivity) -> list[int]:
     return [int(i) for i in np.argsort(-total.max(axis=0), kind="stable")]
 
 
-def changes(result: Sensitivity, at: int | None) -> tuple[Real, Real]:
+def changes(result: Sensitivity | OneAtATime, at: int | None) -> tuple[Real, Real]:
     """Change at the low and the high end of each field, (D,) each, in the quantity's shown unit."""
     scale = SHOWN[REGISTRY[result.quantity].shown_unit]
     pick = slice(None) if at is None else at
@@ -135,7 +135,7 @@ def _index_panel(result: Sensitivity) -> Panel:
     )  # fmt: skip
 
 
-def _tornado_panel(result: Sensitivity, at: int | None) -> Panel:
+def _tornado_panel(result: Sensitivity | OneAtATime, at: int | None) -> Panel:
     quantity = REGISTRY[result.quantity]
     ends = np.stack(changes(result, at))
     order = [int(i) for i in np.argsort(-np.nan_to_num(np.abs(ends)).max(axis=0), kind="stable")]
@@ -159,13 +159,13 @@ def _tornado_bars(ends: Real, order: list[int]) -> Iterator[Bar]:
                           HATCHES[k], rank == 0)  # fmt: skip
 
 
-def _rows(result: Sensitivity, order: list[int]) -> Axis:
+def _rows(result: Sensitivity | OneAtATime, order: list[int]) -> Axis:
     last = len(order) - 1
     ticks = tuple((float(last - rank), _row(result, i)) for rank, i in enumerate(order))
     return Axis("", "", (-0.6, last + 0.6), ticks)
 
 
-def _row(result: Sensitivity, i: int) -> str:
+def _row(result: Sensitivity | OneAtATime, i: int) -> str:
     """The field, and how far its ends lie from the machine's own value."""
     nominal, name = getattr(result.screen, result.names[i]), _name(result.names[i])
     ends = result.ends[i]
@@ -179,7 +179,7 @@ def _name(field: str) -> str:
     return FIELD[field].symbol if field in FIELD else field
 
 
-def _title(result: Sensitivity, at: int | None) -> str:
+def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:
     label = REGISTRY[result.quantity].label
     if isinstance(result.omega, float):
         return f"Sensitivity of {label} at {result.omega * RPM:.4g} rpm"
@@ -192,7 +192,7 @@ def _one_at_a_time() -> str:
     return "change of the quantity when one field alone moves to the low or high end of its range."
 
 
-def _place(result: Sensitivity, omega: float | None) -> int | None:
+def _place(result: Sensitivity | OneAtATime, omega: float | None) -> int | None:
     """Index of the frequency; None where there is but one."""
     if not result.over_frequency:
         return None

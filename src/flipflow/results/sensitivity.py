@@ -100,6 +100,36 @@ class Sensitivity:
         return tuple(distribution.ends for distribution in self.distributions)
 
 
+@dataclass(frozen=True, eq=False)
+class OneAtATime:
+    """A quantity with one field at a time at the ends of its range, all else as it is.
+
+    Parameters
+    ----------
+    screen, quantity, names, distributions, omega, nominal, at_low, at_high
+        As in :class:`Sensitivity`, at one frequency in rad/s.
+    """
+
+    screen: FlipFlowScreen
+    quantity: str
+    names: tuple[str, ...]
+    distributions: tuple[Distribution, ...]
+    omega: float
+    nominal: float
+    at_low: Real
+    at_high: Real
+
+    @property
+    def over_frequency(self) -> bool:
+        """Whether there is more than one frequency: there is not."""
+        return False
+
+    @property
+    def ends(self) -> tuple[tuple[object, object], ...]:
+        """Low and high end of each field's range."""
+        return tuple(distribution.ends for distribution in self.distributions)
+
+
 ARRAYS = (
     "first_order", "total", "first_order_confidence", "total_confidence", "mean", "variance",
     "failed", "nominal", "at_low", "at_high",
