@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.frequency_response import first_unknowns
-from flipflow.analyses.operating_region import Monitor
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.sweep import check_count
 from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.settle import Settling
