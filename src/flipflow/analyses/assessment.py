@@ -19,6 +19,7 @@ from flipflow.analyses.operating_region import (
     operating_region,
 )
 from flipflow.analyses.quantities import QUANTITIES, Working
+from flipflow.analyses.transients import Transients, transients
 from flipflow.methods.options import Method, PiecewiseExact
 from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.project import Project
@@ -129,6 +130,8 @@ class Assessment:
         Every limit with its worst case.
     verdict
         One sentence.
+    transients
+        Start, coast-down and jump risk of the empty machine; None without a working speed.
     notes
         What was not checked or not finished.
     method, version, input_hash
@@ -141,6 +144,7 @@ class Assessment:
     omega: float | None
     limits_table: tuple[LimitRow, ...]
     verdict: str
+    transients: Transients | None
     notes: tuple[str, ...]
     method: Method
     version: str
@@ -185,6 +189,7 @@ def assess(
         omega=project.speed,
         limits_table=rows,
         verdict=verdict(project.speed, rows, cases, region),
+        transients=None if project.speed is None else transients(project, project.speed),
         notes=(*project.warnings, *region.notes, *coexisting(cases)),
         method=method or PiecewiseExact(),
         version=__version__,

@@ -124,17 +124,13 @@ class _Search:
 
 def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[Real]:
     """Rest, the motion from below, two-touch motions, stepped speeds, and a cloud of states."""
-    from scipy.stats import qmc  # noqa: PLC0415  slow to import, and few ask for all motions
-
     solver = settling.solver
     n = solver.system.size
     X = np.abs(solver.builder.contact_free(np.array([omega]))[0])
     gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
     size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
     box = np.concatenate([size, omega * size])
-    cloud = (
-        qmc.Sobol(2 * n, rng=rng).random(STARTS) if solver.builder.springs else np.zeros((0, 2 * n))
-    )
+    cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
     starts = [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
     if TwoEventProblem.applies(solver.builder):
         starts += list(TwoEventProblem(solver.builder).states(omega)[0])
@@ -144,6 +140,17 @@ def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[
             z = solver.section(z, float(speed), SETTLING_TURNS)[-1]
         starts.append(z)
     return starts
+
+
+def _spread(count: int, size: int, rng: np.random.Generator) -> Real:
+    """A Kronecker sequence from a random point on: (count, size) in [0, 1), evenly spread.
+
+    Its steps are powers of 1 / g with g^(size + 1) = g + 1, after Roberts.
+    """
+    # Kept apart from scipy.stats, whose import takes half a second of every report.
+    g = float(max(np.roots([1.0, *[0.0] * (size - 1), -1.0, -1.0]).real))
+    step = g ** -np.arange(1.0, size + 1.0)
+    return np.mod(rng.random(size) + np.outer(np.arange(count), step), 1.0)
 
 
 def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:

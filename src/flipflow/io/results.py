@@ -15,8 +15,10 @@ import numpy as np
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import basins_from, branch_from
+from flipflow.analyses.transients import Transients
 from flipflow.errors import InputError, StoreError
-from flipflow.io.run_up import run_up_document
+from flipflow.io.jump_risk import risk_document
+from flipflow.io.run_up import run_up_document, run_up_summary
 from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.document import (
@@ -170,7 +172,21 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
             }
             for case in assessment.cases
         ],
+        "transients": _transients(assessment.transients),
         "notes": list(assessment.notes),
+    }
+
+
+def _transients(found: Transients | None) -> dict[str, Any] | None:
+    """Start, coast-down and jump risk of the empty machine; null without a working speed."""
+    if found is None:
+        return None
+    runs = {"start": found.start, "coast_down": found.coast_down}
+    return {
+        "drive_assumed": found.assumed,
+        **{name: None if run is None else run_up_summary(run) for name, run in runs.items()},
+        "jump_risk": None if found.jump is None else risk_document(found.jump),
+        "reasons": dict(found.reasons),
     }
 
 
