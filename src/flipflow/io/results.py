@@ -36,6 +36,7 @@ from flipflow.results.orbit import Orbit
 from flipflow.results.run_up import RunUp
 from flipflow.results.sensitivity import (
     SENSITIVITY,
+    OneAtATime,
     Sensitivity,
     sensitivity_document,
     sensitivity_from,
@@ -173,6 +174,7 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
             for case in assessment.cases
         ],
         "transients": _transients(assessment.transients),
+        "tornado": None if assessment.tornado is None else _tornado_document(assessment.tornado),
         "notes": list(assessment.notes),
     }
 
@@ -188,6 +190,11 @@ def _transients(found: Transients | None) -> dict[str, Any] | None:
         "jump_risk": None if found.jump is None else risk_document(found.jump),
         "reasons": dict(found.reasons),
     }
+
+
+def _tornado_document(result: OneAtATime) -> dict[str, Any]:
+    fields = ("quantity", "names", "ends", "omega", "nominal", "at_low", "at_high")
+    return {name: plain(getattr(result, name)) for name in fields}
 
 
 def branch_table(branch: Branch) -> xarray.Dataset:
