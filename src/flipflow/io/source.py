@@ -64,13 +64,17 @@ def read_source(name_or_path: str | os.PathLike[str]) -> Source:
         When there is no such file, or it is a folder, empty, too large, not UTF-8 or not TOML.
     """
     if isinstance(name_or_path, str) and name_or_path in bundled_names():
-        text = (_machines() / f"{name_or_path}.toml").read_text(encoding="utf-8")
-        return Source(tomllib.loads(text), name_or_path, None)
+        return Source(tomllib.loads(bundled_text(name_or_path)), name_or_path, None)
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise InputError("machine file", name_or_path, "give a bundled name or a path")
     path = Path(name_or_path)
     text = _decoded(path, _content(path))
     return Source(_tables(path, text), path.stem, path)
+
+
+def bundled_text(name: str) -> str:
+    """The file of a bundled machine as it stands, comments included."""
+    return (_machines() / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def _machines() -> Traversable:
