@@ -65,42 +65,75 @@ def periodic_orbits(
         For a frequency that is not finite or not above 0, or periods outside 1 to 6.
     """
     check_count("max_periods", max_periods, MOST_PERIODS)
-    number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
-    if not (number and math.isfinite(omega) and omega > 0.0):
-        raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    search = _Search(machine, float(omega), max_periods)
+    search = _Search(machine, _checked(omega), max_periods)
     starts = _starts(search.settling, search.omega, np.random.default_rng(rng))
+    if TwoEventProblem.applies(search.settling.solver.builder):
+        starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
     for k, start in enumerate(starts):
         search.try_from(start)
         if monitor is not None:
             monitor(f"{len(search.found)} motions found", (k + 1) / len(starts))
-    orbits = [Orbit(machine, point) for point in search.found]
-    which = _first_gap(search.settling.solver.system)
-    return tuple(sorted(orbits, key=lambda o: (-_reach(o, which), -o.state @ which)))
+    return search.orbits()
+
+
+def attracting_orbits(
+    machine: Machine, omega: float, rng: int | np.random.Generator = 0
+) -> tuple[Orbit, ...]:
+    """Stable motions of one forcing period to which a cloud of states settles.
+
+    Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
+    """
+    search = _Search(machine, _checked(omega), 1)
+    for start in _starts(search.settling, search.omega, np.random.default_rng(rng)):
+        search.try_settled(start)
+    return tuple(orbit for orbit in search.orbits() if orbit.stable)
+
+
+def _checked(omega: object) -> float:
+    number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
+    if not (number and math.isfinite(omega) and omega > 0.0):
+        raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
+    return float(omega)  # type: ignore[arg-type]
 
 
 class _Search:
     """The motions found so far at one frequency."""
 
     def __init__(self, machine: Machine, omega: float, max_periods: int) -> None:
+        self.machine = machine
         self.settling = Settling(system_of(machine), max_periods)
         self.omega, self.max_periods = omega, max_periods
         self.found: list[Point] = []
 
     def try_from(self, start: Real) -> None:
         """Newton from a state and from where it settles to, for every number of periods."""
-        solver = self.settling.solver
         try:
-            settled = solver.section(start, self.omega, SETTLING_TURNS)[-1]
+            settled = self.settling.solver.section(start, self.omega, SETTLING_TURNS)[-1]
         except IncompleteError:
             return
-        for z in (start, settled):
-            for periods in range(1, self.max_periods + 1):
-                point = self.settling.solver_of(periods).solve(z, self.omega)
-                if point is not None and self.settling.shortest(point) is point:
-                    self._keep(point)
-                    if solver.system.symmetric:
-                        self._keep(self._mirrored(point))
+        self._try(start)
+        self._try(settled)
+
+    def try_settled(self, start: Real) -> None:
+        """Newton from where a state settles to."""
+        try:
+            self._try(self.settling.solver.section(start, self.omega, SETTLING_TURNS)[-1])
+        except IncompleteError:
+            return
+
+    def orbits(self) -> tuple[Orbit, ...]:
+        """What was found, largest motion at the first gap first."""
+        which = _first_gap(self.settling.solver.system)
+        found = [Orbit(self.machine, point) for point in self.found]
+        return tuple(sorted(found, key=lambda o: (-_reach(o, which), -o.state @ which)))
+
+    def _try(self, z: Real) -> None:
+        for periods in range(1, self.max_periods + 1):
+            point = self.settling.solver_of(periods).solve(z, self.omega)
+            if point is not None and self.settling.shortest(point) is point:
+                self._keep(point)
+                if self.settling.solver.system.symmetric:
+                    self._keep(self._mirrored(point))
 
     def _keep(self, point: Point) -> None:
         """Add a motion unless it is known, in whatever phase."""
@@ -123,7 +156,7 @@ class _Search:
 
 
 def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[Real]:
-    """Rest, the motion from below, two-touch motions, stepped speeds, and a cloud of states."""
+    """Rest, the motion from below, stepped speeds, and a cloud of states."""
     solver = settling.solver
     n = solver.system.size
     X = np.abs(solver.builder.contact_free(np.array([omega]))[0])
@@ -132,8 +165,6 @@ def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[
     box = np.concatenate([size, omega * size])
     cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
     starts = [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
-    if TwoEventProblem.applies(solver.builder):
-        starts += list(TwoEventProblem(solver.builder).states(omega)[0])
     for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO):
         z = np.zeros(2 * n)
         for speed in np.geomspace(ratio * omega, omega, SWEEP_STEPS):

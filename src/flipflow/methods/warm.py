@@ -21,7 +21,6 @@ from flipflow.methods.exact import ExactSolver
 from flipflow.methods.lanes import Lanes
 from flipflow.methods.solver import STEP_SHARE
 from flipflow.methods.time_stepping import Stepper
-from flipflow.methods.two_event import TwoEventProblem
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.elements import ClearanceSpring, Unbalance
 from flipflow.model.system import MechanicalSystem
@@ -86,10 +85,6 @@ def _strobe_part() -> None:
     _small_solver().section(np.zeros(2), 1.0, 1)
 
 
-def _two_event_part() -> None:
-    TwoEventProblem(_small_solver().builder).states(1.0)
-
-
 def _start_up_part() -> None:
     profile = SpeedProfile((0.0, 1.0), (1.0, 1.0))
     for _ in Stepper(_small_solver().system, profile, np.zeros(2), fastest=1.0).run(1.0):
@@ -106,7 +101,7 @@ def _small_solver() -> ExactSolver:
 # Two parts, for two processors, that take about equally long; within a part what several kernels
 # call is compiled once.
 PARTS: dict[str, tuple[Callable[[], None], ...]] = {
-    "branches": (_trace_part, _two_event_part),
+    "branches": (_trace_part,),
     "runs": (_observe_part, _strobe_part, _lanes_part, _start_up_part),
 }
 
