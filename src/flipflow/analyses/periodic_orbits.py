@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import first_unknowns
+from flipflow.analyses.frequency_response import OMEGA_MOST, first_unknowns
 from flipflow.analyses.operating_region import Monitor
 from flipflow.analyses.sweep import check_count
 from flipflow.errors import IncompleteError, InputError
@@ -68,6 +68,8 @@ def periodic_orbits(
     number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
     if not (number and math.isfinite(omega) and omega > 0.0):
         raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
+    if omega > OMEGA_MOST:
+        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
     search = _Search(machine, float(omega), max_periods)
     starts = _starts(search.settling, search.omega, np.random.default_rng(rng))
     for k, start in enumerate(starts):
