@@ -95,8 +95,6 @@ def _content(path: Path) -> bytes:
     try:
         _check_kind(path, path.stat())
         return path.read_bytes()
-    except InputError:
-        raise
     except FileNotFoundError:
         raise InputError("machine file", str(path), _missing(path)) from None
     except InputError:
