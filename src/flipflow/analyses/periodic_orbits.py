@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import first_unknowns
+from flipflow.analyses.frequency_response import OMEGA_MOST, first_unknowns
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.sweep import check_count
 from flipflow.errors import IncompleteError, InputError
@@ -90,10 +90,11 @@ def attracting_orbits(
 
 
 def _checked(omega: object) -> float:
-    number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
-    if not (number and math.isfinite(omega) and omega > 0.0):
+    if isinstance(omega, bool) or not isinstance(omega, (int, float)) or not math.isfinite(omega):
         raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    return float(omega)  # type: ignore[arg-type]
+    if not 0.0 < omega <= OMEGA_MOST:
+        raise InputError("omega", omega, f"give a frequency above 0 and up to {OMEGA_MOST:g} rad/s")
+    return float(omega)
 
 
 class _Search:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.analyses.frequency_response import OMEGA_MOST
 from flipflow.analyses.monitor import Monitor
 from flipflow.errors import InputError
 from flipflow.methods.settle import MOST_TURNS, Settled, Settling
@@ -91,6 +92,8 @@ def checked_speeds(omega: ArrayLike) -> Real:
         raise InputError("omega", omega, "give at least one frequency in rad/s, in one row")
     if not (np.isfinite(speeds).all() and (speeds > 0.0).all()):
         raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
+    if speeds.max() > OMEGA_MOST:
+        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
     return speeds
 
 

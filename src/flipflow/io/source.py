@@ -81,24 +81,28 @@ def _machines() -> Traversable:
     return importlib.resources.files("flipflow.io") / "machines"
 
 
+def _check_kind(path: Path, status: os.stat_result) -> None:
+    """Refuse what is no file of a machine's size."""
+    if stat.S_ISDIR(status.st_mode):
+        raise InputError("machine file", str(path), "this is a folder, name the .toml file in it")
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError("machine file", str(path), "this is not a file, give a .toml file")
+    if status.st_size > LARGEST:
+        raise InputError(
+            "machine file", str(path),
+            f"it has {status.st_size / 1e6:.3g} MB, give a machine file of at most 1 MB",
+        )  # fmt: skip
+
+
 def _content(path: Path) -> bytes:
     """Read the file, but look at its kind and size before."""
     try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError(
-                "machine file", str(path), "this is a folder, name the .toml file in it"
-            )
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError("machine file", str(path), "this is not a file, give a .toml file")
-        if status.st_size > LARGEST:
-            raise InputError(
-                "machine file", str(path),
-                f"it has {status.st_size / 1e6:.3g} MB, give a machine file of at most 1 MB",
-            )  # fmt: skip
+        _check_kind(path, path.stat())
         return path.read_bytes()
     except FileNotFoundError:
         raise InputError("machine file", str(path), _missing(path)) from None
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(
