@@ -17,9 +17,13 @@ from flipflow.model.system import MechanicalSystem
 
 
 class BalanceSolver(Solver):
-    """Unknowns: the Fourier coefficients of the motion at the gaps."""
+    """Unknowns: the Fourier coefficients of the motion at the gaps.
+
+    ``confirmed``: special points that no exact motion shows are notes, not special points.
+    """
 
     reads_jacobian = False
+    confirmed = True
 
     def __init__(self, system: MechanicalSystem, harmonics: int, *, half_turn: bool) -> None:
         self.order = harmonics
@@ -141,8 +145,11 @@ class SampledSolver(BalanceSolver):
     """The same unknowns, with the smooth contact law sampled at fixed times.
 
     What is read off a motion besides its displacements is exact: the contacts of its series, and
-    the return maps of the exact flow beside it.
+    the return maps of the exact flow beside it. Its false special points stay: to show them is
+    what it is kept for.
     """
+
+    confirmed = False
 
     def __init__(
         self,
