@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 RPM = 30.0 / math.pi
 
-FILE_HELP = "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without)."
+FILE_HELP = (
+    "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without), rig-lin2024 "
+    "(a two-mass rig)."
+)
 
 File = Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)]
 Speed = Annotated[
