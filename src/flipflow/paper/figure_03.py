@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -61,7 +62,7 @@ class Indices:
     def has_rank(self, name: str, rank: int) -> list[bool]:
         """Where exactly ``rank`` other parameters have a higher total index."""
         higher = np.sum(self.result.total > self.total(name)[:, None], axis=1)
-        return (higher == rank).tolist()
+        return [bool(one) for one in higher == rank]
 
 
 def compute(screen: FlipFlowScreen) -> Indices:
@@ -150,7 +151,7 @@ def _bands(data: Indices) -> Iterator[tuple[str, NDArray[np.bool_]]]:
     if data.w_ea is None or data.w_ar is None or not data.w01 < data.w_ea < data.w_ar < data.w02:
         return
     ends = (("w01", data.w01), ("w_ea", data.w_ea), ("w_ar", data.w_ar), ("w02", data.w02))
-    for (low, start), (high, end) in zip(ends[:-1], ends[1:], strict=True):
+    for (low, start), (high, end) in itertools.pairwise(ends):
         yield f"{low} to {high}", (data.omega >= start) & (data.omega <= end)
 
 

@@ -59,7 +59,8 @@ def compute(_screen: FlipFlowScreen) -> RigResponse:
         raise IncompleteError("The rig's file has no speed.")
     steps = np.arange(-BELOW, ABOVE + 1)
     rising = sweep(project.screen, BEFORE_UP[0] + STEP * steps)
-    falling = sweep(project.screen, BEFORE_DOWN[0] + STEP * steps[::-1])
+    shift = round((BEFORE_UP[0] - BEFORE_DOWN[0]) / STEP)
+    falling = sweep(project.screen, BEFORE_DOWN[0] + STEP * (steps[::-1] + shift))
     branch = frequency_response(project.screen, (LOW, HIGH))
     return RigResponse(branch, rising, falling, project.speed)
 
