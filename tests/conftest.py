@@ -8,6 +8,7 @@ from collections.abc import Callable
 import pytest
 
 import flipflow as ff
+from flipflow.paper.reproduce import Reproduction
 from flipflow.results.branch import Branch
 
 LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
@@ -38,3 +39,9 @@ def response(screen: ff.FlipFlowScreen) -> Callable[..., Branch]:
 def exact(response: Callable[..., Branch]) -> Branch:
     """The exact branch of FFS0827, 5 to 250 rad/s."""
     return response()
+
+
+@pytest.fixture(scope="session")
+def reproduction() -> Reproduction:
+    """All figures and claims of the paper on its own machine."""
+    return ff.reproduce()

@@ -38,11 +38,6 @@ CLAIMS = [
 
 
 @pytest.fixture(scope="module")
-def reproduction():
-    return ff.reproduce()
-
-
-@pytest.fixture(scope="module")
 def stiffened(screen):
     return ff.loading(screen, ff.Load(stiffness_factor=1.3))
 

@@ -195,11 +195,11 @@ def _only(jumps: tuple[Jump, ...], fold: float | None) -> bool:
 
 
 def _jump_numbers(jumps: tuple[Jump, ...], fold: float | None, name: str) -> dict[str, Number]:
-    first = jumps[0] if jumps else None
+    before, after = (jumps[0].omega_before, jumps[0].omega_after) if jumps else (None, None)
     return {
         f"fold by balance, speed {name}": Number(fold, "rad/s"),
-        f"before the jump, speed {name}": Number(first and first.omega_before, "rad/s"),
-        f"after, speed {name}": Number(first and first.omega_after, "rad/s"),
+        f"before the jump, speed {name}": Number(before, "rad/s"),
+        f"after, speed {name}": Number(after, "rad/s"),
     }
 
 
