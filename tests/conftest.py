@@ -10,6 +10,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.cli.main import main
+from flipflow.paper.reproduce import Reproduction
 from flipflow.results.branch import Branch
 
 LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
@@ -61,3 +62,9 @@ def command(
         return code, told.out, told.err
 
     return call
+
+
+@pytest.fixture(scope="session")
+def reproduction() -> Reproduction:
+    """All figures and claims of the paper on its own machine."""
+    return ff.reproduce()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 import flipflow as ff
@@ -110,3 +111,13 @@ def test_without_a_working_speed_nothing_is_checked(project):
 def assess_drive(project):
     """The drive that is assumed for the machine."""
     return ff.start_up(project.screen, speed=project.speed).drive
+
+
+def test_the_report_shows_what_moves_the_amplitude(assessment):
+    """The tornado chart: at 850 rpm the gap of FFS0827 moves its amplitude most."""
+    found = assessment.tornado
+    widest = int(np.argmax(np.abs(found.at_high - found.nominal)))
+    assert found.names[widest] == "clearance"
+    assert found.at_low[widest] < found.nominal < found.at_high[widest]
+    titles = [b.figure.title for b in blocks_of(assessment) if isinstance(b, FigureBlock)]
+    assert "Sensitivity of relative amplitude at 850 rpm" in titles

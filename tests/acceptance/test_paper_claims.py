@@ -26,19 +26,15 @@ from flipflow.errors import InputError
 from flipflow.paper.registry import FIGURES
 from judge import close
 
-IN_PART = {"M1", "M2", "M4", "M6", "V1g", "V9f"}
+IN_PART = {"S1", "S2", "S4", "M1", "M2", "M4", "M6", "V1g", "V9f"}
 CLAIMS = [
-    "L1", "L2", "L3", "F1", "F2", "N4", "M1", "M2", "M3", "M4", "M5", "M6",
+    "L1", "L2", "L3", "S1", "S2", "S3", "S4", "F1", "F2", "P1", "N1", "N2", "N3", "N4",
+    "M1", "M2", "M3", "M4", "M5", "M6", "R1", "R2", "R3",
     *(f"V1{c}" for c in "abcdefg"), *(f"V2{c}" for c in "abcde"), *(f"V3{c}" for c in "abcd"),
     *(f"V4{c}" for c in "abcde"), *(f"V5{c}" for c in "abc"), *(f"V6{c}" for c in "abcde"),
     *(f"V7{c}" for c in "abc"), *(f"V8{c}" for c in "ab"), *(f"V9{c}" for c in "abcdef"),
     *(f"V10{c}" for c in "abcde"),
 ]  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def reproduction():
-    return ff.reproduce()
 
 
 @pytest.fixture(scope="module")

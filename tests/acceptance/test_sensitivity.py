@@ -12,7 +12,6 @@ from rich.console import Console
 from scipy import stats
 
 import flipflow as ff
-from flipflow.analyses import assessment
 from flipflow.analyses.feasible import working_motion
 from flipflow.analyses.linear_motions import LINEAR
 from flipflow.analyses.quantities import QUANTITIES
@@ -394,14 +393,6 @@ def test_one_at_a_time_is_the_tornado_of_the_samples(with_stop):
     assert np.allclose(alone.at_low, with_stop.at_low, rtol=1e-9)
     assert np.allclose(alone.at_high, with_stop.at_high, rtol=1e-9)
     assert alone.nominal == pytest.approx(with_stop.nominal, rel=1e-9)
-
-
-def test_the_report_shows_what_moves_the_amplitude():
-    """The tornado chart: at 850 rpm the gap of FFS0827 moves its amplitude most."""
-    found = assessment.tornado(ff.load("ffs0827"), 850.0 * np.pi / 30.0)
-    widest = int(np.argmax(np.abs(found.at_high - found.nominal)))
-    assert found.names[widest] == "clearance"
-    assert found.at_low[widest] < found.nominal < found.at_high[widest]
 
 
 def test_summary_is_what_the_section_says(capsys, with_stop):

@@ -25,14 +25,14 @@ from flipflow.paper.runge_kutta import SteppedSweep, stepped_sweep
 from flipflow.paper.thrown import Thrown, thrown, thrown_panel, thrown_to_the_lower
 from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
-from flipflow.results.sweep import Sweep
+from flipflow.results.sweep import Jump, Sweep
 
 Real = NDArray[np.float64]
 TITLE = "Amplitude over frequency of the machine with stop"
 SAMPLES = 60
 SAME = 1e-6
 STEPS = 247
-EVERY = 2
+EVERY, BESIDE_FOLDS = 4, 3.0
 INSIDE = 9
 NO_FOLDS = "two folds"
 CAPTION = (
@@ -62,7 +62,7 @@ class Responses:
     settled
         Sweeps with rising and with falling speed, settled exactly.
     stepped
-        The same by Runge-Kutta, at every other speed.
+        The same by Runge-Kutta, at some of the speeds: ``rows`` of the rising sweep.
     thrown
         What a blow does between the folds; None without folds.
     """
@@ -73,7 +73,13 @@ class Responses:
     marks: Landmarks
     settled: tuple[Sweep, Sweep]
     stepped: tuple[SteppedSweep, SteppedSweep]
+    rows: NDArray[np.intp]
     thrown: Thrown | None
+
+    def settled_rows(self, way: int, which: str) -> Real:
+        """Amplitude of a sweep settled exactly (0 rising, 1 falling) where Runge-Kutta went."""
+        turned = 1 - 2 * way
+        return self.settled[way].amplitude(which)[::turned][self.rows][::turned]
 
 
 def compute(screen: FlipFlowScreen) -> Responses:
@@ -83,15 +89,23 @@ def compute(screen: FlipFlowScreen) -> Responses:
     balance = frequency_response(screen, (low, high), HarmonicBalance(3))
     marks = landmarks(screen, exact)
     omega = np.linspace(low, high, STEPS)
-    rising, falling = omega[::EVERY], omega[::EVERY][::-1]
+    rows = _rows(omega, marks)
     system = screen.system()
     blow = None
     if marks.omega_lb is not None and marks.omega_ub is not None:
         blow = thrown(screen, exact, _middle(marks.omega_lb, marks.omega_ub))
     return Responses(
         screen, exact, balance, marks, (sweep(screen, omega), sweep(screen, omega[::-1])),
-        (stepped_sweep(system, rising), stepped_sweep(system, falling)), blow,
+        (stepped_sweep(system, omega[rows]), stepped_sweep(system, omega[rows][::-1])), rows, blow,
     )  # fmt: skip
+
+
+def _rows(omega: Real, marks: Landmarks) -> NDArray[np.intp]:
+    """Every fourth speed, and all from a little below the folds to a little above them."""
+    taken = np.arange(omega.size) % EVERY == 0
+    if marks.omega_lb is not None and marks.omega_ub is not None:
+        taken |= (omega > marks.omega_lb - BESIDE_FOLDS) & (omega < marks.omega_ub + BESIDE_FOLDS)
+    return np.flatnonzero(taken)
 
 
 def _middle(low: float, high: float) -> float:
@@ -141,10 +155,11 @@ def sweeps_agree(data: Responses) -> Evaluation:
     parts: list[Part] = []
     numbers: dict[str, Number] = {}
     folds = [fold.omega for fold in data.balance.folds]
-    for name, one, settled, fold in zip(
-        ("rising", "falling"), data.stepped, data.settled,
-        (max(folds, default=None), min(folds, default=None)), strict=True,
-    ):  # fmt: skip
+    ends = max(folds, default=None), min(folds, default=None)
+    for way, (name, one, fold) in enumerate(
+        zip(("rising", "falling"), data.stepped, ends, strict=True)
+    ):
+        same = True
         for which in ("main", "relative"):
             off = _difference(one, data.balance, which)
             k = int(np.nanargmax(off))
@@ -152,10 +167,13 @@ def sweeps_agree(data: Responses) -> Evaluation:
             parts.append(Part(f"{label}: within 2 %", bool(off[k] < AGREEMENT)))
             numbers[f"greatest difference, {label}"] = Number(100.0 * float(off[k]), "%")
             numbers[f"at, {label}"] = Number(float(one.omega[k]), "rad/s")
-            exact = np.abs(one.amplitude(which) / settled.amplitude(which)[::EVERY] - 1.0).max()
+            exact = np.abs(one.amplitude(which) / data.settled_rows(way, which) - 1.0).max()
+            same = same and bool(exact < AGREEMENT)
             numbers[f"Runge-Kutta against exact sweep, {label}"] = Number(100.0 * exact, "%")
-        parts.append(Part(f"jump with speed {name} at the fold", _jumps_at(one, fold)))
-        numbers |= _jump_numbers(one, settled, fold, name)
+        # Runge-Kutta takes every speed around the folds, so it jumps where the exact sweep does.
+        jumps = data.settled[way].jumps if same else ()
+        parts.append(Part(f"speed {name}: jump at the fold of the balance", _only(jumps, fold)))
+        numbers |= _jump_numbers(jumps, fold, name)
     return decide(parts, numbers)
 
 
@@ -168,26 +186,21 @@ def _difference(one: SteppedSweep, branch: Branch, which: str) -> Real:
     return off
 
 
-def _jumps_at(one: SteppedSweep, fold: float | None) -> bool:
-    """Whether the sweep jumps in the step that holds the fold, or nowhere where there is none."""
-    if one.jump is None or fold is None:
-        return one.jump is None and fold is None
-    return min(one.jump) <= fold <= max(one.jump)
+def _only(jumps: tuple[Jump, ...], fold: float | None) -> bool:
+    """Whether the one jump is in the step that holds the fold, or both are missing."""
+    steps = [sorted((jump.omega_before, jump.omega_after)) for jump in jumps]
+    if fold is None:
+        return not steps
+    return len(steps) == 1 and steps[0][0] <= fold <= steps[0][1]
 
 
-def _jump_numbers(
-    one: SteppedSweep, settled: Sweep, fold: float | None, name: str
-) -> dict[str, Number]:
-    before, after = one.jump or (None, None)
-    numbers = {
+def _jump_numbers(jumps: tuple[Jump, ...], fold: float | None, name: str) -> dict[str, Number]:
+    before, after = (jumps[0].omega_before, jumps[0].omega_after) if jumps else (None, None)
+    return {
         f"fold by balance, speed {name}": Number(fold, "rad/s"),
-        f"Runge-Kutta before the jump, speed {name}": Number(before, "rad/s"),
+        f"before the jump, speed {name}": Number(before, "rad/s"),
         f"after, speed {name}": Number(after, "rad/s"),
     }
-    for jump in settled.jumps:
-        numbers[f"exact sweep before its jump, speed {name}"] = Number(jump.omega_before, "rad/s")
-        numbers[f"exact sweep after, speed {name}"] = Number(jump.omega_after, "rad/s")
-    return numbers
 
 
 def solutions_coexist(data: Responses) -> Evaluation:

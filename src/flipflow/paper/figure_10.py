@@ -12,7 +12,6 @@ from flipflow.analyses.sweep import sweep
 from flipflow.errors import IncompleteError
 from flipflow.figures.family import branch_traces, speed_axis_in_radians
 from flipflow.figures.parts import Axis, Figure, Line, Note, Panel, Trace
-from flipflow.figures.response import LABELS
 from flipflow.figures.scales import MM
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
@@ -59,7 +58,8 @@ def compute(_screen: FlipFlowScreen) -> RigResponse:
         raise IncompleteError("The rig's file has no speed.")
     steps = np.arange(-BELOW, ABOVE + 1)
     rising = sweep(project.screen, BEFORE_UP[0] + STEP * steps)
-    falling = sweep(project.screen, BEFORE_DOWN[0] + STEP * steps[::-1])
+    shift = round((BEFORE_UP[0] - BEFORE_DOWN[0]) / STEP)
+    falling = sweep(project.screen, BEFORE_DOWN[0] + STEP * (steps[::-1] + shift))
     branch = frequency_response(project.screen, (LOW, HIGH))
     return RigResponse(branch, rising, falling, project.speed)
 
@@ -74,8 +74,8 @@ def draw(data: RigResponse) -> Figure:
         Note(data.point_a, POINT_B - 0.16, "b", "center"),
     )
     panel = Panel(
-        speed_axis_in_radians(LOW, HIGH), Axis("amplitude", "mm", (0.0, 1.08 * top)), traces,
-        lines=lines, notes=notes, title=LABELS["relative"],
+        speed_axis_in_radians(LOW, HIGH),
+        Axis("relative amplitude (x2)", "mm", (0.0, 1.08 * top)), traces, lines=lines, notes=notes,
     )  # fmt: skip
     return Figure(TITLE, CAPTION, (panel,), height=420)
 
@@ -84,12 +84,12 @@ def _symbols(data: RigResponse) -> Iterator[Trace]:
     swept = (("rising", data.rising, "case 1", "circle-open"),
              ("falling", data.falling, "case 2", "cross"))  # fmt: skip
     for way, one, colour, symbol in swept:
-        yield Trace(f"sweep, speed {way}", one.omega, one.amplitude("relative") * MM, "point",
+        yield Trace(f"sweep, {way}", one.omega, one.amplitude("relative") * MM, "point",
                     colour, symbol=symbol)  # fmt: skip
     groups = (
-        ("published, speed rising", (BEFORE_UP, AFTER_UP), "triangle", "case 1"),
-        ("published, speed falling", (BEFORE_DOWN, AFTER_DOWN), "diamond", "case 2"),
-        ("published, points a and b", ((data.point_a, POINT_A), (data.point_a, POINT_B)), "square",
+        ("published, rising", (BEFORE_UP, AFTER_UP), "triangle", "case 1"),
+        ("published, falling", (BEFORE_DOWN, AFTER_DOWN), "diamond", "case 2"),
+        ("published, a and b", ((data.point_a, POINT_A), (data.point_a, POINT_B)), "square",
          "case 3"),
     )  # fmt: skip
     for name, points, symbol, colour in groups:

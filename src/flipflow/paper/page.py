@@ -149,9 +149,11 @@ def _numbers(one: DecidedClaim) -> str:
 def _shown(value: Number) -> str:
     if value.value is None:
         return NOTHING
+    if isinstance(value.value, int):
+        return f"{value.value} {value.unit}"
     return f"{number(value.value) if value.unit != 'rad/s' else f'{value.value:.6g}'} {value.unit}"
 
 
 def _sentence(text: str) -> str:
-    symbol = not text.split(maxsplit=1)[0].isalpha()
+    symbol = not text.split(maxsplit=1)[0].rstrip(",").replace("-", "").isalpha()
     return f"{text if symbol else text[:1].upper() + text[1:]}."

@@ -37,17 +37,6 @@ class SteppedSweep:
         """Half peak-to-peak over the last turn in m, (n,)."""
         return np.array([_amplitude(turn, which) for turn in self.turns])
 
-    @property
-    def jump(self) -> tuple[float, float] | None:
-        """Speeds before and after the largest change of the relative amplitude, if it is one.
-
-        A jump changes the amplitude by more than a quarter from one step to the next.
-        """
-        a = self.amplitude("relative")
-        change = np.abs(np.diff(np.log(a)))
-        k = int(change.argmax())
-        return (float(self.omega[k]), float(self.omega[k + 1])) if change[k] > 0.25 else None
-
 
 def stepped_sweep(system: MechanicalSystem, omega: Real) -> SteppedSweep:
     """From rest, each speed from where the one before ended, by the event-located RK4."""

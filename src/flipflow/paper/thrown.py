@@ -21,7 +21,7 @@ from flipflow.results.branch import Branch
 from flipflow.results.history import History
 
 CELLS = 60
-TURNS, BLOW_AFTER = 400, 60
+TURNS, BLOW_AFTER = 240, 60
 MORE = 1.02
 REACHED = 1e-3
 
