@@ -46,7 +46,7 @@ def figures_of_indices(result: Sensitivity) -> Iterator[Block]:
     yield FigureBlock(sensitivity_figure(result))
 
 
-@section(Assessment, Part.DETAILS, 45)
+@section(Assessment, Part.DETAILS, 80)
 def tornado(assessment: Assessment) -> Iterator[Block]:
     """What moves the amplitude most, one value of the empty machine at a time."""
     found = assessment.tornado

@@ -24,7 +24,7 @@ CANNOT_JUMP = "cannot jump: no other motion was found"
 NO_SPEED = "not checked, for the machine file gives no working speed."
 
 
-@section(Assessment, Part.DETAILS, 35, brief=True)
+@section(Assessment, Part.DETAILS, 70, brief=True)
 def start_and_stop(assessment: Assessment) -> Iterator[Block]:
     """Start, coast-down and jump risk in a line each."""
     yield Heading("Start, stop and disturbances", 1)
@@ -37,7 +37,7 @@ def start_and_stop(assessment: Assessment) -> Iterator[Block]:
     yield Text(jump_words(found), "Blows and lumps (empty):")
 
 
-@section(Assessment, Part.DETAILS, 36)
+@section(Assessment, Part.DETAILS, 71)
 def start_and_stop_details(assessment: Assessment) -> Iterator[Block]:
     """The peaks on the way with their speeds, start and coast-down over time, the assumptions."""
     found = assessment.transients
