@@ -205,7 +205,9 @@ def test_missing_file_names_what_is_bundled(run):
 
 
 def test_folder(run, tmp_path):
-    assert_one_sentence(run(tmp_path), "machine file", "folder")
+    result = run(tmp_path)
+    assert_one_sentence(result, "machine file", "folder")
+    assert result[2].count("machine file =") == 1
 
 
 @pytest.mark.parametrize("content", [b"", b" \n\t\n", b"\xef\xbb\xbf"])

@@ -12,13 +12,14 @@ from rich.console import Console
 from scipy import stats
 
 import flipflow as ff
+from flipflow.analyses import assessment
 from flipflow.analyses.feasible import working_motion
 from flipflow.analyses.linear_motions import LINEAR
 from flipflow.analyses.quantities import QUANTITIES
+from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.errors import Cancelled, InputError, StoreError
 from flipflow.figures.sensitivity import tornado_figure
 from flipflow.report import summary
-from flipflow.report.sensitivity import tornado
 
 SEVEN = (
     "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
@@ -385,8 +386,22 @@ def test_figures_and_blocks(tmp_path, figure_3, with_stop):
         figure.write(tmp_path / f"{k}.html")
     with pytest.raises(InputError, match="give a frequency"):
         tornado_figure(over)
-    (block,) = tornado(with_stop)
-    assert block.figure.title == "Sensitivity of relative amplitude at 1146 rpm"
+
+
+def test_one_at_a_time_is_the_tornado_of_the_samples(with_stop):
+    vary = dict(zip(with_stop.names, with_stop.ends, strict=True))
+    alone = one_at_a_time(with_stop.screen, vary, with_stop.quantity, with_stop.omega)
+    assert np.allclose(alone.at_low, with_stop.at_low, rtol=1e-9)
+    assert np.allclose(alone.at_high, with_stop.at_high, rtol=1e-9)
+    assert alone.nominal == pytest.approx(with_stop.nominal, rel=1e-9)
+
+
+def test_the_report_shows_what_moves_the_amplitude():
+    """The tornado chart: at 850 rpm the gap of FFS0827 moves its amplitude most."""
+    found = assessment.tornado(ff.load("ffs0827"), 850.0 * np.pi / 30.0)
+    widest = int(np.argmax(np.abs(found.at_high - found.nominal)))
+    assert found.names[widest] == "clearance"
+    assert found.at_low[widest] < found.nominal < found.at_high[widest]
 
 
 def test_summary_is_what_the_section_says(capsys, with_stop):

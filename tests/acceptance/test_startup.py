@@ -149,8 +149,11 @@ def test_a_machine_that_nothing_holds(screen):
 
 
 def test_cancelling(screen):
+    def stop(_sentence, _share):
+        raise Cancelled("stopped")
+
     with pytest.raises(Cancelled):
-        ff.start_up(screen, drive_of(screen, 1500.0), monitor=lambda _sentence, _share: False)
+        ff.start_up(screen, drive_of(screen, 1500.0), monitor=stop)
 
 
 def test_history_reads_like_an_orbit(start):

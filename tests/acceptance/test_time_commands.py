@@ -54,6 +54,10 @@ def test_simulate_says_whether_it_settled(command, tmp_path):
         (("simulate", "ffs0827", "--impulse", "1 s: main 1e99"), "impulse"),
         (("simulate", "ffs0827", "--impulse", "99 s: main 1"), "disturbances"),
         (("simulate", "nothing-there"), "nothing-there"),
+        (("simulate", "ffs0827", "--speed", "1e99 rpm"), "no screen runs above"),
+        (("orbits", "ffs0827", "--speed", "1e99 rpm"), "no screen runs above"),
+        (("basins", "ffs0827", "--speed", "1e99 rpm"), "no screen runs above"),
+        (("sweep", "ffs0827", "--speeds", "1 rpm", "1e9 rpm"), "no screen runs above"),
     ],
 )
 def test_bad_input_is_one_sentence(command, arguments, field):

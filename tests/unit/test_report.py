@@ -92,7 +92,7 @@ def test_the_report_opens_with_title_and_verdict(assessment):
     assert isinstance(blocks[0], TitleBlock)
     assert blocks[1] == Verdict(assessment.verdict, "attention")
     parts = [b.text for b in blocks if isinstance(b, Heading) and b.level == 1]
-    assert parts == ["The machine", "Results", "Appendix"]
+    assert parts == ["The machine", "Results", "Start, stop and disturbances", "Appendix"]
 
 
 def test_every_limit_stands_in_the_table_with_its_state(assessment):

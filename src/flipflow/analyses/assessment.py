@@ -19,15 +19,23 @@ from flipflow.analyses.operating_region import (
     operating_region,
 )
 from flipflow.analyses.quantities import QUANTITIES, Working
+from flipflow.analyses.sensitivity import one_at_a_time
+from flipflow.analyses.transients import Transients, transients
 from flipflow.methods.options import Method, PiecewiseExact
 from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
+from flipflow.results.sensitivity import OneAtATime
 
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
 CLOSE = 0.05
+TORNADO_SHARE = 0.05
+TORNADO_FIELDS = (
+    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
+    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
+)  # fmt: skip
 NO_LIMIT = (-math.inf, math.inf)
 
 
@@ -129,6 +137,11 @@ class Assessment:
         Every limit with its worst case.
     verdict
         One sentence.
+    tornado
+        The empty machine's relative amplitude with one field at a time 5 % lower and higher; None
+        without a working speed.
+    transients
+        Start, coast-down and jump risk of the empty machine; None without a working speed.
     notes
         What was not checked or not finished.
     method, version, input_hash
@@ -141,6 +154,8 @@ class Assessment:
     omega: float | None
     limits_table: tuple[LimitRow, ...]
     verdict: str
+    tornado: OneAtATime | None
+    transients: Transients | None
     notes: tuple[str, ...]
     method: Method
     version: str
@@ -185,11 +200,27 @@ def assess(
         omega=project.speed,
         limits_table=rows,
         verdict=verdict(project.speed, rows, cases, region),
+        tornado=None if project.speed is None else tornado(project.screen, project.speed),
+        transients=None if project.speed is None else transients(project, project.speed),
         notes=(*project.warnings, *region.notes, *coexisting(cases)),
         method=method or PiecewiseExact(),
         version=__version__,
         input_hash=input_hash(project),
     )
+
+
+def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:
+    """The relative amplitude with each value of the machine alone 5 % lower and higher.
+
+    5 % is the spread of Table 1 of the paper; what is zero, infinite or not given does not vary.
+    """
+    present = {name: getattr(screen, name) for name in TORNADO_FIELDS}
+    vary = {
+        name: ((1.0 - TORNADO_SHARE) * value, (1.0 + TORNADO_SHARE) * value)
+        for name, value in present.items()
+        if 0.0 < value < math.inf
+    }
+    return one_at_a_time(screen, vary, "relative_amplitude", omega)
 
 
 def assess_case(

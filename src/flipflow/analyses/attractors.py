@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.periodic_orbits import MOST_PERIODS, periodic_orbits
+from flipflow.analyses.periodic_orbits import MOST_PERIODS, attracting_orbits
 from flipflow.kernels import status
 from flipflow.kernels.lanes import NOT_SETTLED
 from flipflow.methods.capture import capture_of
@@ -46,14 +46,13 @@ class Attractors:
         self.machine = machine
         self.system = system_of(machine)
         self._rng = np.random.default_rng(rng)
-        found = periodic_orbits(machine, omega, rng=self._rng)
+        found = attracting_orbits(machine, omega, self._rng)
         self.lanes = Lanes(self.system, omega, threads)
         self.capture = Capture.nothing(2 * self.system.size)
         self.orbits: list[Orbit] = []
         self._settling = Settling(self.system, MOST_PERIODS)
         for orbit in found:
-            if orbit.stable:
-                self.add(orbit.point)
+            self.add(orbit.point)
 
     def add(self, point: Point) -> int | None:
         """Label of a stable motion, known or not; None where no neighbourhood of it is found."""

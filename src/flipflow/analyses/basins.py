@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flipflow.analyses.attractors import Attractors
+from flipflow.analyses.monitor import Monitor
 from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.kernels.lanes import NOT_SETTLED
@@ -18,7 +19,6 @@ from flipflow.methods.solver import Real
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.results.basins import Basins, GridAxis
 
-Monitor = Callable[[str, float], None]
 Window = Mapping[Coordinate, ArrayLike]
 Kind = Literal["displacement", "velocity"]
 MOST_CELLS = 4_000_000

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 from flipflow.analyses.continue_field import field_branch
-from flipflow.analyses.frequency_response import check_interval, described
-from flipflow.errors import InputError
+from flipflow.analyses.frequency_response import SAMPLED, check_interval, described
+from flipflow.errors import InputError, SampledContactWarning
 from flipflow.kernels import arclength
-from flipflow.methods.balance import BalanceSolver
+from flipflow.methods.balance import BalanceSolver, SampledSolver
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.options import HarmonicBalance, Method, PiecewiseExact
+from flipflow.methods.options import (
+    HarmonicBalance,
+    Method,
+    PiecewiseExact,
+    SampledHarmonicBalance,
+)
 from flipflow.methods.solver import STEP_SHARE, Point, Solver
 from flipflow.methods.special import DOUBLING, SYMMETRY
 from flipflow.methods.stability import UNDETERMINED
@@ -63,6 +69,11 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
     InputError
         For a field that is not known or has no finite value, and for an interval that is empty or
         does not hold the motion.
+
+    Warns
+    -----
+    SampledContactWarning
+        When the orbit's own method samples the contact force.
     """
     if field != "omega":
         return field_branch(orbit, field, interval, solver_like(orbit, ExactSolver))
@@ -73,6 +84,8 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
     solver = solver_like(orbit, type(orbit.point.solver))
     u = orbit.unknowns if solver is orbit.point.solver else solver.unknowns_from(orbit.motion)
     method = _method_of(solver)
+    if isinstance(solver, SampledSolver):
+        warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
     followed = follow_both_ways(solver, u, orbit.omega, _course(low, high, method))
     return _branch(orbit.machine, method, solver, followed)
 
@@ -136,6 +149,8 @@ def solver_like(orbit: Orbit, kind: type[Solver]) -> Solver:
         symmetric = distance_to(orbit.state, mirrored, orbit.omega) < SYMMETRIC
     if isinstance(own, kind) and own.half_turn == symmetric:
         return own
+    if kind is SampledSolver and isinstance(own, SampledSolver):
+        return SampledSolver(own.system, own.order, own.samples, own.sharpness, half_turn=symmetric)
     if kind is BalanceSolver and isinstance(own, BalanceSolver):
         return BalanceSolver(own.system, own.order, half_turn=symmetric)
     return ExactSolver(own.system, half_turn=symmetric, turns=turns)
@@ -155,6 +170,8 @@ def _exact_point(point: SpecialPoint) -> Point:
 
 
 def _method_of(solver: Solver) -> Method:
+    if isinstance(solver, SampledSolver):
+        return SampledHarmonicBalance(solver.order, solver.samples, solver.sharpness)
     if isinstance(solver, BalanceSolver):
         return HarmonicBalance(solver.order)
     return PiecewiseExact()

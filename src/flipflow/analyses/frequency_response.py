@@ -226,7 +226,7 @@ def _finished(
     special = tuple(
         SpecialPoint(
             one.kind,
-            Orbit(machine, one.point, _word(one.kind)),
+            Orbit(machine, one.point, word_of(one.kind)),
             one.index + one.share,
             one.spring,
             one.side,
@@ -249,6 +249,6 @@ def _finished(
     )
 
 
-def _word(kind: str) -> str | None:
+def word_of(kind: str) -> str | None:
     """Where stability changes the motion is neither; elsewhere its multipliers tell."""
     return UNDETERMINED if kind in STABILITY_CHANGES else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,6 +12,7 @@ from flipflow import __version__
 from flipflow.analyses.attractors import Attractors
 from flipflow.analyses.blows import Blows
 from flipflow.analyses.frequency_response import first_unknowns
+from flipflow.analyses.monitor import Monitor
 from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.settle import is_stable
@@ -21,7 +21,6 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
-Monitor = Callable[[str, float], None]
 PHASES = 60
 LONE_STRIDE = 6
 MOST_IMPULSE = 1e9

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from flipflow.analyses.linear import (
     equal_amplitude_frequency,
     linear_response,
 )
+from flipflow.analyses.monitor import Monitor as Monitor  # noqa: PLC0414  assessment reads it here
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import InputError
 from flipflow.methods.options import Method
@@ -23,7 +24,6 @@ from flipflow.model.limits import Limits
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.results.branch import Branch
 
-Monitor = Callable[[str, float], None]
 LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
 JUMP_WORDS = "jump when the speed falls (w_lb)"

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import first_unknowns
-from flipflow.analyses.operating_region import Monitor
+from flipflow.analyses.frequency_response import OMEGA_MOST, first_unknowns
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.sweep import check_count
 from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.settle import Settling
@@ -65,42 +65,76 @@ def periodic_orbits(
         For a frequency that is not finite or not above 0, or periods outside 1 to 6.
     """
     check_count("max_periods", max_periods, MOST_PERIODS)
-    number = isinstance(omega, (int, float)) and not isinstance(omega, bool)
-    if not (number and math.isfinite(omega) and omega > 0.0):
-        raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    search = _Search(machine, float(omega), max_periods)
+    search = _Search(machine, _checked(omega), max_periods)
     starts = _starts(search.settling, search.omega, np.random.default_rng(rng))
+    if TwoEventProblem.applies(search.settling.solver.builder):
+        starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
     for k, start in enumerate(starts):
         search.try_from(start)
         if monitor is not None:
             monitor(f"{len(search.found)} motions found", (k + 1) / len(starts))
-    orbits = [Orbit(machine, point) for point in search.found]
-    which = _first_gap(search.settling.solver.system)
-    return tuple(sorted(orbits, key=lambda o: (-_reach(o, which), -o.state @ which)))
+    return search.orbits()
+
+
+def attracting_orbits(
+    machine: Machine, omega: float, rng: int | np.random.Generator = 0
+) -> tuple[Orbit, ...]:
+    """Stable motions of one forcing period to which a cloud of states settles.
+
+    Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
+    """
+    search = _Search(machine, _checked(omega), 1)
+    for start in _starts(search.settling, search.omega, np.random.default_rng(rng)):
+        search.try_settled(start)
+    return tuple(orbit for orbit in search.orbits() if orbit.stable)
+
+
+def _checked(omega: object) -> float:
+    if isinstance(omega, bool) or not isinstance(omega, (int, float)) or not math.isfinite(omega):
+        raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
+    if not 0.0 < omega <= OMEGA_MOST:
+        raise InputError("omega", omega, f"give a frequency above 0 and up to {OMEGA_MOST:g} rad/s")
+    return float(omega)
 
 
 class _Search:
     """The motions found so far at one frequency."""
 
     def __init__(self, machine: Machine, omega: float, max_periods: int) -> None:
+        self.machine = machine
         self.settling = Settling(system_of(machine), max_periods)
         self.omega, self.max_periods = omega, max_periods
         self.found: list[Point] = []
 
     def try_from(self, start: Real) -> None:
         """Newton from a state and from where it settles to, for every number of periods."""
-        solver = self.settling.solver
         try:
-            settled = solver.section(start, self.omega, SETTLING_TURNS)[-1]
+            settled = self.settling.solver.section(start, self.omega, SETTLING_TURNS)[-1]
         except IncompleteError:
             return
-        for z in (start, settled):
-            for periods in range(1, self.max_periods + 1):
-                point = self.settling.solver_of(periods).solve(z, self.omega)
-                if point is not None and self.settling.shortest(point) is point:
-                    self._keep(point)
-                    if solver.system.symmetric:
-                        self._keep(self._mirrored(point))
+        self._try(start)
+        self._try(settled)
+
+    def try_settled(self, start: Real) -> None:
+        """Newton from where a state settles to."""
+        try:
+            self._try(self.settling.solver.section(start, self.omega, SETTLING_TURNS)[-1])
+        except IncompleteError:
+            return
+
+    def orbits(self) -> tuple[Orbit, ...]:
+        """What was found, largest motion at the first gap first."""
+        which = _first_gap(self.settling.solver.system)
+        found = [Orbit(self.machine, point) for point in self.found]
+        return tuple(sorted(found, key=lambda o: (-_reach(o, which), -o.state @ which)))
+
+    def _try(self, z: Real) -> None:
+        for periods in range(1, self.max_periods + 1):
+            point = self.settling.solver_of(periods).solve(z, self.omega)
+            if point is not None and self.settling.shortest(point) is point:
+                self._keep(point)
+                if self.settling.solver.system.symmetric:
+                    self._keep(self._mirrored(point))
 
     def _keep(self, point: Point) -> None:
         """Add a motion unless it is known, in whatever phase."""
@@ -123,27 +157,32 @@ class _Search:
 
 
 def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[Real]:
-    """Rest, the motion from below, two-touch motions, stepped speeds, and a cloud of states."""
-    from scipy.stats import qmc  # noqa: PLC0415  slow to import, and few ask for all motions
-
+    """Rest, the motion from below, stepped speeds, and a cloud of states."""
     solver = settling.solver
     n = solver.system.size
     X = np.abs(solver.builder.contact_free(np.array([omega]))[0])
     gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
     size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
     box = np.concatenate([size, omega * size])
-    cloud = (
-        qmc.Sobol(2 * n, rng=rng).random(STARTS) if solver.builder.springs else np.zeros((0, 2 * n))
-    )
+    cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
     starts = [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
-    if TwoEventProblem.applies(solver.builder):
-        starts += list(TwoEventProblem(solver.builder).states(omega)[0])
     for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO):
         z = np.zeros(2 * n)
         for speed in np.geomspace(ratio * omega, omega, SWEEP_STEPS):
             z = solver.section(z, float(speed), SETTLING_TURNS)[-1]
         starts.append(z)
     return starts
+
+
+def _spread(count: int, size: int, rng: np.random.Generator) -> Real:
+    """A Kronecker sequence from a random point on: (count, size) in [0, 1), evenly spread.
+
+    Its steps are powers of 1 / g with g^(size + 1) = g + 1, after Roberts.
+    """
+    # Kept apart from scipy.stats, whose import takes half a second of every report.
+    g = float(max(np.roots([1.0, *[0.0] * (size - 1), -1.0, -1.0]).real))
+    step = g ** -np.arange(1.0, size + 1.0)
+    return np.mod(rng.random(size) + np.outer(np.arange(count), step), 1.0)
 
 
 def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:

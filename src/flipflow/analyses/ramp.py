@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.frequency_response import check_interval, frequency_response
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
-from flipflow.analyses.transient import Monitor, Start, normal_direction, run_history, swings
+from flipflow.analyses.transient import Start, normal_direction, run_history, swings
 from flipflow.errors import InputError
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.screen import FlipFlowScreen
@@ -94,7 +95,7 @@ def ramp(
     rate
         Size of the rate in rad/s^2; 1 rpm/s is 0.1047 rad/s^2.
     monitor
-        Called with a sentence and the share done; False from it cancels.
+        Called with a sentence and the share done; raise from it to cancel.
 
     Raises
     ------

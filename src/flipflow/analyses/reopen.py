@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flipflow.analyses.frequency_response import solver_for
+from flipflow.analyses.frequency_response import solver_for, word_of
 from flipflow.errors import StoreError
 from flipflow.kernels import arclength
 from flipflow.methods.exact import ExactSolver
@@ -42,14 +42,15 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
     solver = solver_of(half_turn, turns)
     u = np.asarray(document["unknowns"], dtype=float).reshape(-1, solver.unknowns)
     points = u.shape[0]
-    record = new_branch(solver.unknowns, max(points, 1))
+    # One more than the points: the step at which the branch ended.
+    record = new_branch(solver.unknowns, points + 1)
     record.u[:points] = u
     record.omega[:points] = document["omega"]
     record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
     record.signature[:points] = document["signature"]
     record.iterations[:points] = document["iterations"]
-    record.rejected[:points] = document["rejected"][:points]
-    record.reason[:points] = document["reason"][:points]
+    tried = len(document["rejected"])
+    record.rejected[:tried], record.reason[:tried] = document["rejected"], document["reason"]
     course = arclength.Course(*document["course"])
     traced = Traced.recorded(record, points, int(document["code"]), course)
     n = solver.system.size
@@ -65,6 +66,7 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
                     one["omega"],
                     known_map=np.asarray(one["return_map"]),
                 ),
+                word_of(one["kind"]),
             ),
             one["position"],
             one["spring"],

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow import __version__
 from flipflow.analyses.feasible import missing_words
 from flipflow.analyses.frequency_response import check_interval
-from flipflow.analyses.operating_region import Monitor, analysed_range
+from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.operating_region import analysed_range
 from flipflow.analyses.quantities import Quantity
 from flipflow.analyses.response_quantities import ResponseQuantity, quantity_named
 from flipflow.analyses.samples import (

@@ -9,8 +9,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
-from flipflow.analyses.operating_region import Monitor
 from flipflow.analyses.sweep import MAX_PERIODS, check_count, checked_speeds, initial_state
 from flipflow.errors import InputError
 from flipflow.methods.course import Course

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.linear import linear_response
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.transient import (
     STATUS,
-    Monitor,
     at_rest,
     check_positive,
     movable,
@@ -76,7 +76,7 @@ def start_up(
     method
         How it is stepped.
     monitor
-        Called with a sentence and the share done, 0 to 1; False from it cancels.
+        Called with a sentence and the share done, 0 to 1; raise from it to cancel.
 
     Returns
     -------
@@ -87,8 +87,6 @@ def start_up(
     ------
     InputError
         Without damping, for a bad speed or duration, and for a drive that cannot be.
-    Cancelled
-        When the monitor asks for it.
     """
     movable(machine)
     given = None if speed is None else check_positive("speed", speed, "rad/s")
@@ -139,8 +137,6 @@ def coast_down(
     ------
     InputError
         Without damping, for a bad speed or duration, and for a drive that cannot be.
-    Cancelled
-        When the monitor asks for it.
     """
     movable(machine)
     omega = check_positive("speed", speed, "rad/s")

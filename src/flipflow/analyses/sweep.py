@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.analyses.operating_region import Monitor
+from flipflow.analyses.frequency_response import OMEGA_MOST
+from flipflow.analyses.monitor import Monitor
 from flipflow.errors import InputError
 from flipflow.methods.settle import MOST_TURNS, Settled, Settling
 from flipflow.model.system import Machine, system_of
@@ -91,6 +92,8 @@ def checked_speeds(omega: ArrayLike) -> Real:
         raise InputError("omega", omega, "give at least one frequency in rad/s, in one row")
     if not (np.isfinite(speeds).all() and (speeds > 0.0).all()):
         raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
+    if speeds.max() > OMEGA_MOST:
+        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
     return speeds
 
 
@@ -105,6 +108,8 @@ def check_count(name: str, value: object, most: int) -> None:
 def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
     """State (x, x') from "rest", an orbit or numbers, (2 N,)."""
     if isinstance(initial, Orbit):
+        if initial.state.size != 2 * size:
+            raise InputError("initial", initial, "give an orbit of this machine")
         return initial.state
     if isinstance(initial, str):
         if initial != "rest":

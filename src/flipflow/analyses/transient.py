@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.errors import Cancelled, InputError
+from flipflow.analyses.monitor import Monitor
+from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.methods.time_stepping import NormalDirection, RungeKutta, Stepper, Stretch
 from flipflow.model.drive import Drive, SpeedProfile
@@ -17,7 +18,6 @@ from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.results.history import ContactChange, History, stop_forces
 
 Real = NDArray[np.float64]
-Monitor = Callable[[str, float], bool | None]
 MOST_ROWS = 400_000
 SETTLED, MOST_TURNS, TURNS_AT_ONCE = 1e-7, 2000, 20
 
@@ -78,7 +78,7 @@ def run_history(
 ) -> History:
     """Run a machine with its shaft and keep every step.
 
-    ``enough`` sees all that was calculated so far and may end the run; ``monitor`` may cancel it.
+    ``enough`` sees all that was calculated so far and may end the run; ``monitor`` hears of it.
     """
     system, normal = movable(machine), normal_direction(machine)
     stepper = Stepper(
@@ -93,18 +93,13 @@ def run_history(
         if stretch.t.size:
             done.append(stretch)
         rows += stretch.t.size
-        tell(monitor, f"{stepper.speed * 30.0 / np.pi:.0f} rpm", stepper.time / duration)
+        if monitor is not None:
+            monitor(f"{stepper.time:.4g} s of {duration:.4g} s", min(stepper.time / duration, 1.0))
         early = stepper.code in (status.OK, status.POINT_LIMIT) and bool(enough and enough(done))
         if early or rows >= MOST_ROWS:
             break
     code = status.OK if early else stepper.code
     return _history(system, stepper, shaft, done, changes, STATUS[code])
-
-
-def tell(monitor: Monitor | None, sentence: str, share: float) -> None:
-    """Report to a monitor; False from it cancels."""
-    if monitor is not None and monitor(sentence, min(share, 1.0)) is False:
-        raise Cancelled(f"Cancelled at {100.0 * min(share, 1.0):.0f} %.")
 
 
 def settled_start(machine: Machine, speed: float, method: RungeKutta | None = None) -> Start:
@@ -155,7 +150,7 @@ def turn_means(history: History, values: Real, turns: int) -> float:
     """Mean rate of a running total over the last whole turns; NaN with fewer turns than that."""
     end = float(history.angle[-1])
     begin = end - 2.0 * np.pi * turns
-    if begin < history.angle[0]:
+    if begin <= history.angle[0]:
         return float("nan")
     row = int(np.searchsorted(history.angle, begin))
     t, total = (

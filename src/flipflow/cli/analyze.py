@@ -7,32 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
-from flipflow.errors import InputError
-
-FILE_HELP = "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without)."
+from flipflow.cli.options import File, Force, Json, Output, Speeds, speeds_of
 
 
 def analyze(
-    file: Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)],
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder for report and data."),
-    ] = None,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
-    ] = None,
-    speeds: Annotated[
-        tuple[str, str] | None,
-        typer.Option("--speeds", metavar="LOW HIGH", help='Speeds to analyse: "300 rpm" "40 Hz".'),
-    ] = None,
+    file: File,
+    output: Output = None,
+    json: Json = None,
+    speeds: Speeds = None,
     harmonics: Annotated[
         int | None,
         typer.Option("--harmonics", metavar="H", help="Harmonic balance instead of exact motion."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
-    ] = False,
+    force: Force = False,
 ) -> None:
     """Analyze a machine: verdict, allowed speed range, report."""
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
@@ -68,17 +55,11 @@ def analyze(
 
 def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, Any]:
     """Interval and method as the analysis takes them."""
-    from flipflow.analyses.frequency_response import check_interval  # noqa: PLC0415  quick --help
-    from flipflow.io.units import parse_quantity  # noqa: PLC0415
-    from flipflow.methods.options import HarmonicBalance  # noqa: PLC0415
+    from flipflow.methods.options import HarmonicBalance  # noqa: PLC0415  quick --help
 
     options: dict[str, Any] = {}
     if speeds is not None:
-        low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in speeds)
-        try:
-            options["omega"] = check_interval((low, high))
-        except InputError as error:
-            raise InputError("--speeds", " to ".join(speeds), error.remedy) from None
+        options["omega"] = speeds_of(speeds)
     if harmonics is not None:
         options["method"] = HarmonicBalance(harmonics)
     return options

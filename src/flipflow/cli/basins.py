@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,10 +13,9 @@ from flipflow.cli.progress import progress, stoppable
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.analyses.jump_risk import JumpRisk, Throw
+    from flipflow.analyses.jump_risk import JumpRisk
     from flipflow.model.screen import FlipFlowScreen
     from flipflow.results.basins import Basins
-    from flipflow.results.orbit import Orbit
 
 CELLS = 80
 MOST_CELLS_ASIDE = 1000
@@ -70,10 +67,7 @@ def _computed(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Basins,
     from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
 
     with progress("starting") as monitor:
-        compile_ahead(
-            lambda seconds: monitor(f"compiling, once per version: {seconds:.0f} s", 0.0),
-            ("lanes",),
-        )
+        compile_ahead(lambda seconds: monitor(f"compiling, once per version: {seconds:.0f} s", 0.0))
         x, v = _window(screen, omega, cells)
         with stoppable(monitor, "cells") as told:
             found = basins_of(screen, omega, {"relative": x}, {"relative": v}, monitor=told)
@@ -95,32 +89,15 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
 
 
 def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
-    from flipflow.io.results import document_of  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.jump_risk import risk_document  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.results import document_of  # noqa: PLC0415
 
-    return document_of(found) | {"jump_risk": None if risk is None else _risk_document(risk)}
-
-
-def _risk_document(risk: JumpRisk) -> dict[str, Any]:
-    """Least impulse and lump, SI and rad; null where nothing throws the motion."""
-    return {
-        "working_relative_amplitude": risk.orbit.amplitude("relative"),
-        "impulse": _throw_document(risk.worst_impulse),
-        "lump": _throw_document(risk.worst_lump),
-        "largest_impulse": {str(frame): size for frame, size in risk.largest_impulse.items()},
-        "notes": list(risk.notes),
-    }
-
-
-def _throw_document(throw: Throw | None) -> dict[str, Any] | None:
-    if throw is None:
-        return None
-    fields = {f.name: getattr(throw, f.name) for f in dataclasses.fields(throw)}
-    lands = fields.pop("lands")
-    return fields | {"lands_on_relative_amplitude": lands.amplitude("relative")}
+    return document_of(found) | {"jump_risk": None if risk is None else risk_document(risk)}
 
 
 def _show(found: Basins, risk: JumpRisk | None, out: Console) -> None:
-    from flipflow.report.numbers import speed  # noqa: PLC0415  keeps --help quick
+    from flipflow.report.jump_risk import millimetres, risk_words  # noqa: PLC0415  quick --help
+    from flipflow.report.numbers import speed  # noqa: PLC0415
 
     count = len(found.orbits)
     motions = f"{count} motion{'' if count == 1 else 's'}" if count else "no motion"
@@ -130,7 +107,7 @@ def _show(found: Basins, risk: JumpRisk | None, out: Console) -> None:
         found.orbits, found.shares, found.share_intervals, strict=True
     ):
         out.print(
-            f"{_millimetres(orbit):>8} relative amplitude: {100 * share:5.1f} % of the starting "
+            f"{millimetres(orbit):>8} relative amplitude: {100 * share:5.1f} % of the starting "
             f"states ({100 * low:.1f} to {100 * high:.1f} %)"
         )
     for note in found.notes:
@@ -139,48 +116,3 @@ def _show(found: Basins, risk: JumpRisk | None, out: Console) -> None:
         out.print()
         for line in risk_words(risk):
             out.print(line)
-
-
-def _millimetres(orbit: Orbit) -> str:
-    from flipflow.report.numbers import quantity  # noqa: PLC0415  keeps --help quick
-
-    return quantity(orbit.amplitude("relative"), "mm", "m")
-
-
-def risk_words(risk: JumpRisk) -> list[str]:
-    """The jump risk in a plant's words."""
-    from flipflow.report.numbers import number  # noqa: PLC0415  keeps --help quick
-
-    here = f"The working motion, {_millimetres(risk.orbit)}, is the one reached from below."
-    words = [here]
-    if not risk.others:
-        words.append(risk.notes[0])
-        return words
-    blow = risk.worst_impulse
-    if blow is None:
-        words.append("No blow that was tried throws it onto another motion.")
-    else:
-        words.append(
-            f"A blow of {number(blow.size)} kg m/s along the surface on the {blow.frame} frame "
-            f"throws it to {_millimetres(blow.lands)}, at the worst moment "
-            f"({_degrees(blow.phase)} of the unbalance, towards "
-            f"{'+x' if blow.impulse > 0 else '-x'}"
-            "). At no other moment, and on neither frame, was a lighter one found."
-        )
-    lump = risk.worst_lump
-    if lump is None:
-        words.append(
-            "A lump of material that lands on a frame and leaves with the feed does not, however "
-            "heavy it is."
-        )
-    else:
-        words.append(
-            f"So does a lump of {number(lump.size)} kg that lands on the {lump.frame} frame at "
-            f"{_degrees(lump.phase)} and leaves with the feed within the turn."
-        )
-    words += [f"Note: {note}" for note in risk.notes]
-    return words
-
-
-def _degrees(phase: float) -> str:
-    return f"{math.degrees(phase):.0f} deg"

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from flipflow.cli.analyze import FILE_HELP
+from flipflow.cli.options import File, Force, Json
 from flipflow.cli.output import print_list, printable
 
 if TYPE_CHECKING:
@@ -18,16 +16,7 @@ if TYPE_CHECKING:
     from flipflow.io.check import Case, Check, Value
 
 
-def check(
-    file: Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)],
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
-    ] = False,
-) -> None:
+def check(file: File, json: Json = None, force: Force = False) -> None:
     """Check a machine file: what it says, assumes and leaves open."""
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
     from flipflow.io.check import check_project  # noqa: PLC0415

@@ -13,12 +13,19 @@ if TYPE_CHECKING:
 
 RPM = 30.0 / math.pi
 
-File = Annotated[
-    str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-]
+FILE_HELP = (
+    "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without), rig-lin2024 "
+    "(a two-mass rig)."
+)
+
+File = Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)]
 Speed = Annotated[
     str | None,
     typer.Option("--speed", metavar="SPEED", help="Shaft speed: '850 rpm', '203 rad/s'."),
+]
+Speeds = Annotated[
+    tuple[str, str] | None,
+    typer.Option("--speeds", metavar="LOW HIGH", help='From and to: "300 rpm" "40 Hz".'),
 ]
 Output = Annotated[
     Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and data.")
@@ -42,3 +49,16 @@ def speed_of(project: Project, written: str | None) -> float:
     if project.speed is None:
         raise InputError("operation.speed", "(left out)", "give it, or --speed '850 rpm'")
     return project.speed
+
+
+def speeds_of(written: tuple[str, str]) -> tuple[float, float]:
+    """Speeds (low, high) in rad/s as asked for."""
+    from flipflow.analyses.frequency_response import check_interval  # noqa: PLC0415  quick --help
+    from flipflow.errors import InputError  # noqa: PLC0415
+    from flipflow.io.units import parse_quantity  # noqa: PLC0415
+
+    low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in written)
+    try:
+        return check_interval((low, high))
+    except InputError as error:
+        raise InputError("--speeds", " to ".join(written), error.remedy) from None

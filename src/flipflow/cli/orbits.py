@@ -52,9 +52,11 @@ def orbits(
 
 def _show(project: Project, omega: float, found: tuple[Orbit, ...], out: Console) -> None:
     lasting = sum(orbit.stable for orbit in found)
+    motions = "1 motion" if len(found) == 1 else f"{len(found)} motions"
+    word = "returns" if lasting == 1 else "return"
     out.print(
-        f"{project.document.name or project.name} at {omega * RPM:.4g} rpm: {len(found)} motions, "
-        f"{lasting} of them return after a small disturbance",
+        f"{project.document.name or project.name} at {omega * RPM:.4g} rpm: {motions}, "
+        f"{lasting} of them {word} after a small disturbance",
         style="bold",
     )
     out.print(

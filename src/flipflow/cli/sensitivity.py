@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.options import File, Force, Json, Output, Speed, Speeds, speed_of, speeds_of
+from flipflow.cli.progress import progress
+
 if TYPE_CHECKING:
     from flipflow.model.project import Project
     from flipflow.results.sensitivity import Sensitivity
@@ -15,9 +18,7 @@ POINTS = 100
 
 
 def sensitivity(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-    ],
+    file: File,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -30,30 +31,17 @@ def sensitivity(
     quantity: Annotated[
         str, typer.Option("--quantity", metavar="NAME", help="What it matters to.")
     ] = "relative_amplitude",
-    speed: Annotated[
-        str | None,
-        typer.Option("--speed", metavar="SPEED", help='"850 rpm"; else the file\'s speed.'),
-    ] = None,
-    speeds: Annotated[
-        tuple[str, str] | None,
-        typer.Option("--speeds", metavar="LOW HIGH", help=f"{POINTS} speeds from low to high."),
-    ] = None,
+    speed: Speed = None,
+    speeds: Speeds = None,
     n: Annotated[int, typer.Option("--n", help="Groups of samples, best a power of two.")] = 1024,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the sample.")] = 0,
     branch: Annotated[
         str,
         typer.Option("--branch", help="Motion that is meant: from-below, upper or lower."),
     ] = "from-below",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for the figures.")
-    ] = None,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
-    ] = False,
+    output: Output = None,
+    json: Json = None,
+    force: Force = False,
 ) -> None:
     """Rank the fields of a machine by what they do to a quantity (Sobol indices)."""
     from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
@@ -79,50 +67,28 @@ def _omega(
     """Where the quantity is meant, rad/s, as the analysis takes it."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.analyses.frequency_response import check_interval  # noqa: PLC0415
     from flipflow.analyses.response_quantities import (  # noqa: PLC0415
         ResponseQuantity,
         quantity_named,
     )
     from flipflow.errors import InputError  # noqa: PLC0415
-    from flipflow.io.units import parse_quantity  # noqa: PLC0415
 
     whole = isinstance(quantity_named(quantity), ResponseQuantity)
     if speed is not None and (speeds is not None or whole):
         other = f"{quantity} belongs to the whole response" if whole else "--speeds is given, too"
         raise InputError("--speed", speed, f"{other}, leave it out")
     if speeds is not None:
-        low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in speeds)
-        interval = check_interval((low, high))
+        interval = speeds_of(speeds)
         return interval if whole else np.linspace(*interval, POINTS)
-    if whole:
-        return None
-    if speed is not None:
-        return parse_quantity(speed, "rad/s", field="--speed")
-    if project.speed is None:
-        raise InputError("--speed", "(left out)", "the file names no speed, give one: '850 rpm'")
-    return project.speed
+    return None if whole else speed_of(project, speed)
 
 
 def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity:
     """Analyse with progress on stderr."""
-    from rich.console import Console  # noqa: PLC0415  keeps --help quick
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
-
     from flipflow.analyses.sensitivity import sensitivity as analysis  # noqa: PLC0415
 
-    terminal = Console(stderr=True)
-    progress = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
-        console=terminal, transient=True, disable=not terminal.is_terminal,
-    )  # fmt: skip
-    with progress:
-        task = progress.add_task("starting", total=1.0)
-        return analysis(
-            *question,
-            monitor=lambda text, share: progress.update(task, description=text, completed=share),
-            **options,
-        )
+    with progress("starting") as tell:
+        return analysis(*question, monitor=tell, **options)
 
 
 def _show(result: Sensitivity, output: Path | None, json: str | None) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
 from flipflow.cli.output import console, print_list, printable, write_json
+from flipflow.cli.progress import Tell, progress
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from flipflow.model.project import Project
     from flipflow.results.run_up import RunUp
 
-RPM = 30.0 / math.pi
 WORDS = {
     "main_amplitude": ("main frame, amplitude", 1e3, "mm"),
     "relative_amplitude": ("relative, amplitude", 1e3, "mm"),
@@ -29,13 +28,8 @@ WORDS = {
 
 
 def startup(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="Machine file, or a bundled name: ffs0827.")
-    ],
-    speed: Annotated[
-        str | None,
-        typer.Option("--speed", metavar="SPEED", help="Working speed: '850 rpm'."),
-    ] = None,
+    file: File,
+    speed: Speed = None,
     motor_power: Annotated[
         str | None,
         typer.Option("--motor-power", metavar="POWER", help="Rated power: '5.5 kW'."),
@@ -50,23 +44,17 @@ def startup(
             "--profile", metavar="POINTS", help="Speed over time: '0 s: 0 rpm, 20 s: 850 rpm'."
         ),
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures.")
-    ] = None,
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal."),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let values through that look like a slip of units.")
-    ] = False,
+    output: Output = None,
+    json: Json = None,
+    force: Force = False,
 ) -> None:
     """Start a machine and let it coast down: reached, or captured; the peaks on the way."""
     from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
     from flipflow.io.results import prepare_folder  # noqa: PLC0415
 
     project = load_project(file, force=force)
-    project = replace(project, speed=_speed(speed, project))
+    if speed is not None or profile is None:
+        project = replace(project, speed=speed_of(project, speed))
     drive = _drive(project, motor_power, inertia, profile)
     if output is not None:
         prepare_folder(output)
@@ -82,13 +70,6 @@ def startup(
         _figures(runs, output)
     if json != "-":
         _show(project, start, coast, console())
-
-
-def _speed(written: str | None, project: Project) -> float | None:
-    from flipflow.io.layout import SPEED  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.values import read_number  # noqa: PLC0415
-
-    return project.speed if written is None else read_number(written, SPEED, label="--speed")
 
 
 def _drive(
@@ -110,8 +91,6 @@ def _drive(
         )
         if text is not None
     }  # fmt: skip
-    if project.speed is None:
-        raise InputError("operation.speed", "(left out)", "give it, or --speed '850 rpm'")
     drive = project.drive
     if drive is None or drive.motor is None:
         if not given:
@@ -119,7 +98,8 @@ def _drive(
         if "rated_power" not in given:
             raise InputError("--inertia", inertia, "give --motor-power with it")
         moment = project.screen.eccentric_moment
-        return assumed_drive(moment, project.speed, given.pop("rated_power"), given)
+        working = speed_of(project, None)
+        return assumed_drive(moment, working, given.pop("rated_power"), given)
     if "rated_power" in given:
         motor = replace(drive.motor, rated_power=given["rated_power"], breakdown_torque=None)
         drive = replace(drive, motor=motor)
@@ -128,30 +108,19 @@ def _drive(
 
 def _calculated(project: Project, drive: Drive | SpeedProfile | None) -> tuple[RunUp, RunUp | None]:
     """Start, and coast down where working speed is reached, with progress on stderr."""
-    from rich.console import Console  # noqa: PLC0415  keeps --help quick
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
-
-    from flipflow.analyses.startup import coast_down, start_up  # noqa: PLC0415
+    from flipflow.analyses.startup import coast_down, start_up  # noqa: PLC0415  keeps --help quick
     from flipflow.model.drive import Drive  # noqa: PLC0415
 
-    terminal = Console(stderr=True)
-    progress = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
-        console=terminal, transient=True, disable=not terminal.is_terminal,
-    )  # fmt: skip
-    with progress:
-        task = progress.add_task("start; the first run of a version compiles", total=1.0)
+    with progress("start; the first run of a version compiles") as tell:
 
-        def tell(stage: str) -> Callable[[str, float], None]:
-            return lambda sentence, share: progress.update(
-                task, description=f"{stage}, {sentence}", completed=share
-            )
+        def during(stage: str) -> Tell:
+            return lambda sentence, share: tell(f"{stage}, {sentence}", share)
 
-        start = start_up(project.screen, drive, speed=project.speed, monitor=tell("start"))
+        start = start_up(project.screen, drive, speed=project.speed, monitor=during("start"))
         if start.outcome != "reached" or not isinstance(start.drive, Drive):
             return start, None
         begin = start.final_speed
-        return start, coast_down(project.screen, begin, start.drive, monitor=tell("coast-down"))
+        return start, coast_down(project.screen, begin, start.drive, monitor=during("coast-down"))
 
 
 def _figures(runs: dict[str, RunUp], folder: Path) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flipflow.cli.options import RPM, File, Force, Json, Output
+from flipflow.cli.options import RPM, File, Force, Json, Output, speeds_of
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -63,18 +63,13 @@ def sweep(
 
 
 def _grid(speeds: tuple[str, str], steps: int) -> np.ndarray:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.layout import SPEED  # noqa: PLC0415
-    from flipflow.io.values import read_number  # noqa: PLC0415
+    import numpy as np  # noqa: PLC0415  keeps --help quick
+
+    from flipflow.errors import InputError  # noqa: PLC0415
 
     if not 2 <= steps <= MOST_STEPS:
         raise InputError("--steps", steps, f"give a whole number from 2 to {MOST_STEPS}")
-    low, high = (read_number(one, SPEED, label="--speeds") for one in speeds)
-    if high <= low:
-        raise InputError("--speeds", " ".join(speeds), "give the lower speed first")
-    import numpy as np  # noqa: PLC0415
-
-    return np.linspace(low, high, steps)
+    return np.linspace(*speeds_of(speeds), steps)
 
 
 def _swept(project: Project, omega: np.ndarray) -> tuple[Sweep, Sweep]:

@@ -65,7 +65,7 @@ def _row(
     ends = float(t[0]), float(t[-1])
     whole, close = [], []
     for word, colour, values in curves:
-        times, low, high = _envelope(t, values, turns)
+        times, low, high = envelope(t, values, turns)
         legend = name == "displacement"
         whole.append(Trace(word, times, high, colour=colour, legend=legend))
         whole.append(Trace(word, times, low, colour=colour, legend=False))
@@ -76,8 +76,16 @@ def _row(
     )
 
 
-def _envelope(t: Real, values: Real, turns: int) -> tuple[Real, Real, Real]:
-    """Middle times, least and greatest values of spans of a turn or more."""
+def envelope(t: Real, values: Real, turns: int) -> tuple[Real, Real, Real]:
+    """Middle times, least and greatest values of at most 400 spans of a turn or more.
+
+    Parameters
+    ----------
+    t, values
+        A course over time, (n,).
+    turns
+        Turns in it.
+    """
     count = max(min(SPANS, t.size, turns), 1)
     edges = np.unique(np.linspace(0, t.size, count + 1).astype(int))
     spans = np.split(values, edges[1:-1])

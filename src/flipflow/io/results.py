@@ -15,8 +15,10 @@ import numpy as np
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import basins_from, branch_from
+from flipflow.analyses.transients import Transients
 from flipflow.errors import InputError, StoreError
-from flipflow.io.run_up import run_up_document
+from flipflow.io.jump_risk import risk_document
+from flipflow.io.run_up import run_up_document, run_up_summary
 from flipflow.results.basins import Basins
 from flipflow.results.branch import Branch
 from flipflow.results.document import (
@@ -34,6 +36,7 @@ from flipflow.results.orbit import Orbit
 from flipflow.results.run_up import RunUp
 from flipflow.results.sensitivity import (
     SENSITIVITY,
+    OneAtATime,
     Sensitivity,
     sensitivity_document,
     sensitivity_from,
@@ -170,8 +173,28 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
             }
             for case in assessment.cases
         ],
+        "transients": _transients(assessment.transients),
+        "tornado": None if assessment.tornado is None else _tornado_document(assessment.tornado),
         "notes": list(assessment.notes),
     }
+
+
+def _transients(found: Transients | None) -> dict[str, Any] | None:
+    """Start, coast-down and jump risk of the empty machine; null without a working speed."""
+    if found is None:
+        return None
+    runs = {"start": found.start, "coast_down": found.coast_down}
+    return {
+        "drive_assumed": found.assumed,
+        **{name: None if run is None else run_up_summary(run) for name, run in runs.items()},
+        "jump_risk": None if found.jump is None else risk_document(found.jump),
+        "reasons": dict(found.reasons),
+    }
+
+
+def _tornado_document(result: OneAtATime) -> dict[str, Any]:
+    fields = ("quantity", "names", "ends", "omega", "nominal", "at_low", "at_high")
+    return {name: plain(getattr(result, name)) for name in fields}
 
 
 def branch_table(branch: Branch) -> xarray.Dataset:

@@ -17,6 +17,12 @@ MOST_ROWS = 2000
 
 def run_up_document(run: RunUp) -> dict[str, Any]:
     """Verdict, peaks, power, and the history at up to 2000 of its steps."""
+    machine = {"machine": machine_document(run.machine)}
+    return run_up_summary(run) | machine | {"history": _rows(run.history)}
+
+
+def run_up_summary(run: RunUp) -> dict[str, Any]:
+    """The document without the machine and without the history."""
     history = run.history
     return {
         "schema": "flipflow/run-up/1",
@@ -32,13 +38,11 @@ def run_up_document(run: RunUp) -> dict[str, Any]:
         "peaks": {name: dataclasses.asdict(peak) for name, peak in run.peaks.items()},
         "power": dict(run.power),
         "energy": dict(history.energy),
-        "machine": machine_document(run.machine),
         "drive": _drive(run),
         "notes": list(run.notes),
         "status": history.status,
         "method": history.method,
         "counters": dict(history.counters),
-        "history": _rows(history),
     }
 
 

@@ -64,8 +64,7 @@ def read_source(name_or_path: str | os.PathLike[str]) -> Source:
         When there is no such file, or it is a folder, empty, too large, not UTF-8 or not TOML.
     """
     if isinstance(name_or_path, str) and name_or_path in bundled_names():
-        text = (_machines() / f"{name_or_path}.toml").read_text(encoding="utf-8")
-        return Source(tomllib.loads(text), name_or_path, None)
+        return Source(tomllib.loads(bundled_text(name_or_path)), name_or_path, None)
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise InputError("machine file", name_or_path, "give a bundled name or a path")
     path = Path(name_or_path)
@@ -73,28 +72,37 @@ def read_source(name_or_path: str | os.PathLike[str]) -> Source:
     return Source(_tables(path, text), path.stem, path)
 
 
+def bundled_text(name: str) -> str:
+    """The file of a bundled machine as it stands, comments included."""
+    return (_machines() / f"{name}.toml").read_text(encoding="utf-8")
+
+
 def _machines() -> Traversable:
     return importlib.resources.files("flipflow.io") / "machines"
+
+
+def _check_kind(path: Path, status: os.stat_result) -> None:
+    """Refuse what is no file of a machine's size."""
+    if stat.S_ISDIR(status.st_mode):
+        raise InputError("machine file", str(path), "this is a folder, name the .toml file in it")
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError("machine file", str(path), "this is not a file, give a .toml file")
+    if status.st_size > LARGEST:
+        raise InputError(
+            "machine file", str(path),
+            f"it has {status.st_size / 1e6:.3g} MB, give a machine file of at most 1 MB",
+        )  # fmt: skip
 
 
 def _content(path: Path) -> bytes:
     """Read the file, but look at its kind and size before."""
     try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError(
-                "machine file", str(path), "this is a folder, name the .toml file in it"
-            )
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError("machine file", str(path), "this is not a file, give a .toml file")
-        if status.st_size > LARGEST:
-            raise InputError(
-                "machine file", str(path),
-                f"it has {status.st_size / 1e6:.3g} MB, give a machine file of at most 1 MB",
-            )  # fmt: skip
+        _check_kind(path, path.stat())
         return path.read_bytes()
     except FileNotFoundError:
         raise InputError("machine file", str(path), _missing(path)) from None
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.plan import Complex, Int, Real
 
-OPEN, PLUS, MINUS, RELEASED_PLUS, RELEASED_MINUS = 0, 1, -1, 2, -2
+# A spring that is open, engaged on a side, or (+-2) beyond its gap without a force.
+OPEN, PLUS, MINUS = 0, 1, -1
 NOTHING = -9
 MAX_SEARCH = 20_000
 AT_GAP = 4e-16

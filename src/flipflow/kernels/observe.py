@@ -152,6 +152,8 @@ def describe_balance(problem: Balance, u: Real, omega: Real, series: Complex, co
         set_series(problem, u[p])
         prepare_receptance(problem, omega[p])
         code[p] = record_contacts(problem, omega[p])
+        if code[p] == status.MISSING_CONFIGURATION:
+            break
         if code[p] != status.OK:
             continue
         contact_integrals(problem, omega[p])

@@ -12,7 +12,7 @@ from flipflow.kernels.plan import Complex, Int, Real
 from flipflow.kernels.shooting import Shooting
 
 PANEL = 2.0  # radians of the fastest mode in a Gauss panel
-END_SHARE = 1e-12
+SLIVER = 1e-12
 
 
 class Table(NamedTuple):
@@ -63,15 +63,16 @@ def sample_motion(
     plan, flow = problem.plan, problem.flow
     turn = 2.0 * math.pi / omega
     row = first
-    while t < end - END_SHARE * turn:
-        duration = min(turn, end - t)
+    while t < end:
+        # No sliver is left over by rounding: the last turn takes it.
+        duration = turn if end - t > (1.0 + SLIVER) * turn else end - t
         code = run_flow(plan, flow, omega, t, duration, problem.rate)
         if code != status.OK:
             return code, row
         for e in range(flow.segments[0]):
             last = flow.start[e] + flow.length[e]
             if e == flow.segments[0] - 1:
-                last = t + duration if t + duration < end - END_SHARE * turn else math.inf
+                last = t + duration if t + duration < end else math.inf
             while row < table.t.shape[0] and table.t[row] <= last and table.t[row] <= end:
                 sample(problem, e, omega, row, table)
                 row += 1

@@ -17,9 +17,13 @@ from flipflow.model.system import MechanicalSystem
 
 
 class BalanceSolver(Solver):
-    """Unknowns: the Fourier coefficients of the motion at the gaps."""
+    """Unknowns: the Fourier coefficients of the motion at the gaps.
+
+    ``confirmed``: special points that no exact motion shows are notes, not special points.
+    """
 
     reads_jacobian = False
+    confirmed = True
 
     def __init__(self, system: MechanicalSystem, harmonics: int, *, half_turn: bool) -> None:
         self.order = harmonics
@@ -53,14 +57,20 @@ class BalanceSolver(Solver):
         """
         kept_u, kept_omega, series = self._last
         if not (np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega)):
-            series = self._read_off(self.balance, np.ascontiguousarray(u), omega)
+            series = self._read_off(np.ascontiguousarray(u), omega)
             self._last = u.copy(), omega.copy(), series
         return series
 
-    def _read_off(self, problem: Balance, u: Real, omega: Real) -> Complex:
+    def _read_off(self, u: Real, omega: Real, *, whole_turn: bool = False) -> Complex:
+        """Displacement harmonics (P, n_h, N); the last point's contacts stay recorded."""
         series = np.empty((omega.size, self.harmonics.size, self.system.size), np.complex128)
         code = np.zeros(omega.size, np.int64)
-        describe_balance(problem, u, omega, series, code)
+        while True:
+            walk = 2.0 * np.pi if whole_turn else self.balance.walk
+            describe_balance(self.balance._replace(walk=walk), u, omega, series, code)
+            if not np.any(code == status.MISSING_CONFIGURATION):
+                break
+            self.add_missing_configuration()
         series[code != status.OK] = np.nan
         return series
 
@@ -110,8 +120,7 @@ class BalanceSolver(Solver):
         return low, high, seen[:, :, self.harmonics == 1][:, :, 0]
 
     def motion(self, u: Real, omega: float) -> Motion:
-        whole = self.balance._replace(walk=2.0 * np.pi)
-        series = self._read_off(whole, u[None], np.array([omega]))
+        series = self._read_off(u[None], np.array([omega]), whole_turn=True)
         flow = self.flow
         pieces = Pieces.recorded(flow, np.zeros((flow.start.size, 0), np.complex128))
         return SeriesMotion(
@@ -136,8 +145,11 @@ class SampledSolver(BalanceSolver):
     """The same unknowns, with the smooth contact law sampled at fixed times.
 
     What is read off a motion besides its displacements is exact: the contacts of its series, and
-    the return maps of the exact flow beside it.
+    the return maps of the exact flow beside it. Its false special points stay: to show them is
+    what it is kept for.
     """
+
+    confirmed = False
 
     def __init__(
         self,
@@ -154,8 +166,8 @@ class SampledSolver(BalanceSolver):
     def _formulated(self) -> Sampled:
         return new_sampled(self.balance, self.samples, self.sharpness)
 
-    def _read_off(self, problem: Balance, u: Real, omega: Real) -> Complex:
-        series = super()._read_off(problem, u, omega)
+    def _read_off(self, u: Real, omega: Real, *, whole_turn: bool = False) -> Complex:
+        series = super()._read_off(u, omega, whole_turn=whole_turn)
         describe_sampled(self.problem, u, omega, series)
         return series
 

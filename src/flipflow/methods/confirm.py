@@ -77,13 +77,14 @@ class ExactBeside:
         """
         omega, course = self.traced.omega, self.traced.course
         for steps in FOLLOWED:
-            begin = self.at(position - min(steps, 0.5 * room))
+            start = max(position - min(steps, 0.5 * room), 0.0)
+            begin = self.at(start)
             if begin is None:
                 continue
             first, last = max(int(position - steps), 0), int(position + steps) + 2
             speeds = np.append(omega[first:last], begin.omega)
             low, high = float(speeds.min()), float(speeds.max())
-            direction = float(np.sign(self.traced.tangent[int(position - steps), -1]))
+            direction = float(np.sign(self.traced.tangent[int(start), -1]))
             window = course._replace(
                 lower=low - EDGE * low, upper=high + EDGE * high, direction=direction
             )

@@ -75,7 +75,7 @@ class Course:
     def _stretch(
         self, solver: ExactSolver, z: Real, omega: float, t: float, until: float, budget: Budget
     ) -> Real:
-        capacity = (TURNS_A_CALL + 1) * MOST_SEGMENTS
+        capacity = (TURNS_A_CALL + 2) * MOST_SEGMENTS
         kept = budget.work.copy()
         while True:
             changes = Changes(

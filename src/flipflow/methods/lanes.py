@@ -107,7 +107,7 @@ class Lanes:
             raise InputError("threads", threads, f"give a whole number from 1 to {MOST_THREADS}")
         self.builder = PlanBuilder(system)
         self.omega = float(omega)
-        self.threads = threads or os.cpu_count() or 1
+        self.threads = threads or _processors()
         self._adding = threading.Lock()
 
     def settle(
@@ -179,3 +179,10 @@ class Lanes:
             code[:] = status.OK
         run.states[part], run.label[part] = states, label
         run.turns[part], run.code[part] = turns, code
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

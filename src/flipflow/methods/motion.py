@@ -93,7 +93,9 @@ class Motion(ABC):
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""
         found: list[ContactInterval] = []
-        ends = self.pieces.start + self.pieces.length
+        # Where a piece ends the next one starts, to the last digit: touches are joined by it.
+        last = self.pieces.start[-1:] + self.pieces.length[-1:]
+        ends = np.concatenate([self.pieces.start[1:], last])
         for j in range(self.pieces.states.shape[1]):
             engaged = np.where(np.abs(self.pieces.states[:, j]) == 1, self.pieces.states[:, j], 0)
             found += _joined(j, engaged, self.pieces.start, ends, self.period)

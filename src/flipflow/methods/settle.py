@@ -150,6 +150,8 @@ class Settling:
 
     def continued(self, point: Point, omega: float) -> Point | None:
         """The motion followed along its branch to another frequency; None where it turns back."""
+        if omega == point.omega:
+            return point
         low, high = sorted((point.omega, omega))
         course = arclength.Course(
             low, high, high - low, STEP_SHARE, math.copysign(1.0, omega - point.omega),

@@ -190,15 +190,30 @@ class Solver(ABC):
 
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
+        record = new_branch(self.unknowns, POINTS_MOST, with_jacobian=self.reads_jacobian)
+        code, points = self._follow(record, u, omega, course)
+        return Traced.recorded(record, points, code, course)
+
+    def _follow(
+        self,
+        record: arclength.Branch,
+        u: Real,
+        omega: float,
+        course: arclength.Course,
+        p: int = arclength.TRACE_ALL,
+        share: float = 0.0,
+    ) -> tuple[int, int]:
+        """The compiled loop, begun anew whenever it finds a configuration missing."""
         while True:
-            record = new_branch(self.unknowns, POINTS_MOST, with_jacobian=self.reads_jacobian)
             code, points = arclength.follow(
-                self.problem, self.work, record, u, omega, course, arclength.TRACE_ALL, 0.0
+                self.problem, self.work, record, u, omega, course, p, share
             )
             if code != status.MISSING_CONFIGURATION:
-                break
+                return code, points
             self.add_missing_configuration()
-        return Traced.recorded(record, points, code, course)
+            if p == arclength.TRACE_ALL:
+                record.rejected[:] = 0
+                record.reason[:] = arclength.REASON_NONE
 
     def trace_through(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch from (u, omega) both ways, in rising omega at the start."""
@@ -209,9 +224,7 @@ class Solver(ABC):
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
-        code, _ = arclength.follow(
-            self.problem, self.work, traced.record, traced.u[p], 0.0, traced.course, p, share
-        )
+        code, _ = self._follow(traced.record, traced.u[p], 0.0, traced.course, p, share)
         if code != status.OK:
             omega = traced.omega[p]
             raise IncompleteError(
@@ -225,13 +238,7 @@ class Solver(ABC):
         """Newton at fixed omega from the guess u; None where it does not converge."""
         course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, arclength.SHARP)
         record = new_branch(self.unknowns, 1, with_jacobian=self.reads_jacobian)
-        while True:
-            code, points = arclength.follow(
-                self.problem, self.work, record, u, omega, course, arclength.TRACE_ALL, 0.0
-            )
-            if code != status.MISSING_CONFIGURATION:
-                break
-            self.add_missing_configuration()
+        _, points = self._follow(record, u, omega, course)
         if points == 0:
             return None
         return Point(self, record.u[0], omega, float(record.tangent[0, -1]), record.jacobian[0])

@@ -75,7 +75,7 @@ def find_special_points(
     """All special points in branch order, and a sentence for each that could not be refined."""
     tests = [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]
     found, notes = zeros_of(tests, solver, traced)
-    if isinstance(solver, BalanceSolver):
+    if isinstance(solver, BalanceSolver) and solver.confirmed:
         side = saddle_side(traced.tangent[:, -1], eigenvalues)
         return _confirmed(ExactBeside(solver, traced), found, notes, side)
     return found, notes

@@ -1,4 +1,4 @@
-"""Compile the kernels of the exact solver ahead, in processes side by side.
+"""Compile the kernels of an analysis ahead, in processes side by side.
 
 numba compiles under one lock in a process, and the first analysis needs several large kernels.
 Each part is compiled by a process of its own into the shared cache, once per version.
@@ -20,6 +20,8 @@ from flipflow.kernels.compile import cache_folder
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.lanes import Lanes
 from flipflow.methods.solver import STEP_SHARE
+from flipflow.methods.time_stepping import Stepper
+from flipflow.model.drive import SpeedProfile
 from flipflow.model.elements import ClearanceSpring, Unbalance
 from flipflow.model.system import MechanicalSystem
 
@@ -27,17 +29,15 @@ logger = logging.getLogger("flipflow")
 POLL_SECONDS = 0.2
 
 
-def compile_ahead(tell: Callable[[float], None], also: tuple[str, ...] = ()) -> None:
+def compile_ahead(tell: Callable[[float], None]) -> None:
     """Compile what an exact analysis needs, unless it is in the cache already.
 
     Parameters
     ----------
     tell
         Called every fraction of a second with the seconds passed.
-    also
-        Further parts: "lanes" for basins.
     """
-    marks = {part: cache_folder() / f"{part}-compiled" for part in (*ANALYSIS, *also)}
+    marks = {part: cache_folder() / f"{part}-compiled" for part in PARTS}
     parts = [part for part, mark in marks.items() if not mark.exists()]
     if not parts:
         return
@@ -81,6 +81,16 @@ def _lanes_part() -> None:
     Lanes(_small_solver().system, 1.0, 1).carry(states, 1)
 
 
+def _strobe_part() -> None:
+    _small_solver().section(np.zeros(2), 1.0, 1)
+
+
+def _start_up_part() -> None:
+    profile = SpeedProfile((0.0, 1.0), (1.0, 1.0))
+    for _ in Stepper(_small_solver().system, profile, np.zeros(2), fastest=1.0).run(1.0):
+        pass
+
+
 def _small_solver() -> ExactSolver:
     """One mass and one stop: kernels do not depend on the machine, only on the types."""
     stop = ClearanceSpring([1.0], 1.0, 0.1, 10.0)
@@ -88,8 +98,13 @@ def _small_solver() -> ExactSolver:
     return ExactSolver(system, half_turn=True)
 
 
-ANALYSIS = ("trace", "observe")
-PARTS = {"trace": _trace_part, "observe": _observe_part, "lanes": _lanes_part}
+# Two parts, for two processors, that take about equally long; within a part what several kernels
+# call is compiled once.
+PARTS: dict[str, tuple[Callable[[], None], ...]] = {
+    "branches": (_trace_part,),
+    "runs": (_observe_part, _strobe_part, _lanes_part, _start_up_part),
+}
 
 if __name__ == "__main__":
-    PARTS[sys.argv[1]]()
+    for compile_part in PARTS[sys.argv[1]]:
+        compile_part()

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 Data = TypeVar("Data")
 AGREEMENT = 0.02
 
@@ -143,6 +146,19 @@ def runs(labels: Sequence[str], answers: Sequence[bool | None]) -> Iterator[Part
     for k, answer in enumerate(answers):
         if k + 1 == len(answers) or answers[k + 1] is not answer:
             yield Part(f"{labels[start]} to {labels[k + 1]}", answer)
+            start = k + 1
+
+
+def bands(omega: NDArray[np.float64], answers: Sequence[bool]) -> Iterator[Part]:
+    """Frequencies in rad/s with their answers; equal neighbours become one part.
+
+    A part reaches from the first to the last frequency that has its answer.
+    """
+    start = 0
+    for k, answer in enumerate(answers):
+        if k + 1 == len(answers) or answers[k + 1] is not answer:
+            ends = f"{omega[start]:.4g}" + (f" to {omega[k]:.4g}" if k > start else "")
+            yield Part(f"{ends} rad/s", answer)
             start = k + 1
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from flipflow.figures.drawing import Drawing
 from flipflow.figures.parts import Figure
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim
@@ -32,7 +33,7 @@ class PaperFigure(Generic[Data]):
     compute
         From the machine to the data that picture, tables and claims share.
     draw, tables
-        From the data to the neutral figure and to tables for the page.
+        From the data to the neutral figure or the drawing, and to tables for the page.
     claims
         What the paper says of it.
     needs_stop
@@ -42,7 +43,7 @@ class PaperFigure(Generic[Data]):
     name: str
     title: str
     compute: Callable[[FlipFlowScreen], Data]
-    draw: Callable[[Data], Figure]
+    draw: Callable[[Data], Figure | Drawing]
     claims: tuple[Claim[Data], ...]
     tables: Callable[[Data], tuple[Table, ...]] = no_tables
     needs_stop: bool = True

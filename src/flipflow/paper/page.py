@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from flipflow import __version__
+from flipflow.figures.drawing import Drawing
 from flipflow.paper.claims import DecidedClaim, Number, Verdict
 from flipflow.paper.reproduce import PAPER, ReproducedFigure, Reproduction
 from flipflow.report.blocks import (
@@ -19,6 +20,7 @@ from flipflow.report.blocks import (
     Text,
     TitleBlock,
 )
+from flipflow.report.blocks import Drawing as DrawingBlock
 from flipflow.report.html import page, write_page
 from flipflow.report.numbers import NOTHING, number
 
@@ -113,8 +115,16 @@ def _figure_blocks(one: ReproducedFigure) -> Iterator[Block]:
     if one.figure is None:
         yield Note(one.failure)
         return
-    yield FigureBlock(one.figure)
+    if isinstance(one.figure, Drawing):
+        yield DrawingBlock(one.figure.title, one.figure.svg, one.figure.caption)
+    else:
+        yield FigureBlock(one.figure)
     yield from one.tables
+    if one.claims:
+        yield _claims_of(one)
+
+
+def _claims_of(one: ReproducedFigure) -> Table:
     columns = (Column("Claim"), Column("Verdict"), Column("Numbers"))
     rows = tuple(
         (
@@ -124,7 +134,7 @@ def _figure_blocks(one: ReproducedFigure) -> Iterator[Block]:
         )
         for decided in one.claims
     )
-    yield Table("Numbers behind the verdicts", columns, rows)
+    return Table("Numbers behind the verdicts", columns, rows)
 
 
 def _verdict(one: DecidedClaim) -> Cell:

@@ -7,10 +7,17 @@ from typing import Any
 
 from flipflow.errors import InputError
 from flipflow.paper import (
+    figure_01,
     figure_02c,
+    figure_03,
     figure_04,
+    figure_05,
+    figure_06,
     figure_07,
     figure_08,
+    figure_09,
+    figure_10,
+    figure_11,
     figure_12,
     figure_13,
     figure_14,
@@ -25,8 +32,9 @@ from flipflow.paper import (
 from flipflow.paper.figure import PaperFigure
 
 MODULES = (
-    figure_02c, figure_04, figure_07, figure_08, figure_12, figure_13, figure_14, figure_15,
-    figure_16, figure_17, figure_18, figure_19, figure_20, figure_21,
+    figure_01, figure_02c, figure_03, figure_04, figure_05, figure_06, figure_07, figure_08,
+    figure_09, figure_10, figure_11, figure_12, figure_13, figure_14, figure_15, figure_16,
+    figure_17, figure_18, figure_19, figure_20, figure_21,
 )  # fmt: skip
 FIGURES: Mapping[str, PaperFigure[Any]] = {m.FIGURE.name: m.FIGURE for m in MODULES}
 

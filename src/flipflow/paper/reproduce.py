@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from flipflow import __version__
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import IncompleteError, InputError, MissingExtra
+from flipflow.figures.drawing import Drawing
 from flipflow.figures.parts import Figure
 from flipflow.io.project import load
 from flipflow.model.screen import FlipFlowScreen
@@ -38,7 +39,7 @@ class ReproducedFigure:
 
     name: str
     title: str
-    figure: Figure | None
+    figure: Figure | Drawing | None
     tables: tuple[Table, ...]
     claims: tuple[DecidedClaim, ...]
     failure: str = ""
@@ -118,6 +119,8 @@ def _reproduced(one: PaperFigure[Any], screen: FlipFlowScreen) -> ReproducedFigu
         claims = tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims)
     except IncompleteError as error:
         return _without(one, f"a branch to its end ({error})")
+    except MissingExtra as error:
+        return _without(one, f"an optional package ({error})")
     return ReproducedFigure(one.name, one.title, picture, tables, claims)
 
 

@@ -5,6 +5,7 @@ from flipflow.report import (  # noqa: F401  they register sections
     details,
     first_page,
     sensitivity,
+    transients,
 )
 from flipflow.report.html import write_html
 from flipflow.report.terminal import summary

@@ -6,10 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.response_quantities import REGISTRY
 from flipflow.figures.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
 from flipflow.model.fields import FIELD
-from flipflow.report.blocks import Block, Column, FigureBlock, Note, Table, Values, cells
+from flipflow.report.blocks import (
+    Block,
+    Column,
+    FigureBlock,
+    Heading,
+    Note,
+    Table,
+    Text,
+    Values,
+    cells,
+)
 from flipflow.report.numbers import NOTHING, number, quantity, rpm
 from flipflow.report.registry import Part, section
 from flipflow.results.sensitivity import Sensitivity
@@ -35,18 +46,18 @@ def figures_of_indices(result: Sensitivity) -> Iterator[Block]:
     yield FigureBlock(sensitivity_figure(result))
 
 
-def tornado(result: Sensitivity, omega: float | None = None) -> Iterator[Block]:
-    """The tornado chart as a section of another report, with the notes that belong to it.
-
-    Parameters
-    ----------
-    result
-        A sensitivity.
-    omega
-        One of its frequencies in rad/s where there are several.
-    """
-    yield FigureBlock(tornado_figure(result, omega))
-    yield from (Note(text) for text in result.notes)
+@section(Assessment, Part.DETAILS, 45)
+def tornado(assessment: Assessment) -> Iterator[Block]:
+    """What moves the amplitude most, one value of the empty machine at a time."""
+    found = assessment.tornado
+    if found is None or not np.isfinite(found.nominal):
+        return
+    yield Heading("What moves the amplitude", 1)
+    yield Text(
+        "The relative amplitude of the empty machine at working speed when one value alone is 5 % "
+        "lower or higher; the longest bar is the value to make and keep most exactly."
+    )
+    yield FigureBlock(tornado_figure(found))
 
 
 def _at_one(result: Sensitivity) -> Table:

@@ -1,0 +1,174 @@
+"""Figure 3: which parameter matters most to the relative amplitude of the machine without stop."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.analyses.linear import linear_response
+from flipflow.analyses.sensitivity import sensitivity
+from flipflow.figures.family import speed_axis_in_radians
+from flipflow.figures.palette import CASES, case_colour, case_symbol
+from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.figures.sensitivity import INDEX_AXIS, index_order
+from flipflow.model.fields import FIELD
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.paper.claims import Claim, Evaluation, Number, Part, bands, decide
+from flipflow.paper.figure import PaperFigure
+from flipflow.results.sensitivity import Sensitivity
+
+TITLE = "Sobol indices of the relative amplitude of the machine without stop"
+PARAMETERS = (
+    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
+    "shear_stiffness", "shear_damping",
+)  # fmt: skip
+SPREAD = 0.05
+GROUPS, FREQUENCIES = 4096, 200
+WHERE = "Fig. 3, 2.2"
+CAPTION = (
+    "Total indices: share of the variance of the relative amplitude that goes with a parameter and "
+    "all it does together with others. Each parameter of Table 1 varies evenly by 5 % to either "
+    f"side; {GROUPS} groups of samples at each of {FREQUENCIES} frequencies. Shaded: 95 % "
+    "confidence."
+)
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Indices:
+    """Total indices over frequency, and the frequencies that divide it."""
+
+    result: Sensitivity
+    w01: float
+    w02: float
+    w_ea: float | None
+    w_ar: float | None
+
+    @property
+    def omega(self) -> Real:
+        """Frequencies in rad/s."""
+        return np.asarray(self.result.omega)
+
+    def total(self, name: str) -> Real:
+        """Total index of a parameter over frequency."""
+        return self.result.total[:, self.result.names.index(name)]
+
+    def has_rank(self, name: str, rank: int) -> list[bool]:
+        """Where exactly ``rank`` other parameters have a higher total index."""
+        higher = np.sum(self.result.total > self.total(name)[:, None], axis=1)
+        return [bool(one) for one in higher == rank]
+
+
+def compute(screen: FlipFlowScreen) -> Indices:
+    """Between the natural frequencies, in closed form."""
+    bare = screen.replace(clearance=math.inf, clearance_minus=None)
+    linear = linear_response(bare, 1.0)
+    w01, w02 = (float(w) for w in linear.natural_frequencies)
+    ends = ((1.0 - SPREAD), (1.0 + SPREAD))
+    vary = {name: tuple(end * getattr(bare, name) for end in ends) for name in PARAMETERS}
+    omega = np.linspace(w01, w02, FREQUENCIES)
+    result = sensitivity(bare, vary, "relative_amplitude", omega, n=GROUPS)
+    return Indices(result, w01, w02, linear.omega_ea, linear.omega_ar)
+
+
+def draw(data: Indices) -> Figure:
+    """One line a parameter."""
+    areas, lines = [], []
+    for rank, i in enumerate(index_order(data.result)):
+        name = FIELD[data.result.names[i]].symbol
+        index, half = data.result.total[:, i], data.result.total_confidence[:, i]
+        areas.append(
+            Trace(f"{name}, 95 %", data.omega, index + half, "case band", "case band",
+                  legend=False, lower=index - half)
+        )  # fmt: skip
+        lines.append(
+            Trace(name, data.omega, index, colour=case_colour(rank), symbol=case_symbol(rank),
+                  bold=rank < 2, dash="dash" if rank >= CASES else "")
+        )  # fmt: skip
+    marks = (("w_ea", data.w_ea), ("w_ar", data.w_ar))
+    panel = Panel(
+        speed_axis_in_radians(data.w01, data.w02), Axis("total index", "", INDEX_AXIS),
+        (*areas, *lines),
+        lines=tuple(Line("x", at, f"{name} {at:.4g}", "mark") for name, at in marks if at),
+    )  # fmt: skip
+    return Figure(TITLE, CAPTION, (panel,), height=400)
+
+
+def stiffness_first(data: Indices) -> Evaluation:
+    """S1: where no parameter has a higher total index than k2."""
+    found = data.has_rank("shear_stiffness", 0)
+    return decide(list(bands(data.omega, found)), _share(found))
+
+
+def mass_second(data: Indices) -> Evaluation:
+    """S2: where exactly one parameter has a higher total index than m2."""
+    found = data.has_rank("floating_mass", 1)
+    return decide(list(bands(data.omega, found)), _share(found))
+
+
+def largest_past_antiresonance(data: Indices) -> Evaluation:
+    """S3: frequency of the largest total index of k2 and of m2."""
+    parts, numbers = [], {}
+    for name in ("shear_stiffness", "floating_mass"):
+        index, symbol = data.total(name), FIELD[name].symbol
+        at = float(data.omega[index.argmax()])
+        inside = None if data.w_ar is None else data.w_ar < at < data.w02
+        parts.append(Part(f"{symbol} between w_ar and w02", inside))
+        numbers[f"largest total index, {symbol}"] = Number(float(index.max()))
+        numbers[f"at, {symbol}"] = Number(at, "rad/s")
+    return decide(parts, numbers)
+
+
+def steepest_past_antiresonance(data: Indices) -> Evaluation:
+    """S4: mean slope of each total index in size, band by band."""
+    slopes = np.abs(np.gradient(data.result.total, data.omega, axis=0))
+    means = {name: slopes[inside].mean(axis=0) for name, inside in _bands(data)}
+    if "w_ar to w02" not in means:
+        return decide([Part("the bands", None)])
+    last = means.pop("w_ar to w02")
+    words = [FIELD[name].symbol for name in data.result.names]
+    parts = [Part("sum of all", all(last.sum() > mean.sum() for mean in means.values()))]
+    parts += [
+        Part(word, all(bool(last[i] > mean[i]) for mean in means.values()))
+        for i, word in enumerate(words)
+    ]
+    numbers = {}
+    for band, mean in (*means.items(), ("w_ar to w02", last)):
+        numbers[f"mean slope, sum of all, {band}"] = Number(1e3 * mean.sum(), "per 1000 rad/s")
+        for i, word in enumerate(words):
+            numbers[f"mean slope, {word}, {band}"] = Number(1e3 * mean[i], "per 1000 rad/s")
+    return decide(parts, numbers)
+
+
+def _bands(data: Indices) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+    """Frequencies of the three bands; none where one of them does not exist."""
+    if data.w_ea is None or data.w_ar is None or not data.w01 < data.w_ea < data.w_ar < data.w02:
+        return
+    ends = (("w01", data.w01), ("w_ea", data.w_ea), ("w_ar", data.w_ar), ("w02", data.w02))
+    for (low, start), (high, end) in itertools.pairwise(ends):
+        yield f"{low} to {high}", (data.omega >= start) & (data.omega <= end)
+
+
+def _share(found: list[bool]) -> dict[str, Number]:
+    return {"share of the frequencies": Number(100.0 * float(np.mean(found)), "%")}
+
+
+FIGURE = PaperFigure(
+    "figure-03", TITLE, compute, draw,
+    (
+        Claim("S1", WHERE, "between w01 and w02 the shear spring's stiffness k2 has the highest "
+              "total index of the relative amplitude", stiffness_first),
+        Claim("S2", WHERE, "the floating mass m2 comes second", mass_second),
+        Claim("S3", WHERE, "both indices are largest between w_ar and w02",
+              largest_past_antiresonance),
+        Claim("S4", WHERE, "between w_ar and w02 the indices depend most on the excitation "
+              "frequency", steepest_past_antiresonance),
+    ),
+    needs_stop=False,
+)  # fmt: skip

@@ -1,0 +1,108 @@
+"""Figure 6: the stop's piecewise law and the hyperbolic tangent that stands in for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from flipflow.analyses.linear import linear_response
+from flipflow.analyses.smooth_law import LawComparison, compare_laws
+from flipflow.errors import IncompleteError
+from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.figures.scales import KN, MM
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.smooth import SHARPNESS
+from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide
+from flipflow.paper.figure import PaperFigure
+
+TITLE = "The stop's law and the hyperbolic tangent that stands in for it"
+REACH = 1.5
+CLOSE_UP = 1.5
+FITS, THIN = 1e-3, 1e-2
+MICROMETRES = 1e6
+CAPTION = (
+    "Force of the stop over the relative displacement. Wide and pale: piecewise law, Eq. (2); "
+    f"thin: Eq. (3) with eps = {SHARPNESS:g} per metre. With damping: at a constant rate. With a "
+    "motion: x2 = 1.5 e sin(w t) at the antiresonance. Below: the same around the gap, where the "
+    "tangent takes its time to switch."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """Both laws in the paper's three conditions; the nearer gap stands at x2 = ``at``."""
+
+    at: float
+    conditions: tuple[LawComparison, ...]
+
+
+def compute(screen: FlipFlowScreen) -> Laws:
+    """Up to half as far again as the gap, at the speed of the antiresonance."""
+    stop, omega = screen.stop(), linear_response(screen, 1.0).omega_ar
+    plus, minus = stop.gaps
+    if omega is None or stop.law != "paper" or min(plus, minus) == 0.0:
+        raise IncompleteError("It needs the paper's law, a gap, and an antiresonance.")
+    at = plus if plus <= minus else -minus
+    return Laws(at, compare_laws(stop, REACH * abs(at), omega))
+
+
+def draw(data: Laws) -> Figure:
+    """A column for each condition: the whole course, and the layer at the gap."""
+    whole = [_whole(one, legend=k == 0) for k, one in enumerate(data.conditions)]
+    close = [_close(one, data.at) for one in data.conditions]
+    return Figure(TITLE, CAPTION, (*whole, *close), columns=3, height=470)
+
+
+def _whole(one: LawComparison, *, legend: bool) -> Panel:
+    axis = Axis("relative displacement", "mm")
+    traces = tuple(_traces(one, one.displacement * MM, slice(None), legend=legend))
+    return Panel(axis, Axis("force", "kN"), traces, title=one.condition)
+
+
+def _close(one: LawComparison, at: float) -> Panel:
+    """Around the nearer gap, where x2 rises."""
+    reach = CLOSE_UP * one.layer_width
+    passed = np.flatnonzero((np.abs(one.displacement - at) < reach) & (one.velocity >= 0.0))
+    rows = slice(int(passed[0]), int(passed[-1]) + 1)
+    axis = Axis("displacement from the gap", "um", (-MICROMETRES * reach, MICROMETRES * reach))
+    half = MICROMETRES * one.layer_width / 2.0
+    lines = tuple(Line("x", edge, "", "gap") for edge in (-half, half))
+    x = (one.displacement - at) * MICROMETRES
+    return Panel(axis, Axis("force", "kN"), tuple(_traces(one, x, rows, legend=False)), lines=lines)
+
+
+def _traces(one: LawComparison, x: np.ndarray, rows: slice, *, legend: bool) -> Iterator[Trace]:
+    yield Trace("piecewise law", x[rows], one.piecewise[rows] * KN, "beneath", "beneath",
+                legend=legend)  # fmt: skip
+    yield Trace("hyperbolic tangent", x[rows], one.smooth[rows] * KN, colour="main",
+                legend=legend)  # fmt: skip
+
+
+def fits(data: Laws) -> Evaluation:
+    """P1: differences outside the switching layers, and how wide these are."""
+    parts: list[Part] = []
+    numbers: dict[str, Number] = {}
+    for one in data.conditions:
+        name = one.condition
+        parts.append(Part(name, one.largest < FITS * one.largest_force))
+        numbers |= {
+            f"largest difference outside the layers, {name}": Number(one.largest, "N"),
+            f"rms difference outside, {name}": Number(one.rms, "N"),
+            f"largest difference inside, {name}": Number(one.largest_inside, "N"),
+            f"largest force, {name}": Number(one.largest_force, "N"),
+        }
+    width = data.conditions[0].layer_width
+    parts.append(Part("the layer is narrower than 1 % of the gap", width < THIN * abs(data.at)))
+    numbers["width of the layer"] = Number(width * MICROMETRES, "um")
+    return decide(parts, numbers)
+
+
+FIGURE = PaperFigure(
+    "figure-06", TITLE, compute, draw,
+    (
+        Claim("P1", "Fig. 6, 3", "tanh with eps = 1e6 fits the piecewise law in three conditions",
+              fits),
+    ),
+)  # fmt: skip

@@ -1,0 +1,112 @@
+"""The section "Start, stop and disturbances" of ``flipflow analyze``."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+import flipflow as ff
+from flipflow.analyses.assessment import assess
+from flipflow.io.results import assessment_document
+from flipflow.report.blocks import FigureBlock, Heading, Text
+from flipflow.report.registry import blocks_of
+
+
+@pytest.fixture(scope="module")
+def project():
+    return ff.load_project("ffs0827")
+
+
+@pytest.fixture(scope="module")
+def assessment(project):
+    return assess(project)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    """The rig is bistable at its working speed."""
+    return assess(ff.load_project("rig-lin2024"))
+
+
+def words(assessment):
+    found = blocks_of(assessment, brief=True)
+    return {block.lead: block.text for block in found if isinstance(block, Text)}
+
+
+def test_numbers_are_those_of_the_analyses(project, assessment):
+    start = ff.start_up(project.screen, project.drive, speed=project.speed)
+    coast = ff.coast_down(project.screen, start.final_speed, start.drive)
+    document = assessment_document(assessment)["transients"]
+    assert document["drive_assumed"] is (project.drive is None)
+    for name, run in (("start", start), ("coast_down", coast)):
+        assert document[name]["outcome"] == run.outcome
+        assert document[name]["final_speed"] == run.final_speed
+        assert document[name]["passing"] == run.passing
+        for key, peak in run.peaks.items():
+            assert document[name]["peaks"][key] == dataclasses.asdict(peak)
+    assert document["reasons"] == {}
+
+
+def test_report_has_the_section_with_two_figures(assessment):
+    found = blocks_of(assessment)
+    titles = [block.text for block in found if isinstance(block, Heading)]
+    assert titles.count("Start, stop and disturbances") == 1
+    figures = [block.figure.title for block in found if isinstance(block, FigureBlock)]
+    assert [title for title in figures if title in ("Start", "Coast-down")] == [
+        "Start", "Coast-down",
+    ]  # fmt: skip
+
+
+def test_words_of_the_empty_machine(assessment):
+    said = words(assessment)
+    start = said["Start (empty):"]
+    assert start.startswith("reaches 850 rpm in ")
+    assert "passes the first natural frequency w01 = 214.8 rpm in " in start
+    assert start.endswith("(drive assumed).")
+    assert "comes down from " in said["Coast-down (empty):"]
+    assert said["Blows and lumps (empty):"] == "cannot jump: no other motion was found."
+
+
+def test_a_drive_of_the_machine_file_is_taken(project):
+    drive = dataclasses.replace(assess_drive(project), friction=0.0)
+    given = assess(dataclasses.replace(project, drive=drive))
+    assert given.transients.start.drive is drive
+    assert words(given)["Start (empty):"].endswith("(drive of the machine file).")
+
+
+def test_a_machine_that_is_captured_has_no_coast_down(project):
+    """A third of the assumed motor hangs at the first natural frequency."""
+    drive = assess_drive(project)
+    motor = dataclasses.replace(drive.motor, rated_power=1500.0, breakdown_torque=None)
+    weak = assess(dataclasses.replace(project, drive=dataclasses.replace(drive, motor=motor)))
+    said = words(weak)
+    assert said["Start (empty):"].startswith("captured at ")
+    assert "does not pass the first natural frequency" in said["Start (empty):"]
+    reason = "the start does not reach the working speed"
+    assert said["Coast-down (empty):"] == f"not checked: {reason}."
+    document = assessment_document(weak)["transients"]
+    assert document["coast_down"] is None
+    assert document["reasons"] == {"coast_down": reason}
+
+
+def test_least_blow_and_lump_of_a_bistable_machine(rig):
+    risk = ff.jump_risk(rig.project.screen, rig.project.speed)
+    found = assessment_document(rig)["transients"]["jump_risk"]
+    assert found["other_motions"] == len(risk.others) > 0
+    assert found["impulse"]["impulse"] == risk.worst_impulse.impulse
+    assert found["lump"] is None or found["lump"]["lump"] == risk.worst_lump.lump
+    assert "kg m/s on the " in words(rig)["Blows and lumps (empty):"]
+
+
+def test_without_a_working_speed_nothing_is_checked(project):
+    given = assess(dataclasses.replace(project, speed=None), omega=(85.0, 90.0))
+    assert given.transients is None
+    assert assessment_document(given)["transients"] is None
+    said = words(given)["Start, stop and disturbances:"]
+    assert said == "not checked, for the machine file gives no working speed."
+
+
+def assess_drive(project):
+    """The drive that is assumed for the machine."""
+    return ff.start_up(project.screen, speed=project.speed).drive

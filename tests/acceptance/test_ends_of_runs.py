@@ -1,0 +1,48 @@
+"""The last moment of a run, and a speed that comes twice."""
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.errors import InputError
+
+OMEGA = 50.0
+
+
+@pytest.fixture(scope="module")
+def screen():
+    return ff.load("ffs0827")
+
+
+def test_last_sample_is_reached_whatever_the_number_of_turns(screen):
+    """At 50 rad/s 192 turns are one rounding longer than six stretches of 32 turns."""
+    longer = ff.simulate(screen, OMEGA, 193)
+    run = ff.simulate(screen, OMEGA, 192)
+    assert run.x[-1] == pytest.approx(longer.x[192 * 128], rel=1e-9)
+    assert run.a[-1] == pytest.approx(longer.a[192 * 128], rel=1e-9)
+
+
+def test_last_sample_after_a_blow_just_before_the_end(screen):
+    end = 3 * 2.0 * math.pi / OMEGA
+    blow = ff.Impulse(math.nextafter(end, 0.0), "main", 100.0)
+    calm = ff.simulate(screen, OMEGA, 3)
+    struck = ff.simulate(screen, OMEGA, 3, disturbances=(blow,))
+    assert struck.x[-1] == pytest.approx(calm.x[-1], rel=1e-9)
+    assert struck.v[-1, 0] - calm.v[-1, 0] == pytest.approx(100.0 / screen.main_mass, rel=1e-9)
+
+
+def test_a_speed_that_comes_twice_is_no_jump(screen):
+    swept = ff.sweep(screen, np.array([100.0, 100.0, 100.0]))
+    assert swept.jumps == ()
+    assert swept.settled.all()
+
+
+def test_an_orbit_of_another_machine_is_no_start(screen):
+    one_mass = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], (), ff.Unbalance([0.1]))
+    (orbit,) = ff.periodic_orbits(one_mass, 0.5)
+    with pytest.raises(InputError, match="an orbit of this machine"):
+        ff.simulate(screen, OMEGA, 2, initial=orbit)
+    with pytest.raises(InputError, match="an orbit of this machine"):
+        ff.sweep(screen, [OMEGA], initial=orbit)
