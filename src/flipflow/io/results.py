@@ -9,9 +9,10 @@ import tempfile
 from collections.abc import Callable, Mapping
 from functools import singledispatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.reopen import basins_from, branch_from
@@ -44,9 +45,6 @@ from flipflow.results.sensitivity import (
 from flipflow.results.sweep import Sweep
 from flipflow.results.time_document import history_document, sweep_document
 
-if TYPE_CHECKING:
-    import xarray
-
 RPM = 30.0 / np.pi
 Opened = Branch | Basins | Sensitivity | dict[str, Any]
 OPENERS: Mapping[str, Callable[[dict[str, Any]], Opened]] = {
@@ -77,8 +75,9 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
         text = json.dumps(document_of(result), indent=1, ensure_ascii=False, allow_nan=False)
         _write(target, text.encode())
     elif target.suffix in (".nc", ".csv") and isinstance(result, Branch):
-        table = branch_table(result)
-        _write(target, table.to_netcdf() if target.suffix == ".nc" else _csv(table))
+        table = branch_columns(result)
+        netcdf = target.suffix == ".nc"
+        _write(target, _netcdf(table, _attributes(result)) if netcdf else _csv(table))
     else:
         raise InputError(
             "path", str(path), f"{type(result).__name__} is written as .json; a branch also as "
@@ -197,27 +196,31 @@ def _tornado_document(result: OneAtATime) -> dict[str, Any]:
     return {name: plain(getattr(result, name)) for name in fields}
 
 
-def branch_table(branch: Branch) -> xarray.Dataset:
-    """The points of a branch as a labelled table along the dimension "point"."""
-    import xarray as xr  # noqa: PLC0415  slow to import, and only files need it
+Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]
 
-    columns: dict[str, tuple[str, Any, Mapping[str, str]]] = {
-        "omega": ("point", branch.omega, {"units": "rad/s"}),
-        "speed": ("point", branch.omega * RPM, {"units": "rpm"}),
-        "stable": ("point", branch.stable.astype(np.int8), {"flag_meanings": "1: returns"}),
-        "error": ("point", branch.error, {"units": "m"}),
-        "largest_multiplier": ("point", np.abs(branch.multipliers[:, 0]), {}),
+
+def branch_columns(branch: Branch) -> Columns:
+    """The points of a branch by name: values (n,) and attributes such as units."""
+    columns: Columns = {
+        "omega": (branch.omega, {"units": "rad/s"}),
+        "speed": (branch.omega * RPM, {"units": "rpm"}),
+        "stable": (branch.stable.astype(np.int8), {"flag_meanings": "1: returns"}),
+        "error": (branch.error, {"units": "m"}),
+        "largest_multiplier": (np.abs(branch.multipliers[:, 0]), {}),
     }
     for which in branch.system.named:
-        columns[f"amplitude_{which}"] = ("point", branch.amplitude(which), {"units": "m"})
-        columns[f"phase_{which}"] = ("point", branch.phase(which), {"units": "rad"})
-    attributes = {
+        columns[f"amplitude_{which}"] = (branch.amplitude(which), {"units": "m"})
+        columns[f"phase_{which}"] = (branch.phase(which), {"units": "rad"})
+    return columns
+
+
+def _attributes(branch: Branch) -> dict[str, str]:
+    return {
         "title": "Periodic motions over frequency",
         "method": repr(branch.method),
         "status": branch.status.value,
         "flipflow_version": branch.version,
     }
-    return xr.Dataset(columns, attrs=attributes)
 
 
 def write_response(assessment: Assessment, folder: Path) -> list[str]:
@@ -225,21 +228,45 @@ def write_response(assessment: Assessment, folder: Path) -> list[str]:
 
     Branches have different numbers of points, so the cases follow each other along "point".
     """
-    import xarray as xr  # noqa: PLC0415  slow to import, and only files need it
-
-    tables = [branch_table(case.branch) for case in assessment.cases]
-    owner = np.repeat(np.arange(len(tables)), [table.sizes["point"] for table in tables])
-    joined = xr.concat(tables, dim="point", combine_attrs="drop_conflicts")
+    tables = [branch_columns(case.branch) for case in assessment.cases]
+    joined: Columns = {
+        name: (np.concatenate([table[name][0] for table in tables]), attributes)
+        for name, (_, attributes) in tables[0].items()
+    }
+    owner = np.repeat(np.arange(len(tables)), [case.branch.omega.size for case in assessment.cases])
     meanings = ", ".join(f"{k}: {case.name}" for k, case in enumerate(assessment.cases))
-    joined["case"] = ("point", owner.astype(np.int32), {"flag_meanings": meanings})
-    joined.attrs["input_hash"] = assessment.input_hash
-    _write(folder / "response.nc", joined.to_netcdf())
+    joined["case"] = (owner.astype(np.int32), {"flag_meanings": meanings})
+    shared = dict(
+        set.intersection(*(set(_attributes(case.branch).items()) for case in assessment.cases))
+    )
+    shared["input_hash"] = assessment.input_hash
+    _write(folder / "response.nc", _netcdf(joined, shared))
     rows = [
         _csv(table, case=case.name, head=k == 0)
         for k, (case, table) in enumerate(zip(assessment.cases, tables, strict=True))
     ]
     _write(folder / "response.csv", b"".join(rows))
     return ["response.nc", "response.csv"]
+
+
+def _netcdf(columns: Columns, attributes: Mapping[str, str]) -> bytes:
+    """Classic NetCDF with one dimension, "point"; xarray opens it as a labelled table."""
+    import io  # noqa: PLC0415  shadows the package elsewhere
+
+    from scipy.io import netcdf_file  # noqa: PLC0415  only files need it
+
+    content = io.BytesIO()
+    with netcdf_file(content, "w") as file:
+        for name, text in attributes.items():
+            setattr(file, name, text)
+        file.createDimension("point", next(iter(columns.values()))[0].size)
+        for name, (values, own) in columns.items():
+            variable = file.createVariable(name, values.dtype, ("point",))
+            variable[:] = values
+            for key, text in own.items():
+                setattr(variable, key, text)
+        file.flush()
+        return content.getvalue()
 
 
 def prepare_folder(folder: Path) -> None:
@@ -259,17 +286,16 @@ def prepare_folder(folder: Path) -> None:
         raise InputError("--output", str(folder), remedy) from None
 
 
-def _csv(table: xarray.Dataset, case: str | None = None, *, head: bool = True) -> bytes:
+def _csv(columns: Columns, case: str | None = None, *, head: bool = True) -> bytes:
     import io  # noqa: PLC0415  shadows the package elsewhere
 
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = [str(name) for name in table.data_vars]
     if head:
-        units = [table[name].attrs.get("units", "") for name in names]
-        heads = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
+        units = [own.get("units", "") for _, own in columns.values()]
+        heads = [f"{n} [{u}]" if u else n for n, u in zip(columns, units, strict=True)]
         writer.writerow(heads if case is None else ["case", *heads])
-    for row in zip(*(table[name].values.tolist() for name in names), strict=True):
+    for row in zip(*(values.tolist() for values, _ in columns.values()), strict=True):
         writer.writerow(row if case is None else (case, *row))
     return text.getvalue().encode()
 
