@@ -14,6 +14,7 @@ from flipflow.kernels import arclength
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Point, Solver, Traced
+from flipflow.model.system import Machine
 from flipflow.results.basins import Basins, GridAxis
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.document import BASINS, BRANCH, machine_from, method_from
@@ -38,39 +39,14 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
     def solver_of(half_turn: bool, turns: int) -> Solver:
         return solver_for(system, method, half_turn=half_turn, turns=turns)
 
-    half_turn, turns = document["half_turn"], document.get("turns", 1)
-    solver = solver_of(half_turn, turns)
-    u = np.asarray(document["unknowns"], dtype=float).reshape(-1, solver.unknowns)
-    points = u.shape[0]
-    # One more than the points: the step at which the branch ended.
-    record = new_branch(solver.unknowns, points + 1)
-    record.u[:points] = u
-    record.omega[:points] = document["omega"]
-    record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
-    record.signature[:points] = document["signature"]
-    record.iterations[:points] = document["iterations"]
-    tried = len(document["rejected"])
-    record.rejected[:tried], record.reason[:tried] = document["rejected"], document["reason"]
-    course = arclength.Course(*document["course"])
-    traced = Traced.recorded(record, points, int(document["code"]), course)
-    n = solver.system.size
+    own = document["half_turn"], document.get("turns", 1)
+    solver = solver_of(*own)
+    traced = _traced_from(document, solver.unknowns)
+    points, n = traced.omega.size, solver.system.size
     special = tuple(
-        SpecialPoint(
-            one["kind"],
-            Orbit(
-                machine,
-                Point(
-                    # Where a branch meets another, the point is one of the other's motions.
-                    solver_of(one.get("half_turn", half_turn), one.get("turns", turns)),
-                    np.asarray(one["unknowns"]),
-                    one["omega"],
-                    known_map=np.asarray(one["return_map"]),
-                ),
-                word_of(one["kind"]),
-            ),
-            one["position"],
-            one["spring"],
-            one["side"],
+        # Where a branch meets another, the point is one of the other's motions.
+        _special_from(
+            one, machine, solver_of(one.get("half_turn", own[0]), one.get("turns", own[1]))
         )
         for one in document["special_points"]
     )
@@ -89,6 +65,30 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
         notes=tuple(document["notes"]),
         version=document["version"],
     )
+
+
+def _traced_from(document: Mapping[str, Any], unknowns: int) -> Traced:
+    """The points of a branch as they were followed."""
+    u = np.asarray(document["unknowns"], dtype=float).reshape(-1, unknowns)
+    points = u.shape[0]
+    # One more than the points: the step at which the branch ended.
+    record = new_branch(unknowns, points + 1)
+    record.u[:points] = u
+    record.omega[:points] = document["omega"]
+    record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
+    record.signature[:points] = document["signature"]
+    record.iterations[:points] = document["iterations"]
+    tried = len(document["rejected"])
+    record.rejected[:tried], record.reason[:tried] = document["rejected"], document["reason"]
+    course = arclength.Course(*document["course"])
+    return Traced.recorded(record, points, int(document["code"]), course)
+
+
+def _special_from(one: Mapping[str, Any], machine: Machine, solver: Solver) -> SpecialPoint:
+    unknowns, known = np.asarray(one["unknowns"]), np.asarray(one["return_map"])
+    point = Point(solver, unknowns, one["omega"], known_map=known)
+    orbit = Orbit(machine, point, word_of(one["kind"]))
+    return SpecialPoint(one["kind"], orbit, one["position"], one["spring"], one["side"])
 
 
 def basins_from(document: Mapping[str, Any]) -> Basins:

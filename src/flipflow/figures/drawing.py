@@ -8,8 +8,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from flipflow.errors import InputError, MissingExtra, StoreError
+from flipflow.errors import MissingExtra
 from flipflow.figures.palette import INK
+from flipflow.figures.parts import write_rendered
 
 FORMATS = (".html", ".svg", ".pdf")
 PAGE = """<!DOCTYPE html>
@@ -58,15 +59,7 @@ class Drawing:
         MissingExtra
             When typst, which makes the PDF, is not installed.
         """
-        target = Path(path)
-        ending = target.suffix.lower()
-        if ending not in FORMATS:
-            raise InputError("path", str(path), f"give a name that ends in {', '.join(FORMATS)}")
-        try:
-            target.write_bytes(self._rendered(ending))
-        except OSError as error:
-            raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
-        return target
+        return write_rendered(path, FORMATS, self._rendered)
 
     def _rendered(self, ending: str) -> bytes:
         if ending == ".svg":

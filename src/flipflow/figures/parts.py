@@ -7,6 +7,7 @@ draw it. Colours are named by what they mean; :mod:`flipflow.figures.palette` sa
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -231,16 +232,7 @@ class Figure:
         MissingExtra
             When matplotlib is needed and not installed.
         """
-        target = Path(path)
-        ending = target.suffix.lower()
-        if ending not in FORMATS:
-            raise InputError("path", str(path), f"give a name that ends in {', '.join(FORMATS)}")
-        data = self._rendered(ending)
-        try:
-            target.write_bytes(data)
-        except OSError as error:
-            raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
-        return target
+        return write_rendered(path, FORMATS, self._rendered)
 
     def _rendered(self, ending: str) -> bytes:
         if ending == ".html":
@@ -250,3 +242,27 @@ class Figure:
         from flipflow.figures.print import printed  # noqa: PLC0415  loads matplotlib
 
         return printed(self, ending.removeprefix("."))
+
+
+def write_rendered(
+    path: str | os.PathLike[str], formats: Sequence[str], rendered: Callable[[str], bytes]
+) -> Path:
+    """Write what ``rendered`` makes for the path's ending, one of ``formats``; the file.
+
+    Raises
+    ------
+    InputError
+        For another ending.
+    StoreError
+        When the file cannot be written.
+    """
+    target = Path(path)
+    ending = target.suffix.lower()
+    if ending not in formats:
+        raise InputError("path", str(path), f"give a name that ends in {', '.join(formats)}")
+    data = rendered(ending)
+    try:
+        target.write_bytes(data)
+    except OSError as error:
+        raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
+    return target
