@@ -12,7 +12,6 @@ from flipflow.analyses.frequency_response import solver_for, word_of
 from flipflow.errors import StoreError
 from flipflow.kernels import arclength
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Point, Solver, Traced
 from flipflow.model.system import Machine
 from flipflow.results.basins import Basins, GridAxis
@@ -41,7 +40,7 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
 
     own = document["half_turn"], document.get("turns", 1)
     solver = solver_of(*own)
-    traced = _traced_from(document, solver.unknowns)
+    traced = _traced_from(document, solver)
     points, n = traced.omega.size, solver.system.size
     special = tuple(
         # Where a branch meets another, the point is one of the other's motions.
@@ -67,12 +66,13 @@ def branch_from(document: Mapping[str, Any]) -> Branch:
     )
 
 
-def _traced_from(document: Mapping[str, Any], unknowns: int) -> Traced:
-    """The points of a branch as they were followed."""
-    u = np.asarray(document["unknowns"], dtype=float).reshape(-1, unknowns)
+def _traced_from(document: Mapping[str, Any], solver: Solver) -> Traced:
+    """The points of a branch as they were followed, but for the depths: those are not kept."""
+    u = np.asarray(document["unknowns"], dtype=float).reshape(-1, solver.unknowns)
     points = u.shape[0]
     # One more than the points: the step at which the branch ended.
-    record = new_branch(unknowns, points + 1)
+    record = solver.new_branch(points + 1)
+    record.depth[:] = np.nan
     record.u[:points] = u
     record.omega[:points] = document["omega"]
     record.tangent[:points] = np.reshape(document["tangent"], (points, -1))

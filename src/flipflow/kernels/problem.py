@@ -1,4 +1,4 @@
-"""What every problem offers to the arc-length loop: residual, signature, scale.
+"""What every problem offers to the arc-length loop: residual, signature, depth, scale.
 
 Dispatch is by problem type at compile time. A compiled function handed over as an argument would
 be compiled anew in every process. The plain functions serve where compiling is switched off.
@@ -11,10 +11,23 @@ from typing import Any
 from numba.core.types import NamedTuple as NamedTupleType
 from numba.extending import overload
 
-from flipflow.kernels.balance import Balance, balance_residual, contact_count, series_scale
+from flipflow.kernels.balance import balance_residual, series_scale
 from flipflow.kernels.plan import Real
-from flipflow.kernels.sampled import Sampled, passages, sampled_residual, sampled_scale
-from flipflow.kernels.shooting import Shooting, crossings, shooting_residual, state_scale
+from flipflow.kernels.sampled import (
+    Sampled,
+    passages,
+    sampled_depths,
+    sampled_residual,
+    sampled_scale,
+)
+from flipflow.kernels.series import Balance, contact_count, series_depths
+from flipflow.kernels.shooting import (
+    Shooting,
+    crossings,
+    flow_depths,
+    shooting_residual,
+    state_scale,
+)
 
 _RESIDUAL: dict[type, Any] = {
     Shooting: shooting_residual,
@@ -22,6 +35,11 @@ _RESIDUAL: dict[type, Any] = {
     Sampled: sampled_residual,
 }
 _SIGNATURE: dict[type, Any] = {Shooting: crossings, Balance: contact_count, Sampled: passages}
+_DEPTHS: dict[type, Any] = {
+    Shooting: flow_depths,
+    Balance: series_depths,
+    Sampled: sampled_depths,
+}
 _SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale, Sampled: sampled_scale}
 
 
@@ -33,6 +51,11 @@ def residual(problem: Any, u: Real, omega: float, r: Real, J: Real) -> int:
 def signature(problem: Any) -> int:
     """A number that changes when the contacts of the last residual's motion change."""
     return int(_SIGNATURE[type(problem)](problem))
+
+
+def depths(problem: Any, omega: float, depth: Real) -> None:
+    """Write the greatest depth in m beyond each gap, (m, 2), of the last residual's motion."""
+    _DEPTHS[type(problem)](problem, omega, depth)
 
 
 def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
@@ -60,6 +83,16 @@ def _signature(problem: Any) -> Any:
 
     def run(problem: Any) -> Any:
         return chosen(problem)
+
+    return run
+
+
+@overload(depths)
+def _depths(problem: Any, omega: Any, depth: Any) -> Any:
+    chosen = _DEPTHS[_kind(problem)]
+
+    def run(problem: Any, omega: Any, depth: Any) -> Any:
+        return chosen(problem, omega, depth)
 
     return run
 
