@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 from numba.core.types import NamedTuple as NamedTupleType
-from numba.extending import overload
 
 from flipflow.kernels.balance import balance_residual, series_scale
+from flipflow.kernels.compile import chosen_by_type
 from flipflow.kernels.plan import Real
 from flipflow.kernels.sampled import (
     Sampled,
@@ -67,7 +67,7 @@ def _kind(problem: Any) -> Any:
     return problem.instance_class if isinstance(problem, NamedTupleType) else None
 
 
-@overload(residual)
+@chosen_by_type(residual)
 def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
     chosen = _RESIDUAL[_kind(problem)]
 
@@ -77,7 +77,7 @@ def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
     return run
 
 
-@overload(signature)
+@chosen_by_type(signature)
 def _signature(problem: Any) -> Any:
     chosen = _SIGNATURE[_kind(problem)]
 
@@ -87,7 +87,7 @@ def _signature(problem: Any) -> Any:
     return run
 
 
-@overload(depths)
+@chosen_by_type(depths)
 def _depths(problem: Any, omega: Any, depth: Any) -> Any:
     chosen = _DEPTHS[_kind(problem)]
 
@@ -97,7 +97,7 @@ def _depths(problem: Any, omega: Any, depth: Any) -> Any:
     return run
 
 
-@overload(unknown_scale)
+@chosen_by_type(unknown_scale)
 def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
     chosen = _SCALE[_kind(problem)]
 
