@@ -63,7 +63,7 @@ def test_a_kernel_for_kernels_is_not_run_from_python(package: Path, tmp_path: Pa
         env={**os.environ, "FLIPFLOW_CACHE_DIR": str(tmp_path / "cache")}, check=False,
     )  # fmt: skip
     assert done.returncode == 1
-    assert "TypeError" in done.stderr
+    assert "KeyError" in done.stderr
 
 
 def test_the_cache_stays_in_its_folder(package: Path, tmp_path: Path) -> None:

@@ -37,8 +37,9 @@ class PartLowering(NativeLowering):
         state.library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # A name of its own for callers to find the code by, which has to be a built-in function.
-        name = dict[str, Any]().items
+        # Callers find the code by a built-in function of its own; called from Python this one,
+        # the look-up in an empty dictionary, raises, whatever the arguments.
+        name = dict[Any, Any]().__getitem__
         state.targetctx.insert_user_function(name, state.cr.fndesc, [state.library])
         state.cr = state.cr._replace(cfunc=name)
         return True

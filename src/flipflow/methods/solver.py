@@ -257,6 +257,18 @@ class Solver(ABC):
         jacobian = self.work.J[:, :-1].copy()
         return share, Point(self, u, omega, float(self.work.tangent[-1]), jacobian)
 
+    def eigenvalues(self, traced: Traced, maps: Real) -> Complex:
+        """Eigenvalues (P, 2 N) of return maps; without contact those of the open machine."""
+        plan, shooting = self.builder.plan, self.shooting(half_turn=self.half_turn)
+        rate = plan.rate[0, : plan.mode_count[0]]
+        rate = np.concatenate([rate, rate[rate.imag > 0.0].conj()])
+        free = np.all(traced.depth < 0.0, axis=(1, 2))
+        duration = shooting.fraction * 2.0 * np.pi / traced.omega[free]
+        found = np.empty(maps.shape[:-1], np.complex128)
+        found[free] = shooting.sign * np.exp(duration[:, None] * rate)
+        found[~free] = eigenvalues_of(maps[~free])
+        return found
+
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
         course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, arclength.SHARP)
