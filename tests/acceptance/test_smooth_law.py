@@ -101,12 +101,13 @@ def test_paper_sharpness_shows_false_turning_points_and_says_so(screen) -> None:
 def test_a_sharper_switch_stalls_and_the_status_says_so(screen) -> None:
     """At 1e8 per metre no sample is ever in the layer: the branch ends where no solution goes on.
 
-    Public codes that sample the piecewise law stall between 141 and 190 rad/s as well.
+    Where that happens depends on the steps: each sample that crosses a gap is a jump, which a step
+    may pass. Public codes that sample the piecewise law stall between 141 and 190 rad/s as well.
     """
     branch = sampled(screen, (60.0, 210.0), sharpness=1e8)
     assert branch.status.name == "STEP_TOO_SMALL"
     assert not branch.complete
-    assert 140.0 < branch.omega[-1] < 145.0
+    assert 140.0 < branch.omega[-1] < 190.0
 
 
 def test_results_survive_a_file(screen, tmp_path) -> None:
