@@ -16,15 +16,15 @@ from flipflow.kernels.plan import Int, Real
 from flipflow.kernels.problem import depths, residual, signature, unknown_scale
 
 NEWTON_MOST = 8
-NEWTON_FEW, NEWTON_MANY = 3, 5
+NEWTON_FEW, NEWTON_MANY = 3, 4
 QUICK, SHARP = 1e-6, 1e-10
 GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
 LONGEST, SHORTEST = 1.0, 1e-10
 FAR = 2.0
-TOLERATED = 1e-2
-TURN_MOST, ASTRAY_MOST = 0.90, 0.2
+TOLERATED = 1e-4
+TURN_MOST, ASTRAY_MOST, ASTRAY_AT_CORNER = 0.90, 0.05, 0.5
 AWAY, BACK = 3.0, 0.9
-CONTACT_STEP, STRAND_STEP, LABOURED_STEP = 0.03, 1e-4, 1e-3
+CONTACT_STEP, STRAND_STEP, SHORT_STEP = 0.03, 1e-4, 1e-3
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
 
@@ -271,7 +271,7 @@ def judge(
     lies on another strand that runs the other way.
     """
     n = work.r.shape[0]
-    laboured = iterations > NEWTON_MANY and step > LABOURED_STEP
+    laboured = iterations > NEWTON_MANY and step > SHORT_STEP
     if code != status.OK or laboured:
         return REASON_NEWTON
     if work.w[n] > course.upper or work.w[n] < course.lower:
@@ -282,7 +282,9 @@ def judge(
         work.side[0] = -work.side[0]
         for k in range(work.tangent.shape[0]):
             work.tangent[k] = -work.tangent[k]
-    if abs(cosine) < TURN_MOST or astray(work) > ASTRAY_MOST * step:
+    # Where two contacts change at once the branch has a corner, which only a short step may turn.
+    off = ASTRAY_MOST if step > SHORT_STEP else ASTRAY_AT_CORNER
+    if abs(cosine) < TURN_MOST or astray(work) > off * step:
         return REASON_TURN
     if work.side[0] != branch.side[p] and step > STRAND_STEP:
         return REASON_STRAND
