@@ -28,6 +28,7 @@ from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_
 SHARE_TOLERANCE = 1e-10
 DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
 BOTTOM_STEPS = 15
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
@@ -262,18 +263,23 @@ def _dips(values: Real) -> list[int]:
 def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool) -> float | None:
     """Share in step p where the test has the other sign, None when it never has.
 
-    A plunge that has ended halfway, no lower than the ends, goes no further.
+    A plunge that is nowhere between lower than at the ends has ended.
     """
-    ends = np.abs(test.values[p : p + 2])
     sign = float(np.sign(test.values[p]))
+    low, high = 0.0, 1.0
 
     def height(share: float) -> float:
         return sign * test.evaluate(solver.between(traced, p, share))
 
-    if plunges and height(0.5) > ends.min():
-        return None
+    if plunges:
+        first, last = np.abs(test.values[p : p + 2])
+        heights = [first, *(height(share) for share in QUARTERS[1:-1]), last]
+        lowest = int(np.argmin(heights))
+        if lowest in (0, len(QUARTERS) - 1):
+            return None
+        low, high = QUARTERS[lowest - 1], QUARTERS[lowest + 1]
     best = minimize_scalar(
-        height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": BOTTOM_STEPS}
+        height, bounds=(low, high), method="bounded", options={"maxiter": BOTTOM_STEPS}
     )
     return float(best.x) if best.fun < 0.0 else None
 
