@@ -68,6 +68,7 @@ def test_quantities_come_with_their_unit():
     assert quantity(0.0051167, "mm", "m") == "5.12 mm"
     assert quantity(28.7359, "g", "m/s^2") == "2.93 g"
     assert quantity(None, "kN", "N") == "-"
+    assert quantity(math.nan, "mm", "m") == "-"
     assert named("jump_margin", math.inf) == "no jump"
     assert rpm(850.0 * math.pi / 30.0) == "850"
     assert speed(850.0 * math.pi / 30.0) == "850 rpm (14.17 Hz, 89.01 rad/s)"

@@ -22,7 +22,7 @@ def number(value: float) -> str:
 
 def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool = True) -> str:
     """An SI value in the unit to show."""
-    if value is None:
+    if value is None or math.isnan(value):
         return NOTHING
     text = number(in_unit(value, shown_unit, unit)) if math.isfinite(value) else number(value)
     return f"{text} {shown_unit}".strip() if with_unit else text
