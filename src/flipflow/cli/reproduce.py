@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.output import console
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -23,7 +25,7 @@ STYLES = {
 def reproduce(
     figures: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[FIGURE]...", help="figure-08, or 8; all where none is named."),
+        typer.Argument(metavar="FIGURE", help="figure-08, or 8; all where none is named."),
     ] = None,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for page and figures.")
@@ -36,33 +38,38 @@ def reproduce(
         str, typer.Option("--machine", metavar="FILE", help="Another machine file.")
     ] = "ffs0827",
 ) -> None:
-    """Reproduce the paper: its figures, and every claim decided by computing it."""
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    """Reproduce the paper: its figures, a verdict on each claim."""
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load  # noqa: PLC0415
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
     from flipflow.paper.registry import chosen  # noqa: PLC0415
 
     names = tuple(figures or ())
-    chosen(names)
+    wanted = chosen(names)
     screen = load(machine)
-    prepare_folder(output)
+    with Destination(output, json) as target:
+        from flipflow.cli.progress import Tell, stoppable, with_progress  # noqa: PLC0415
+        from flipflow.paper.page import write_reproduction  # noqa: PLC0415
+        from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
+        from flipflow.report.html import require_templates  # noqa: PLC0415
 
-    from flipflow.cli.progress import Tell, with_progress  # noqa: PLC0415
-    from flipflow.paper.page import write_reproduction  # noqa: PLC0415
-    from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
+        require_templates()
 
-    def run(monitor: Tell) -> tuple[Reproduction, tuple[str, ...]]:
-        found = reproduced(screen, names, monitor)
-        return found, write_reproduction(found, output, monitor)
+        def run(monitor: Tell) -> tuple[Reproduction, tuple[str, ...]]:
+            with stoppable(monitor, "figure-") as told:
+                found = reproduced(screen, names, told)
+            return found, write_reproduction(found, output, monitor)
 
-    found, written = with_progress(run)
-    if json is not None:
-        write_json(found.document(), json)
-    if json != "-":
-        _show(found, console(), output, written)
+        found, written = with_progress(run)
+        if target.spoken:
+            _show(found, console())
+        target.document(found.document())
+        target.wrote(written[0], f"and {(len(written) - 1) // 3} figures as HTML, SVG and PDF")
+        target.tell()
+        if len(found.figures) < len(wanted):
+            raise target.stopped(kept=True)
 
 
-def _show(found: Reproduction, out: Console, folder: Path, written: tuple[str, ...]) -> None:
+def _show(found: Reproduction, out: Console) -> None:
     from rich.table import Table  # noqa: PLC0415  slow to import
     from rich.text import Text  # noqa: PLC0415
 
@@ -78,8 +85,3 @@ def _show(found: Reproduction, out: Console, folder: Path, written: tuple[str, .
     for figure in found.figures:
         if figure.failure:
             out.print(f"{figure.name} is not drawn. {figure.failure}", style="yellow")
-    pictures = (len(written) - 1) // 3
-    out.print(
-        f"Written to {folder}: {written[0]}, and {pictures} figures as HTML, SVG and PDF",
-        soft_wrap=True,
-    )
