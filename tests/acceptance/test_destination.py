@@ -208,13 +208,10 @@ def test_ctrl_c_in_a_reproduction_keeps_the_figures_that_are_finished(
 ):
     run = reproduce
 
-    def interrupted(screen, names, monitor):
-        def told(sentence, share):
-            if sentence == "figure-05":
-                os.kill(os.getpid(), signal.SIGINT)
-            monitor(sentence, share)
-
-        return run(screen, names, told)
+    def interrupted(screen, names):
+        if names == ("figure-05",):
+            raise KeyboardInterrupt
+        return run(screen, names)
 
     monkeypatch.setattr("flipflow.paper.reproduce.reproduce", interrupted)
     code, out, err = command("reproduce", "3", "4", "5", "-o", "out", "--json", "c.json")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import textwrap
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +16,7 @@ from flipflow.errors import Cancelled
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+CLOCK = 0.05  # s by which the clock of files may be late
 STOPPED, NOTHING = "Stopped by the user", "nothing is written"
 
 
@@ -47,6 +49,7 @@ class Destination:
         if json is not None:
             check_json(json)
         self.folder, self.json = folder, json
+        self._begun = time.time()
         self._names: list[str] = []
         self._places: list[str] = []
 
@@ -99,10 +102,15 @@ class Destination:
 
     def stopped(self, *, kept: bool = False) -> Cancelled:
         """The error that ends a command after Ctrl-C; ``kept``: what was finished is shown."""
-        places = [str(self.folder)] * bool(self._names) + self._places
+        places = [str(self.folder)] * self._touched() + self._places
         if places:
             return Cancelled(f"{STOPPED}; what was finished is in {' and '.join(places)}.")
         return Cancelled(f"{STOPPED}; {'what was finished is shown' if kept else NOTHING}.")
+
+    def _touched(self) -> bool:
+        """Whether a file of the folder was written since the command began."""
+        files = () if self.folder is None else self.folder.iterdir()
+        return any(file.stat().st_mtime > self._begun - CLOCK for file in files)
 
     def _lines(self) -> Iterable[str]:
         if self._names:

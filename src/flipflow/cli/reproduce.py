@@ -10,9 +10,13 @@ import typer
 from flipflow.cli.output import console
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
-    from flipflow.paper.reproduce import Reproduction
+    from flipflow.cli.progress import Tell
+    from flipflow.model.screen import FlipFlowScreen
+    from flipflow.paper.reproduce import ReproducedFigure, Reproduction
 
 STYLES = {
     "holds": "green",
@@ -47,16 +51,14 @@ def reproduce(
     wanted = chosen(names)
     screen = load(machine)
     with Destination(output, json) as target:
-        from flipflow.cli.progress import Tell, stoppable, with_progress  # noqa: PLC0415
+        from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.paper.page import write_reproduction  # noqa: PLC0415
-        from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
 
         def run(monitor: Tell) -> tuple[Reproduction, tuple[str, ...]]:
-            with stoppable(monitor, "figure-") as told:
-                found = reproduced(screen, names, told)
+            found = _finished(screen, [one.name for one in wanted], monitor)
             return found, write_reproduction(found, output, monitor)
 
         found, written = with_progress(run)
@@ -67,6 +69,23 @@ def reproduce(
         target.tell()
         if len(found.figures) < len(wanted):
             raise target.stopped(kept=True)
+
+
+def _finished(screen: FlipFlowScreen, names: Sequence[str], monitor: Tell) -> Reproduction:
+    """One figure after the other; Ctrl-C ends it and keeps those that are finished."""
+    from flipflow.paper.reproduce import Reproduction  # noqa: PLC0415  quick --help
+    from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
+
+    made: list[ReproducedFigure] = []
+    for k, name in enumerate(names):
+        monitor(name, k / len(names))
+        try:
+            made += reproduced(screen, (name,)).figures
+        except KeyboardInterrupt:
+            if not made:
+                raise
+            break
+    return Reproduction(screen, tuple(made))
 
 
 def _show(found: Reproduction, out: Console) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flipflow import __version__
-from flipflow.errors import Cancelled, IncompleteError, InputError, MissingExtra
+from flipflow.errors import IncompleteError, InputError, MissingExtra
 from flipflow.figures.drawing import Drawing
 from flipflow.figures.parts import Figure
 from flipflow.io.project import load
@@ -90,8 +90,7 @@ def reproduce(
     figures
         Names such as "figure-08"; all where none is given.
     monitor
-        Called with a sentence and the share done, 0 to 1. When it raises
-        :class:`~flipflow.errors.Cancelled`, the figures that are finished are returned.
+        Called with a sentence and the share done, 0 to 1.
 
     Raises
     ------
@@ -103,15 +102,11 @@ def reproduce(
         raise InputError("screen", type(machine).__name__, "give a FlipFlowScreen")
     say = monitor or (lambda _sentence, _share: None)
     wanted = chosen(tuple(figures))
-    made: list[ReproducedFigure] = []
+    made = []
     for k, one in enumerate(wanted):
-        try:
-            say(one.name, k / len(wanted))
-        except Cancelled:
-            break
+        say(one.name, k / len(wanted))
         made.append(_reproduced(one, machine))
-    else:
-        say("done", 1.0)
+    say("done", 1.0)
     return Reproduction(machine, tuple(made))
 
 
