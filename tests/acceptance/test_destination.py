@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +15,7 @@ import flipflow as ff
 from flipflow.errors import InputError
 from flipflow.paper.reproduce import reproduce
 
+FULL = Path("/dev/full")
 # Each command that computes, in a form that takes a second or two.
 QUICK = {
     "analyze": ("ffs0827-linear", "--speeds", "800 rpm", "900 rpm"),
@@ -118,6 +121,20 @@ def test_a_document_for_the_terminal_stands_there_alone(command):
     code, out, _ = command("simulate", *QUICK["simulate"], "-o", "out", "--json", "-")
     assert code == 0
     assert json.loads(out)["schema"] == "flipflow/history/1"
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="needs a device that is full")
+def test_an_answer_that_cannot_be_shown_is_in_its_files(tmp_path):
+    with FULL.open("w") as full:
+        ended = subprocess.run(
+            [sys.executable, "-m", "flipflow.cli.main", "simulate", *QUICK["simulate"],
+             "-o", "out", "--json", "x.json"],
+            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert ended.returncode == 4
+    assert ended.stderr == "Error: what was found cannot be shown (No space left on device).\n"
+    assert (tmp_path / "out" / "motion.html").exists()
+    assert json.loads((tmp_path / "x.json").read_text())
 
 
 @pytest.mark.parametrize("name", QUICK)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from importlib import resources
 
 import pytest
 from rich.console import Console
@@ -68,6 +69,16 @@ def test_nothing_that_is_given_beside_a_profile_is_passed_over(command, beside):
     code, _, err = command("startup", "ffs0827", "--profile", "0 s: 0 rpm, 9 s: 90 rpm", *beside)
     assert code == 2
     assert f"{beside[0]} = '{beside[1]}': --profile lays the speed down" in err
+
+
+@pytest.mark.parametrize("name", ["analyze", "simulate", "startup", "orbits", "basins"])
+def test_a_working_speed_that_would_take_for_ever_is_refused(command, monkeypatch, tmp_path, name):
+    monkeypatch.chdir(tmp_path)
+    text = (resources.files("flipflow.io.machines") / "ffs0827.toml").read_text(encoding="utf-8")
+    (tmp_path / "slow.toml").write_text(text.replace('"850 rpm"', '"0.001 rpm"'), encoding="utf-8")
+    code, _, err = command(name, "slow.toml", "--force")
+    assert code == 2
+    assert err == "Error: operation.speed = '0.001 rpm': give a speed from 1 rpm to 100000 rpm.\n"
 
 
 def test_a_number_stays_with_its_unit():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from flipflow.cli.options import File, Folder, Force, Json, Speeds, speeds_of, whole
+from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
 
 if TYPE_CHECKING:
     from flipflow.analyses.assessment import Assessment
@@ -28,6 +28,8 @@ def analyze(
     from flipflow.io.project import load_project  # noqa: PLC0415
 
     project = load_project(file, force=force)
+    if project.speed is not None:
+        speed_of(project, None)
     options = _options(speeds, harmonics)
     with Destination(output or Path(f"{project.name}-flipflow"), json) as target:
         from flipflow.report.html import require_templates  # noqa: PLC0415
@@ -41,20 +43,20 @@ def analyze(
 
 
 def _write(assessment: Assessment, target: Destination) -> None:
-    """The summary in the terminal, the report, the numbers behind it."""
+    """The report, the numbers behind it, the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
     from flipflow.io.results import assessment_document, write_response  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
 
-    if target.spoken:
-        summary(assessment, console())
     document = assessment_document(assessment)
     write_html(assessment, target.path("report.html"))
     target.wrote("report.html")
     target.data("results.json", document)
     target.wrote(*write_response(assessment, target.path("")))
     target.document(document)
+    if target.spoken:
+        summary(assessment, console())
     target.tell()
 
 

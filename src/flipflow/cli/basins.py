@@ -39,12 +39,12 @@ def basins(
 
         from flipflow.figures.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
-        if target.spoken:
-            _show(found, risk, reason, console())
         document = _document(found, risk)
         target.picture("basins.html", figure(found))
         target.data("basins.json", document)
         target.document(document)
+        if target.spoken:
+            _show(found, risk, reason, console())
         target.tell()
         if not found.complete:
             raise target.stopped(kept=True)

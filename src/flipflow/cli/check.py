@@ -25,9 +25,9 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
     project = load_project(file, force=force)
     with Destination(None, json) as target:
         result = check_project(project)
+        target.document(result.document())
         if target.spoken:
             _show(result, console())
-        target.document(result.document())
         target.tell()
 
 

@@ -24,7 +24,7 @@ from flipflow.cli.sensitivity import sensitivity
 from flipflow.cli.simulate import simulate
 from flipflow.cli.startup import startup
 from flipflow.cli.sweep import sweep
-from flipflow.errors import Cancelled, FlipflowError
+from flipflow.errors import Cancelled, FlipflowError, StoreError
 
 app = typer.Typer(
     name="flipflow",
@@ -91,6 +91,10 @@ def main() -> None:
         head = "" if isinstance(error, Cancelled) else "Error: "
         typer.echo(_for_terminal(f"{head}{_sentence(str(error))}"), err=True)
         sys.exit(error.exit_code)
+    except OSError as error:
+        # What is written to files has its own sentence; this is the terminal, or a pipe from it.
+        typer.echo(f"Error: what was found cannot be shown ({error.strerror}).", err=True)
+        sys.exit(StoreError.exit_code)
     except KeyboardInterrupt:
         sys.exit(130)
 

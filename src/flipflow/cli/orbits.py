@@ -41,14 +41,14 @@ def orbits(
     with Destination(output, json) as target:
         with progress("searching; the first run of a version compiles") as tell:
             found = periodic_orbits(project.screen, omega, max_periods, monitor=tell)
-        if target.spoken:
-            _show(project, omega, found, console())
         if output is not None:
             from flipflow.figures.motion import orbit_figure  # noqa: PLC0415  loads plotly
 
             for k, orbit in enumerate(found, 1):
                 target.picture(f"motion-{k}.html", orbit_figure(orbit))
         target.document(orbits_document(found))
+        if target.spoken:
+            _show(project, omega, found, console())
         target.tell()
 
 

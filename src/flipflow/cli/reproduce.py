@@ -62,10 +62,12 @@ def reproduce(
             return found, write_reproduction(found, output, monitor)
 
         found, written = with_progress(run)
+        target.document(found.document())
         if target.spoken:
             _show(found, console())
-        target.document(found.document())
-        target.wrote(written[0], f"and {(len(written) - 1) // 3} figures as HTML, SVG and PDF")
+        count = (len(written) - 1) // 3
+        pictures = "1 figure" if count == 1 else f"{count} figures"
+        target.wrote(written[0], f"and {pictures} as HTML, SVG and PDF")
         target.tell()
         if len(found.figures) < len(wanted):
             raise target.stopped(kept=True)

@@ -109,13 +109,13 @@ def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity
 def _write(result: Sensitivity, target: Destination) -> None:
     from flipflow.results.sensitivity import sensitivity_document  # noqa: PLC0415  quick --help
 
+    if target.folder is not None:
+        _write_folder(result, target)
+    target.document(sensitivity_document(result))
     if target.spoken:
         from flipflow.report import summary  # noqa: PLC0415
 
         summary(result, console())
-    if target.folder is not None:
-        _write_folder(result, target)
-    target.document(sensitivity_document(result))
     target.tell()
 
 

@@ -53,13 +53,13 @@ def simulate(
     with Destination(output, json) as target:
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
-        if target.spoken:
-            _show(project, history, console())
         if output is not None:
             from flipflow.figures.history import history_figure  # noqa: PLC0415  loads plotly
 
             target.picture("motion.html", history_figure(history))
         target.document(history_document(history))
+        if target.spoken:
+            _show(project, history, console())
         target.tell()
 
 

@@ -75,12 +75,12 @@ def startup(
         from flipflow.io.run_up import run_up_document  # noqa: PLC0415
 
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
-        if target.spoken:
-            _show(project, start, coast, console())
         if output is not None:
             _figures(runs, target)
         parts = {name: run_up_document(run) for name, run in runs.items()}
         target.document({"schema": "flipflow/startup/1", "name": project.name, **parts})
+        if target.spoken:
+            _show(project, start, coast, console())
         target.tell()
 
 

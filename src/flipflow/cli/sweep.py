@@ -71,11 +71,11 @@ def sweep(
     gliding = None if rate is None else _rate(rate, ends)
     with Destination(output, json) as target:
         found = _passed(project, ends, steps, gliding)
-        if target.spoken:
-            _show(project, found, steps, console())
         target.document(_document(project, found))
         if output is not None:
             target.picture("sweep.html", _figure(project, found.sweeps, ends))
+        if target.spoken:
+            _show(project, found, steps, console())
         target.tell()
         if not found.complete:
             raise target.stopped(kept=True)
