@@ -54,6 +54,7 @@ def sweep_document(sweep: Sweep) -> Document:
         "jumps": [dataclasses.asdict(jump) for jump in sweep.jumps],
         "max_periods": sweep.max_periods,
         "most_turns": sweep.most_turns,
+        "complete": sweep.complete,
     }
 
 
