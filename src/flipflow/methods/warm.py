@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -106,5 +107,7 @@ PARTS: dict[str, tuple[Callable[[], None], ...]] = {
 }
 
 if __name__ == "__main__":
+    # Ctrl-C is the parent's to answer, which ends its workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     for compile_part in PARTS[sys.argv[1]]:
         compile_part()
