@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flipflow.kernels.arclength import predict
 from flipflow.kernels.balance import balance_residual
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
@@ -82,3 +83,9 @@ def central_differences(evaluate, u: np.ndarray, omega: float, steps: np.ndarray
         ahead, behind = evaluate(u + d, omega + dw)[0], evaluate(u - d, omega - dw)[0]
         columns.append((ahead - behind) / (2.0 * h))
     return np.array(columns).T
+
+
+@kernel(entry=True)
+def predicted(work, branch, p, step, course):
+    """``predict``."""
+    return predict(work, branch, p, step, course)

@@ -1,0 +1,82 @@
+"""The steps along a branch: order of the predictor, and what is recorded on the way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import flipflow as ff
+from flipflow.kernels import arclength
+from flipflow.methods.scratch import new_branch, new_corrector
+from flipflow.methods.solver import eigenvalues_of
+from kernel_calls import predicted
+
+ANYWHERE = arclength.Course(1.0, 100.0, 1.0, 1.0, 1.0, arclength.QUICK)
+TURN = 1.0 / math.sqrt(2.0)
+
+
+def helix(s: float) -> np.ndarray:
+    """A curve of unit speed in (u, omega)."""
+    return np.array([math.cos(s * TURN), math.sin(s * TURN), 10.0 + s * TURN])
+
+
+def helix_tangent(s: float) -> np.ndarray:
+    return TURN * np.array([-math.sin(s * TURN), math.cos(s * TURN), 1.0])
+
+
+def distance_from_helix(step: float, signatures: tuple[int, int]) -> float:
+    """How far the guess lies from the curve, a step beyond two points a step apart."""
+    branch, work = new_branch(2, 0, 2), new_corrector(2, 0)
+    for p, s in enumerate((-step, 0.0)):
+        branch.u[p], branch.omega[p] = helix(s)[:2], helix(s)[2]
+        branch.tangent[p], branch.signature[p] = helix_tangent(s), signatures[p]
+    work.before[:] = helix_tangent(0.0)
+    assert not predicted(work, branch, 1, step, ANYWHERE)
+    near = minimize_scalar(
+        lambda s: float(np.linalg.norm(helix(s) - work.guess)),
+        bounds=(0.5 * step, 1.5 * step), method="bounded", options={"xatol": 1e-12},
+    )  # fmt: skip
+    return float(near.fun)
+
+
+@pytest.mark.parametrize(("signatures", "order"), [((2, 2), 4.0), ((0, 2), 2.0)])
+def test_order_of_the_predictor(signatures: tuple[int, int], order: float) -> None:
+    """Four along the cubic; two along the tangent, where the contacts have changed."""
+    steps = np.array([0.4, 0.2, 0.1])
+    off = [distance_from_helix(float(step), signatures) for step in steps]
+    slopes = np.diff(np.log(off)) / np.diff(np.log(steps))
+    assert slopes == pytest.approx([order, order], abs=0.1)
+
+
+@pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(9)], ids=repr)
+@pytest.mark.parametrize("clearance_minus", [None, 9e-3], ids=["even gaps", "uneven gaps"])
+def test_recorded_depths_are_those_of_the_motion(method, clearance_minus) -> None:
+    """Read off while the branch is followed, against the extremes of each point by itself."""
+    screen = ff.load("ffs0827")
+    if clearance_minus is not None:
+        screen = screen.replace(clearance_minus=clearance_minus)
+    branch = ff.frequency_response(screen, (60.0, 130.0), method)
+    low, high = branch.solver.gap_extremes(branch.traced.u, branch.omega)
+    plus, minus = branch.solver.builder.springs[0].gaps
+    depth = np.stack([high - plus, -low - minus], axis=2)
+    assert (depth > 0.0).any()
+    assert (depth < 0.0).any()
+    assert branch.traced.depth == pytest.approx(depth, abs=1e-9)
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_multipliers_without_contact_are_those_of_the_return_map(symmetric: bool) -> None:
+    screen = ff.load("ffs0827")
+    if not symmetric:
+        screen = screen.replace(clearance_minus=9e-3)
+    branch = ff.frequency_response(screen, (20.0, 100.0))
+    free = (branch.traced.depth < 0.0).all(axis=(1, 2))
+    assert 0 < free.sum() < free.size
+    closed = branch.solver.eigenvalues(branch.traced, branch.return_maps)
+    for ours, expected in zip(closed, eigenvalues_of(branch.return_maps), strict=True):
+        gaps = np.abs(ours[:, None] - expected[None, :])
+        assert gaps.min(axis=0).max() < 1e-7
+        assert gaps.min(axis=1).max() < 1e-7
