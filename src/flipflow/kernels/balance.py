@@ -36,7 +36,7 @@ from flipflow.kernels.series import (
 )
 
 
-@kernel
+@kernel(inline=True)
 def prepare_receptance(problem: Balance, omega: float) -> None:
     """G_h = D (K - h^2 omega^2 M + i h omega C)^-1 D^T by modes, and its derivative in omega."""
     plan = problem.plan
@@ -68,7 +68,7 @@ def prepare_receptance(problem: Balance, omega: float) -> None:
                 problem.receptance_slope[a, j, c] = slope
 
 
-@kernel
+@kernel(inline=True)
 def contact_forces(problem: Balance, omega: float) -> None:
     """Lambda_h and its derivative in omega at fixed A, from the integrals."""
     plan = problem.plan
@@ -93,7 +93,7 @@ def contact_forces(problem: Balance, omega: float) -> None:
             problem.force_slope[a, j] = share * c * (1j * h * depth + edge)
 
 
-@kernel
+@kernel(inline=True)
 def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
     set_series(problem, u)
@@ -107,7 +107,7 @@ def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) 
     return write_residual(problem, r, J)
 
 
-@kernel
+@kernel(inline=True)
 def write_residual(problem: Balance, r: Real, J: Real) -> int:
     """r and dr/d omega, the last column of J, from the forces of the series last set."""
     m, size = problem.linear.shape[0], r.shape[0]
@@ -135,7 +135,7 @@ def write_residual(problem: Balance, r: Real, J: Real) -> int:
     return status.OK
 
 
-@kernel
+@kernel(inline=True)
 def _jacobian(problem: Balance, omega: float, J: Real) -> None:
     """dr = c1 dA + c2 conj(dA): Toeplitz (l - h) and Hankel (-l - h) parts of the integrals."""
     plan = problem.plan
@@ -164,7 +164,7 @@ def _jacobian(problem: Balance, omega: float, J: Real) -> None:
                     write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
 
 
-@kernel
+@kernel(inline=True)
 def write_block(
     problem: Balance, a: int, j: int, b: int, c: int, direct: complex, mirror: complex,
     unit: float, J: Real,
@@ -182,7 +182,7 @@ def write_block(
             J[row + 1, column + 1] = with_imag.imag + unit
 
 
-@kernel
+@kernel(inline=True)
 def series_scale(problem: Balance, u: Real, omega: float, scale: Real) -> None:  # noqa: ARG001
     """Size of each unknown: the largest amplitude of all."""
     size = problem.linear.shape[0] * (2 * problem.harmonics.shape[0])

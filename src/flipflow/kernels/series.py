@@ -47,7 +47,7 @@ class Balance(NamedTuple):
     length: float
 
 
-@kernel
+@kernel(inline=True)
 def place(problem: Balance, a: int, j: int) -> int:
     """Where the real part of harmonic a at gap j stands; the imaginary part follows it."""
     m = problem.linear.shape[0]
@@ -56,7 +56,7 @@ def place(problem: Balance, a: int, j: int) -> int:
     return j if a == 0 else m + 2 * ((a - 1) * m + j)
 
 
-@kernel
+@kernel(inline=True)
 def set_series(problem: Balance, u: Real) -> None:
     """The unknowns as offsets and amplitudes at the gaps."""
     m = problem.linear.shape[0]
@@ -68,7 +68,7 @@ def set_series(problem: Balance, u: Real) -> None:
             problem.motion.amplitude[j, a - mean] = complex(u[k], u[k + 1])
 
 
-@kernel
+@kernel(inline=True)
 def amplitude_of(problem: Balance, a: int, j: int) -> complex:
     """A_hj of the series last set."""
     if problem.harmonics[0] != 0:
@@ -76,7 +76,7 @@ def amplitude_of(problem: Balance, a: int, j: int) -> complex:
     return problem.motion.offset[j] + 0j if a == 0 else problem.motion.amplitude[j, a - 1]
 
 
-@kernel
+@kernel(inline=True)
 def series_contact_state(problem: Balance) -> None:
     """Contact state of each spring at theta = 0."""
     count = problem.motion.rate.shape[0]
@@ -86,7 +86,7 @@ def series_contact_state(problem: Balance) -> None:
         problem.flow.state[j] = contact_state(problem.flow.contact, j, y, v)
 
 
-@kernel
+@kernel(inline=True)
 def record_contacts(problem: Balance, omega: float) -> int:
     """Walk along the series and record who touches when, as a flow does (times in s)."""
     flow = problem.flow
@@ -121,7 +121,7 @@ def record_contacts(problem: Balance, omega: float) -> int:
     return status.TOO_MANY_EVENTS
 
 
-@kernel
+@kernel(inline=True)
 def next_change_from(
     problem: Balance, theta: float, horizon: float, fired: int
 ) -> tuple[float, int, int]:
@@ -137,7 +137,7 @@ def next_change_from(
     return next_change(turned, problem.flow.contact, problem.flow.state, count, horizon, fired)
 
 
-@kernel
+@kernel(inline=True)
 def contact_integrals(problem: Balance, omega: float) -> None:
     """int exp(i k theta) over the contacts, and what clipped limits leave.
 
@@ -166,7 +166,7 @@ def contact_integrals(problem: Balance, omega: float) -> None:
             _add_clipped_limit(problem, e, last)
 
 
-@kernel
+@kernel(inline=True)
 def _add_clipped_limit(problem: Balance, e: int, theta: float) -> None:
     """The end of piece e, where a clipped spring lets go or takes hold beyond its gap."""
     flow = problem.flow
@@ -178,7 +178,7 @@ def _add_clipped_limit(problem: Balance, e: int, theta: float) -> None:
         _add_edge(problem, spring, theta, -1.0, after)
 
 
-@kernel
+@kernel(inline=True)
 def _add_interval(problem: Balance, j: int, first: float, last: float, gap: float) -> None:
     turns = 2.0 * math.pi / problem.walk
     start, start_turn = turns + 0j, exponential(1j * first)
@@ -193,7 +193,7 @@ def _add_interval(problem: Balance, j: int, first: float, last: float, gap: floa
         problem.integral_gap[j, k] += gap * value
 
 
-@kernel
+@kernel(inline=True)
 def _add_edge(problem: Balance, j: int, theta: float, sign: float, side: int) -> None:
     """A limit of contact beyond the gap: +1 where a clipped spring lets go, -1 where it holds."""
     most = problem.integral.shape[1]
@@ -210,19 +210,19 @@ def _add_edge(problem: Balance, j: int, theta: float, sign: float, side: int) ->
             problem.edge_depth[j, -k] += depth * turn
 
 
-@kernel
+@kernel(inline=True)
 def whole_integral(problem: Balance, j: int, k: int) -> complex:
     """int exp(i k theta) over the contacts of gap j, any sign of k."""
     return problem.integral[j, k] if k >= 0 else problem.integral[j, -k].conjugate()
 
 
-@kernel
+@kernel(inline=True)
 def contact_count(problem: Balance) -> int:
     """A number that changes when the contacts met in a turn change."""
     return contact_number(problem.flow)
 
 
-@kernel
+@kernel(inline=True)
 def series_depths(problem: Balance, omega: float, depth: Real) -> None:  # noqa: ARG001
     """Greatest depth in m of the series last set beyond each gap, (m, 2): plus and minus side."""
     motion = problem.motion
