@@ -179,9 +179,12 @@ def test_bad_arguments(screen, change):
 def test_figure_and_file(start, tmp_path):
     assert len(ff.figure(start).panels) == 3
     ff.save(start, tmp_path / "start.json")
-    document = ff.open_result(tmp_path / "start.json")
+    document = json.loads((tmp_path / "start.json").read_text())
     assert document["schema"] == "flipflow/run-up/1"
     assert document["outcome"] == "reached"
+    again = ff.open_result(tmp_path / "start.json")
+    assert again.verdict == start.verdict
+    np.testing.assert_array_equal(again.history.x, start.history.x)
 
 
 def run(monkeypatch, capsys, *words):

@@ -31,7 +31,7 @@ from flipflow.model.elements import Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.results.history import History
-from flipflow.results.run_up import AT_SPEED, Outcome, Peak, RunUp
+from flipflow.results.run_up import AT_SPEED, NaturalFrequency, Outcome, Peak, RunUp
 
 Real = NDArray[np.float64]
 POWER_FACTOR = 4.0
@@ -235,7 +235,7 @@ def _outcome(
     final: float,
     history: History,
     frequencies: Mapping[str, float],
-) -> tuple[Outcome, tuple[str, float] | None]:
+) -> tuple[Outcome, NaturalFrequency | None]:
     """What became of the run, and the natural frequency that holds it."""
     if isinstance(drive, SpeedProfile):
         return "followed", None
@@ -251,14 +251,14 @@ def _outcome(
 
 def _steady_outcome(
     speed: float, final: float, frequencies: Mapping[str, float]
-) -> tuple[Outcome, tuple[str, float] | None]:
+) -> tuple[Outcome, NaturalFrequency | None]:
     if final >= AT_SPEED * speed:
         return "reached", None
     if not frequencies:
         return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
-        return "captured", (name, frequencies[name])
+        return "captured", NaturalFrequency(name, frequencies[name])
     return "short", None
 
 

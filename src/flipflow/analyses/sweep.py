@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -72,7 +74,7 @@ def sweep(
         row = settling.settle(z, float(speed), most=most_turns)
         if rows and _jumped(settling, rows[-1], row, float(speed)):
             jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
-        rows.append(row)
+        rows.append(_kept(row))
         z = row.state
         if monitor is not None:
             monitor(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
@@ -80,6 +82,13 @@ def sweep(
         machine, speeds, tuple(rows), tuple(jumps), max_periods, most_turns, settling.solver,
         __version__,
     )  # fmt: skip
+
+
+def _kept(row: Settled) -> Settled:
+    """A row with the states of one period only where the motion repeats."""
+    if row.point is None or not row.settled:
+        return row
+    return replace(row, recent=row.recent[-row.point.solver.turns :])
 
 
 def checked_speeds(omega: ArrayLike) -> Real:

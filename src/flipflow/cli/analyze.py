@@ -27,7 +27,7 @@ def analyze(
 
     project = load_project(file, force=force)
     folder = output or Path(f"{project.name}-flipflow")
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
 
     options = _options(speeds, harmonics)
     prepare_folder(folder)
@@ -36,7 +36,8 @@ def analyze(
 
     assessment = with_progress(lambda monitor: assess(project, monitor, **options))
 
-    from flipflow.io.results import assessment_document, write_response  # noqa: PLC0415
+    from flipflow.io.assessment import assessment_document  # noqa: PLC0415
+    from flipflow.io.response import write_response  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
 

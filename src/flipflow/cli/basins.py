@@ -35,8 +35,8 @@ def basins(
     """Show on which motion a machine settles, and what throws it off."""
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
     from flipflow.errors import Cancelled, InputError  # noqa: PLC0415
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -89,10 +89,10 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
 
 
 def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
-    from flipflow.io.jump_risk import risk_document  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.jump_risk import risk_summary  # noqa: PLC0415  keeps --help quick
     from flipflow.io.results import document_of  # noqa: PLC0415
 
-    return document_of(found) | {"jump_risk": None if risk is None else risk_document(risk)}
+    return document_of(found) | {"jump_risk": None if risk is None else risk_summary(risk)}
 
 
 def _show(found: Basins, risk: JumpRisk | None, out: Console) -> None:

@@ -29,9 +29,8 @@ def orbits(
     """List every periodic motion found at a speed, whether it lasts or not."""
     from flipflow.analyses.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
     from flipflow.cli.output import console, write_json  # noqa: PLC0415
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
-    from flipflow.results.time_document import orbits_document  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -40,7 +39,9 @@ def orbits(
     with progress("searching; the first run of a version compiles") as tell:
         found = periodic_orbits(project.screen, omega, max_periods, monitor=tell)
     if json is not None:
-        write_json(orbits_document(found), json)
+        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+        write_json(document_of(found), json)
     if output is not None:
         from flipflow.figures.motion import orbit_figure  # noqa: PLC0415  loads plotly
 

@@ -38,8 +38,8 @@ def reproduce(
 ) -> None:
     """Reproduce the paper: its figures, and every claim decided by computing it."""
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
     from flipflow.io.project import load  # noqa: PLC0415
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
     from flipflow.paper.registry import chosen  # noqa: PLC0415
 
     names = tuple(figures or ())

@@ -53,7 +53,7 @@ def sensitivity(
     ranges = read_vary(vary or [], project.screen)
     omega = _omega(project, quantity, speed, speeds)
     if output is not None:
-        from flipflow.io.results import prepare_folder  # noqa: PLC0415
+        from flipflow.io.files import prepare_folder  # noqa: PLC0415
 
         prepare_folder(output)
     options = {"n": n, "rng": seed, "branch": branch}
@@ -93,11 +93,12 @@ def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity
 
 def _show(result: Sensitivity, output: Path | None, json: str | None) -> None:
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
-    from flipflow.results.sensitivity import sensitivity_document  # noqa: PLC0415
 
     written = _written(result, output) if output is not None else ""
     if json is not None:
-        write_json(sensitivity_document(result), json)
+        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+        write_json(document_of(result), json)
     if json != "-":
         from flipflow.report import summary  # noqa: PLC0415
 

@@ -37,9 +37,8 @@ def simulate(
     from flipflow.analyses.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.output import console, write_json  # noqa: PLC0415
     from flipflow.io.blows import parse_blow  # noqa: PLC0415
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
-    from flipflow.results.time_document import history_document  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -49,7 +48,9 @@ def simulate(
     with progress("simulating; the first run of a version compiles") as tell:
         history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
     if json is not None:
-        write_json(history_document(history), json)
+        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+        write_json(document_of(history), json)
     if output is not None:
         from flipflow.figures.history import history_figure  # noqa: PLC0415  loads plotly
 

@@ -49,8 +49,8 @@ def startup(
     force: Force = False,
 ) -> None:
     """Start a machine and let it coast down: reached, or captured; the peaks on the way."""
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
 
     project = load_project(file, force=force)
     if speed is not None or profile is None:
@@ -59,12 +59,11 @@ def startup(
     if output is not None:
         prepare_folder(output)
     start, coast = _calculated(project, drive)
-
-    from flipflow.io.run_up import run_up_document  # noqa: PLC0415
-
     runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
     if json is not None:
-        parts = {name: run_up_document(run) for name, run in runs.items()}
+        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+        parts = {name: document_of(run) for name, run in runs.items()}
         write_json({"schema": "flipflow/startup/1", "name": project.name, **parts}, json)
     if output is not None:
         _figures(runs, output)

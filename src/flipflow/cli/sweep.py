@@ -38,9 +38,8 @@ def sweep(
 ) -> None:
     """Raise the speed step by step, then lower it again: settled amplitudes and jumps."""
     from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.files import prepare_folder  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.io.results import prepare_folder  # noqa: PLC0415
-    from flipflow.results.time_document import sweep_document  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = _grid(speeds, steps)
@@ -49,7 +48,9 @@ def sweep(
     up, down = _swept(project, omega)
     glides = () if rate is None else _glides(project, omega, rate)
     if json is not None:
-        both = {"up": sweep_document(up), "down": sweep_document(down)}
+        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+        both = {"up": document_of(up), "down": document_of(down)}
         late = [vars(jump) for glide in glides for jump in glide.jumps]
         document = {"schema": "flipflow/sweeps/1", "name": project.name, **both, "late": late}
         write_json(document, json)

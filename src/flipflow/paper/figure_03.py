@@ -158,7 +158,9 @@ def steepest_past_antiresonance(data: Indices) -> Evaluation:
     ]
     numbers = {}
     for band, mean in (*means.items(), ("w_ar to w02", last)):
-        numbers[f"mean slope, sum of all, {band}"] = Number(1e3 * mean.sum(), "per 1000 rad/s")
+        numbers[f"mean slope, sum of all, {band}"] = Number(
+            1e3 * float(mean.sum()), "per 1000 rad/s"
+        )
     return decide(parts, numbers)
 
 

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from flipflow import __version__
-from flipflow.errors import IncompleteError, InputError, MissingExtra
+from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.reopen import CODEC
+from flipflow.errors import IncompleteError, InputError, MissingExtra, StoreError
 from flipflow.figures.drawing import Drawing
 from flipflow.figures.parts import Figure
 from flipflow.io.project import load
+from flipflow.io.results import SUMMARY, document_of
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import DecidedClaim, Evaluation, Verdict, undecided
+from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict, undecided
 from flipflow.paper.figure import PaperFigure
-from flipflow.paper.registry import chosen
+from flipflow.paper.registry import FIGURES, chosen
 from flipflow.report.blocks import Table
-from flipflow.results.document import machine_document, plain
+from flipflow.results.codec import Codec, Form
+from flipflow.results.document import machine_document
 
-Monitor = Callable[[str, float], None]
 SCHEMA = "flipflow/claims/1"
 PAPER = "Lin, Wang, Xu, Zuo, Liang, Minerals 2024, 14, 406"
 MACHINE = "ffs0827"
@@ -69,7 +72,7 @@ class Reproduction:
             "schema": SCHEMA,
             "version": __version__,
             "paper": PAPER,
-            "machine": plain(machine_document(self.screen)),
+            "machine": machine_document(self.screen),
             "claims": [claim.document() for claim in self.claims],
             "counts": self.counts,
         }
@@ -128,3 +131,37 @@ def _without(one: PaperFigure[Any], missing: str) -> ReproducedFigure:
     evaluation: Evaluation = undecided(missing)
     claims = tuple(DecidedClaim(claim, one.name, evaluation) for claim in one.claims)
     return ReproducedFigure(one.name, one.title, None, (), claims, f"It needs {missing}.")
+
+
+@document_of.register
+def _(reproduction: Reproduction) -> dict[str, Any]:
+    whole = PAPER_CODEC.form(Reproduction).write(reproduction)
+    return {**reproduction.document(), "whole": whole}
+
+
+def reproduction_from(document: Mapping[str, Any]) -> Reproduction:
+    """The reproduction that :func:`flipflow.save` wrote.
+
+    Raises
+    ------
+    StoreError
+        For a document that holds the claims alone, or one that this version does not know.
+    """
+    if "whole" not in document:
+        raise StoreError(SUMMARY)
+    reproduction: Reproduction = PAPER_CODEC.form(Reproduction).read(document["whole"])
+    return reproduction
+
+
+def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
+    """The claim that :meth:`~flipflow.paper.claims.DecidedClaim.document` wrote."""
+    name, figure = document["id"], document["figure"]
+    known = {claim.id: claim for claim in FIGURES[figure].claims} if figure in FIGURES else {}
+    if name not in known:
+        raise StoreError(f"the claim {name!r} of {figure!r} is not known; update flipflow")
+    numbers = {key: Number(**one) for key, one in document["numbers"].items()}
+    evaluation = Evaluation(Verdict(document["verdict"]), numbers, document["holds_where"])
+    return DecidedClaim(known[name], figure, evaluation)
+
+
+PAPER_CODEC = Codec({**CODEC.own, DecidedClaim: Form(DecidedClaim.document, _claim_from)})

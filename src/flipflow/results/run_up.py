@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,13 @@ class Peak:
     t: float
 
 
+class NaturalFrequency(NamedTuple):
+    """A natural frequency: its name, as w01, and its value in rad/s."""
+
+    name: str
+    omega: float
+
+
 @dataclass(frozen=True, eq=False)
 class RunUp:
     """A start or a coast-down, and what it does to the machine.
@@ -48,7 +55,7 @@ class RunUp:
     final_speed
         Speed at the end in rad/s; with a motor the mean over the last turns.
     near
-        Name and value in rad/s of the natural frequency at which it is captured, else None.
+        The natural frequency at which it is captured, else None.
     first_frequency
         w01 in rad/s; 0 for a machine that nothing holds.
     passing
@@ -70,7 +77,7 @@ class RunUp:
     history: History
     outcome: Outcome
     final_speed: float
-    near: tuple[str, float] | None
+    near: NaturalFrequency | None
     first_frequency: float
     passing: float | None
     peaks: Mapping[str, Peak]
@@ -96,8 +103,8 @@ class RunUp:
         now, wanted = f"{self.final_speed * RPM:.0f} rpm", f"{self.speed * RPM:.0f} rpm"
         seconds = f"{self.duration:.3g} s"
         if self.outcome == "captured" and self.near is not None:
-            name, omega = self.near
-            return f"captured at {now}, near the natural frequency {name} = {omega * RPM:.0f} rpm"
+            held = f"{self.near.name} = {self.near.omega * RPM:.0f} rpm"
+            return f"captured at {now}, near the natural frequency {held}"
         sentences = {
             "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
             "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",
