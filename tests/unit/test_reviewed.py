@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -41,8 +42,34 @@ def test_springs_are_counted_as_given():
     np.testing.assert_allclose(orbit.stop_force(0), 0.5 * x, atol=1e-12)
     beyond = np.where(np.abs(x) > 0.5, x - np.sign(x) * 0.5, 0.0)
     np.testing.assert_allclose(orbit.stop_force(1), 3.0 * beyond, atol=1e-9)
-    with pytest.raises(InputError, match="2 springs"):
-        orbit.stop_force(2)
+    touched = np.abs(x) > 0.5
+    assert {touch.spring for touch in orbit.contact_intervals} == {1}
+    assert orbit.contact_share(0) == 1.0
+    assert orbit.contact_share(1) == pytest.approx(touched[:-1].mean(), abs=0.01)
+    square = orbit.velocity(0) ** 2
+    assert orbit.mean_square_velocity(0, 0) == pytest.approx(square[:-1].mean(), rel=1e-6)
+    part = np.where(touched, square, 0.0)[:-1].mean()
+    assert orbit.mean_square_velocity(0, 1) == pytest.approx(part, rel=0.02)
+    for asked in (
+        orbit.stop_force,
+        orbit.contact_share,
+        lambda k: orbit.mean_square_velocity(0, k),
+    ):
+        with pytest.raises(InputError, match="2 springs"):
+            asked(2)
+
+
+def test_a_file_holds_the_force_of_every_spring(tmp_path):
+    """A spring without gap stands in the file of a motion, too."""
+    springs = [ff.ClearanceSpring([1.0], 0.5, 0.0, 0.0), ff.ClearanceSpring([1.0], 3.0, 0.0, 0.5)]
+    system = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], springs, ff.HarmonicForce([1.0]))
+    orbit = ff.frequency_response(system, (0.1, 1.0)).orbits_at(0.5)[0]
+    ff.save(orbit, tmp_path / "orbit.json")
+    document = json.loads((tmp_path / "orbit.json").read_text())
+    assert len(document["stop_force"]) == 2
+    np.testing.assert_allclose(document["stop_force"][1], orbit.stop_force(1))
+    assert {touch["spring"] for touch in document["contacts"]} == {1}
+    assert ff.figure(orbit).panels
 
 
 def test_branch_that_starts_between_the_folds_comes_from_below(screen):
