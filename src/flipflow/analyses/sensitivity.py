@@ -13,7 +13,7 @@ from flipflow.analyses.feasible import missing_words
 from flipflow.analyses.frequency_response import check_interval
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.operating_region import analysed_range
-from flipflow.analyses.quantities import Quantity
+from flipflow.analyses.quantities import Quantity, Working
 from flipflow.analyses.response_quantities import ResponseQuantity, quantity_named
 from flipflow.analyses.samples import (
     BranchWord,
@@ -188,7 +188,7 @@ def _nominal(question: Question) -> Real:
     return np.array(values, dtype=float)
 
 
-def _require_data(machine: FlipFlowScreen, quantity: Quantity) -> None:
+def _require_data(machine: FlipFlowScreen, quantity: Quantity[Working]) -> None:
     absent = tuple(need for need in quantity.needs if getattr(machine, need) is None)
     if absent:
         raise InputError("quantity", quantity.name, missing_words(absent))
