@@ -11,13 +11,9 @@ from dataclasses import dataclass
 
 from flipflow import __version__
 from flipflow.analyses.feasible import limit_bounds, missing_for, missing_words, working_motion
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import NormalMotion
-from flipflow.analyses.operating_region import (
-    Monitor,
-    OperatingRegion,
-    analysed_range,
-    operating_region,
-)
+from flipflow.analyses.operating_region import OperatingRegion, analysed_range, operating_region
 from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.analyses.transients import Transients, transients

@@ -15,7 +15,7 @@ from flipflow.analyses.linear import (
     equal_amplitude_frequency,
     linear_response,
 )
-from flipflow.analyses.monitor import Monitor as Monitor  # noqa: PLC0414  assessment reads it here
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import InputError
 from flipflow.methods.options import Method

@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.options import Json, Output
+
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from flipflow.analyses.monitor import Monitor
     from flipflow.paper.reproduce import Reproduction
 
-STYLES = {
-    "holds": "green",
-    "holds in part": "bold yellow",
-    "does not hold": "bold red",
-    "cannot be decided": "dim",
-}
+FOLDER = Path("reproduction")
 
 
 def reproduce(
@@ -25,13 +23,8 @@ def reproduce(
         list[str] | None,
         typer.Argument(metavar="[FIGURE]...", help="figure-08, or 8; all where none is named."),
     ] = None,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for page and figures.")
-    ] = Path("reproduction"),
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Claims as JSON, - for the terminal."),
-    ] = None,
+    output: Output = None,
+    json: Json = None,
     machine: Annotated[
         str, typer.Option("--machine", metavar="FILE", help="Another machine file.")
     ] = "ffs0827",
@@ -45,33 +38,38 @@ def reproduce(
     names = tuple(figures or ())
     chosen(names)
     screen = load(machine)
-    prepare_folder(output)
+    folder = output or FOLDER
+    prepare_folder(folder)
 
-    from flipflow.cli.progress import Tell, with_progress  # noqa: PLC0415
+    from flipflow.cli.progress import with_progress  # noqa: PLC0415
     from flipflow.paper.page import write_reproduction  # noqa: PLC0415
     from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
 
-    def run(monitor: Tell) -> tuple[Reproduction, tuple[str, ...]]:
+    def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
         found = reproduced(screen, names, monitor)
-        return found, write_reproduction(found, output, monitor)
+        return found, write_reproduction(found, folder, monitor)
 
     found, written = with_progress(run)
     if json is not None:
         write_json(found.document(), json)
     if json != "-":
-        _show(found, console(), output, written)
+        _show(found, console(), folder, written)
 
 
 def _show(found: Reproduction, out: Console, folder: Path, written: tuple[str, ...]) -> None:
     from rich.table import Table  # noqa: PLC0415  slow to import
     from rich.text import Text  # noqa: PLC0415
 
+    from flipflow.paper.page import STATES  # noqa: PLC0415  keeps --help quick
+    from flipflow.report.terminal import STYLES  # noqa: PLC0415
+
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     for title in ("Claim", "Verdict", "Statement"):
         table.add_column(title, no_wrap=title != "Statement")
     for one in found.claims:
-        verdict = str(one.evaluation.verdict)
-        table.add_row(one.claim.id, Text(verdict, STYLES[verdict]), one.claim.statement)
+        verdict = one.evaluation.verdict
+        shown = Text(str(verdict), STYLES[STATES[verdict]])
+        table.add_row(one.claim.id, shown, one.claim.statement)
     out.print(table)
     out.print()
     out.print(", ".join(f"{n} {verdict}" for verdict, n in found.counts.items() if n) + ".")

@@ -10,11 +10,12 @@ import typer
 
 from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
 from flipflow.cli.output import console, print_list, printable, write_json
-from flipflow.cli.progress import Tell, progress
+from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from flipflow.analyses.monitor import Monitor
     from flipflow.model.drive import Drive, SpeedProfile
     from flipflow.model.project import Project
     from flipflow.results.run_up import RunUp
@@ -112,7 +113,7 @@ def _calculated(project: Project, drive: Drive | SpeedProfile | None) -> tuple[R
 
     with progress("start; the first run of a version compiles") as tell:
 
-        def during(stage: str) -> Tell:
+        def during(stage: str) -> Monitor:
             return lambda sentence, share: tell(f"{stage}, {sentence}", share)
 
         start = start_up(project.screen, drive, speed=project.speed, monitor=during("start"))

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from flipflow.analyses.assessment import Assessment, CaseAssessment
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.bars import energy_figure, region_figure
+from flipflow.figures.drawing import Drawing
 from flipflow.figures.motion import orbits_figure, portrait_figure
 from flipflow.figures.response import branch_figure
 from flipflow.figures.schematic import schematic
@@ -19,7 +20,7 @@ from flipflow.report.blocks import (
     Block,
     Cell,
     Column,
-    Drawing,
+    DrawingBlock,
     FigureBlock,
     Heading,
     Note,
@@ -34,6 +35,11 @@ DRAWN = (
     "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
     "clearance_minus",
 )  # fmt: skip
+SCHEMATIC = (
+    "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "
+    "relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds the gap per "
+    "side (e), that on the other side when x2 falls below -e."
+)
 CASES_ABREAST = 6  # load cases for which a table has columns on an A4 page
 SYMBOLS = {
     "clearance": "gap per side e",
@@ -47,13 +53,7 @@ def machine(assessment: Assessment) -> Iterator[Block]:
     """The machine as a drawing."""
     screen = assessment.project.screen
     yield Heading("The machine", 1)
-    yield Drawing(
-        "Schematic",
-        schematic(screen, drawn_values(screen)),
-        "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and "
-        "the relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds "
-        "the gap per side (e), that on the other side when x2 falls below -e.",
-    )
+    yield DrawingBlock(Drawing("Schematic", SCHEMATIC, schematic(screen, drawn_values(screen))))
 
 
 @section(Assessment, Part.DETAILS, 20)
