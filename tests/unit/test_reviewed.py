@@ -124,3 +124,19 @@ def test_high_orders_of_unequal_gaps_fit_the_memory(screen):
     lean = screen.replace(clearance=6e-3, clearance_minus=math.inf)
     branch = ff.frequency_response(lean, (100.0, 101.0), ff.HarmonicBalance(120, points=3))
     assert branch.complete
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: ff.loading(s, ff.Load(), omega=(5.0, 20.0)), "omega = .*operating region is"),
+        (lambda s: ff.loading(s, ff.Load(), omega=(205.0, 230.0)), "omega = .*operating region is"),
+        (lambda s: ff.loading(s, 1.1), "load = .*ff.Load"),
+        (lambda s: ff.response_family(s, {"clearance": ["a"]}), "clearance.*numbers"),
+        (lambda s: ff.response_family(s, [1.0]), "vary = .*one field"),
+    ],
+)
+def test_loading_and_family_refuse_with_a_sentence(screen, call, words):
+    """Speeds beside the operating region once ended in an error of numpy."""
+    with pytest.raises(InputError, match=words):
+        call(screen)
