@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,17 +91,14 @@ def start_up(
     """
     movable(machine)
     given = None if speed is None else check_positive("speed", speed, "rad/s")
-    if drive is None:
-        drive = default_drive(machine, given, method)
-    wanted = given or _working_speed(drive)
-    profile = isinstance(drive, SpeedProfile)
-    longest = drive.duration if isinstance(drive, SpeedProfile) else START_SECONDS
-    longest = longest if duration is None else _seconds(duration)
+    shaft = _shaft(machine, drive, given, method)
+    wanted = given or _working_speed(shaft)
     history = run_history(
-        machine, drive, at_rest(machine), longest, fastest=_fastest(drive, wanted), method=method,
-        monitor=monitor, enough=None if profile else _steady,
+        machine, shaft, at_rest(machine), _longest(shaft, duration, START_SECONDS),
+        fastest=_fastest(shaft, wanted), method=method, monitor=monitor,
+        enough=None if isinstance(shaft, SpeedProfile) else _steady,
     )  # fmt: skip
-    return _judged(machine, drive, wanted, history)
+    return _judged(machine, shaft, wanted, history)
 
 
 def coast_down(
@@ -140,19 +138,14 @@ def coast_down(
     """
     movable(machine)
     omega = check_positive("speed", speed, "rad/s")
-    if drive is None:
-        drive = default_drive(machine, omega, method)
-    if isinstance(drive, SpeedProfile):
-        if drive.speeds[0] != omega:
-            raise InputError("speeds", drive.speeds[0], f"begin the profile at {omega:.6g} rad/s")
-        shaft: Drive | SpeedProfile = drive
-        longest = drive.duration
-    else:
-        shaft, longest = drive.switched_off(), COAST_SECONDS
-    longest = longest if duration is None else _seconds(duration)
-    slowest = -math.inf if isinstance(shaft, SpeedProfile) else STOPPED * omega
+    shaft, slowest = _shaft(machine, drive, omega, method), -math.inf
+    if isinstance(shaft, Drive):
+        shaft, slowest = shaft.switched_off(), STOPPED * omega
+    elif shaft.speeds[0] != omega:
+        raise InputError("speeds", shaft.speeds[0], f"begin the profile at {omega:.6g} rad/s")
     history = run_history(
-        machine, shaft, settled_start(machine, omega, method), longest,
+        machine, shaft, settled_start(machine, omega, method),
+        _longest(shaft, duration, COAST_SECONDS),
         fastest=_fastest(shaft, omega), slowest=slowest, method=method, monitor=monitor,
     )  # fmt: skip
     return _judged(machine, shaft, omega, history)
@@ -171,13 +164,33 @@ def default_drive(machine: Machine, speed: float | None, method: RungeKutta | No
     power = POWER_FACTOR * steady_power(machine, speed, method)
     drive = assumed_drive(machine.eccentric_moment, speed, power)
     word = f"rated power {power / 1e3:.3g} kW, four times what the dampers take at working speed"
-    return Drive(**{**vars(drive), "assumed": (word, *drive.assumed)})
+    return replace(drive, assumed=(word, *drive.assumed))
 
 
-def _seconds(duration: float) -> float:
-    if check_positive("duration", duration, "s") > MOST_SECONDS:
+def _shaft(
+    machine: Machine,
+    drive: Drive | SpeedProfile | None,
+    speed: float | None,
+    method: RungeKutta | None,
+) -> Drive | SpeedProfile:
+    """What turns the shaft, as given or assumed."""
+    if method is not None and not isinstance(method, RungeKutta):
+        raise InputError("method", method, "leave it out, or give a RungeKutta")
+    if drive is None:
+        return default_drive(machine, speed, method)
+    if not isinstance(drive, (Drive, SpeedProfile)):
+        raise InputError("drive", drive, "give an ff.Drive or an ff.SpeedProfile")
+    return drive
+
+
+def _longest(shaft: Drive | SpeedProfile, duration: float | None, usual: float) -> float:
+    """Longest time in s: as asked for, else that of the profile, else the usual one."""
+    if duration is None:
+        return shaft.duration if isinstance(shaft, SpeedProfile) else usual
+    seconds = check_positive("duration", duration, "s")
+    if seconds > MOST_SECONDS:
         raise InputError("duration", duration, f"give at most {MOST_SECONDS:g} s")
-    return float(duration)
+    return seconds
 
 
 def _working_speed(drive: Drive | SpeedProfile) -> float:
@@ -242,7 +255,7 @@ def _outcome(
     if drive.motor is None:
         down = history.omega[-1] <= 1.001 * STOPPED * speed
         return ("stopped" if down else "unfinished"), None
-    if final < AT_REST * speed:
+    if final < AT_REST * speed and float(drive.torque(0.0)) <= drive.friction:
         return "not started", None
     if not _is_steady(history):
         return "unfinished", None

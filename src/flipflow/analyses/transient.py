@@ -160,11 +160,12 @@ def turn_means(history: History, values: Real, turns: int) -> float:
     return float((values[-1] - total) / (history.t[-1] - t))
 
 
-def check_positive(name: str, value: float, unit: str) -> float:
+def check_positive(name: str, value: object, unit: str) -> float:
     """Return a finite number above 0 or refuse it."""
-    if not (np.isfinite(value) and value > 0.0):
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not (number and 0.0 < value < np.inf):  # type: ignore[operator]
         raise InputError(name, value, f"give a finite number above 0 {unit}")
-    return float(value)
+    return float(value)  # type: ignore[arg-type]
 
 
 def _history(
