@@ -68,11 +68,7 @@ def branch_from(document: Document) -> Branch:
         # Where a branch meets another, the point is one of the other's motions.
         special_points=tuple(
             SpecialPoint(
-                one["kind"],
-                Orbit(machine, _point_from(one, solver_of), one["stability"]),
-                one["position"],
-                one["spring"],
-                one["side"],
+                orbit=Orbit(machine, _point_from(one, solver_of), one["stability"]), **_place(one)
             )
             for one in document["special_points"]
         ),
@@ -106,7 +102,7 @@ def _traced_from(document: Document, solver: Solver) -> Traced:
     record = new_branch(solver.unknowns, points + 1, with_jacobian=solver.reads_jacobian)
     record.u[:points] = u
     record.omega[:points] = document["omega"]
-    record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
+    record.tangent[:points] = array(document["tangent"]).reshape(points, solver.unknowns + 1)
     record.side[:points] = document["side"]
     record.signature[:points] = document["signature"]
     record.iterations[:points] = document["iterations"]
@@ -123,6 +119,11 @@ def _point_from(document: Document, solver_of: SolverOf) -> Point:
     solver = solver_of(document["half_turn"], document["turns"])
     known = array(document["return_map"])
     return Point(solver, array(document["unknowns"]), document["omega"], known_map=known)
+
+
+def _place(document: Document) -> dict[str, Any]:
+    """What a special point is, and where it stands along its branch."""
+    return {name: document[name] for name in ("kind", "position", "spring", "side")}
 
 
 def orbit_from(document: Document) -> Orbit:
@@ -153,12 +154,9 @@ def field_branch_from(document: Document) -> FieldBranch:
         values=array(document["values"]),
         special_points=tuple(
             FieldSpecialPoint(
-                one["kind"],
-                orbit_at(one["value"], one, one["stability"]),
-                one["position"],
-                one["spring"],
-                one["side"],
-                one["value"],
+                orbit=orbit_at(one["value"], one, one["stability"]),
+                value=one["value"],
+                **_place(one),
             )
             for one in document["special_points"]
         ),

@@ -80,19 +80,19 @@ def write_response(assessment: Assessment, folder: Path) -> list[str]:
 
 
 def _netcdf(columns: Columns, attributes: Mapping[str, str]) -> bytes:
-    """Classic NetCDF with one dimension, "point"; xarray opens it as a labelled table."""
+    """Classic NetCDF, text in UTF-8, with one dimension, "point"; xarray opens it as a table."""
     from scipy.io import netcdf_file  # noqa: PLC0415  only files need it
 
     content = io.BytesIO()
     with netcdf_file(content, "w") as file:
         for name, text in attributes.items():
-            setattr(file, name, text)
+            setattr(file, name, text.encode())
         file.createDimension("point", next(iter(columns.values()))[0].size)
         for name, (values, own) in columns.items():
             variable = file.createVariable(name, values.dtype, ("point",))
             variable[:] = values
             for key, text in own.items():
-                setattr(variable, key, text)
+                setattr(variable, key, text.encode())
         file.flush()
         return content.getvalue()
 

@@ -21,7 +21,7 @@ from flipflow.methods.options import (
 from flipflow.methods.solver import Point, Solver
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.codec import Codec, array, exact, plain
 from flipflow.results.field_branch import FieldBranch
@@ -38,24 +38,12 @@ SCREEN = Codec({}).form(FlipFlowScreen)
 
 
 def branch_document(branch: Branch) -> Document:
-    """A branch over frequency, and the amplitudes and phases of named coordinates."""
-    system = branch.system
+    """A branch over frequency."""
     traced = branch.traced
     return {
-        "version": branch.version,
-        "machine": machine_document(branch.machine),
+        **_followed_document(branch, branch.system.named),
         "method": method_document(branch.method),
-        "status": branch.status.name,
-        "status_sentence": branch.status.value,
-        "complete": branch.complete,
-        "notes": list(branch.notes),
         "shortened_steps": [dataclasses.asdict(step) for step in branch.shortened_steps],
-        "omega": plain(branch.omega),
-        "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
-        "phase": {str(which): plain(branch.phase(which)) for which in system.named},
-        "stability": branch.stability.tolist(),
-        "multipliers": plain(branch.multipliers),
-        "error": plain(branch.error),
         "special_points": [special_point_document(point) for point in branch.special_points],
         "half_turn": branch.solver.half_turn,
         "turns": branch.solver.turns,
@@ -74,28 +62,34 @@ def branch_document(branch: Branch) -> Document:
 
 
 def field_branch_document(branch: FieldBranch) -> Document:
-    """A branch over a field, and the amplitudes and phases of named coordinates."""
-    system = branch.machine.system()
+    """A branch over a field of the machine."""
     return {
-        "version": branch.version,
-        "machine": machine_document(branch.machine),
+        **_followed_document(branch, branch.machine.system().named),
         "field": branch.field,
-        "status": branch.status.name,
-        "status_sentence": branch.status.value,
-        "complete": branch.complete,
-        "notes": list(branch.notes),
         "values": plain(branch.values),
-        "omega": plain(branch.omega),
-        "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
-        "phase": {str(which): plain(branch.phase(which)) for which in system.named},
-        "stability": branch.stability.tolist(),
-        "multipliers": plain(branch.multipliers),
-        "error": plain(branch.error),
         "points": [_point_document(orbit.point) for orbit in branch.orbits],
         "special_points": [
             {"value": point.value, **special_point_document(point)}
             for point in branch.special_points
         ],
+    }
+
+
+def _followed_document(branch: Branch | FieldBranch, named: tuple[Coordinate, ...]) -> Document:
+    """What every branch holds, and the amplitudes and phases of named coordinates."""
+    return {
+        "version": branch.version,
+        "machine": machine_document(branch.machine),
+        "status": branch.status.name,
+        "status_sentence": branch.status.value,
+        "complete": branch.complete,
+        "notes": list(branch.notes),
+        "omega": plain(branch.omega),
+        "amplitude": {str(which): plain(branch.amplitude(which)) for which in named},
+        "phase": {str(which): plain(branch.phase(which)) for which in named},
+        "stability": branch.stability.tolist(),
+        "multipliers": plain(branch.multipliers),
+        "error": plain(branch.error),
     }
 
 
