@@ -150,6 +150,7 @@ def test_a_saved_result_opens_as_what_it_was(tmp_path, make):
     document = json.loads((tmp_path / "result.json").read_text())
     assert document["schema"].startswith("flipflow/")
     assert repr(again) == repr(result)
+    assert len(repr(result)) < 250, "what a prompt shows is a line, not the arrays"
 
 
 def test_every_result_of_the_public_face_is_tried():

@@ -157,6 +157,10 @@ class Assessment:
     version: str
     input_hash: str
 
+    def __repr__(self) -> str:
+        name = self.project.document.name or self.project.name
+        return f"Assessment({name}: {self.verdict})"
+
 
 def assess(
     project: Project,

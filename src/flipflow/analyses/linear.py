@@ -38,6 +38,10 @@ class LinearResponse:
     system: MechanicalSystem
     omega: Real
 
+    def __repr__(self) -> str:
+        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        return f"LinearResponse({self.omega.size} frequencies, {ends})"
+
     @cached_property
     def complex_amplitudes(self) -> NDArray[np.complex128]:
         """X of x = Re(X exp(i omega t)) in m, (n, N)."""

@@ -169,6 +169,10 @@ class Loading:
     with_stop: LoadedMachine | None
     without_stop: LoadedMachine
 
+    def __repr__(self) -> str:
+        stop = "without stop" if self.with_stop is None else "with and without stop"
+        return f"Loading({self.load.name or 'load'}, {stop})"
+
 
 def loading(
     screen: FlipFlowScreen,

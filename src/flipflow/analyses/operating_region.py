@@ -79,6 +79,11 @@ class OperatingRegion:
     branches: tuple[Branch, ...]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        ends = f"{self.lower:.6g} to {self.upper:.6g} rad/s"
+        allowed = f"{len(self.feasible)} allowed intervals over {len(self.cases)} load cases"
+        return f"OperatingRegion({ends}, {allowed})"
+
     @property
     def contact_speeds(self) -> Mapping[int, float]:
         """Where each side's contact begins, rad/s, by side: +1, -1.

@@ -70,6 +70,11 @@ class Ramp:
     branch: Branch
     jumps: tuple[LateJump, ...]
 
+    def __repr__(self) -> str:
+        first, last = self.history.omega[0], self.history.omega[-1]
+        ends = f"{first:.6g} to {last:.6g} rad/s"
+        return f"Ramp({ends} at {self.rate:.4g} rad/s^2, {len(self.jumps)} jumps)"
+
     def amplitude(self, which: Coordinate) -> tuple[Real, Real]:
         """Speed in rad/s and amplitude in m at every turning point of a coordinate."""
         h = self.history

@@ -99,6 +99,10 @@ class ResponseFamily:
     field: str
     members: tuple[Member, ...]
 
+    def __repr__(self) -> str:
+        values = ", ".join(f"{member.value:.6g}" for member in self.members)
+        return f"ResponseFamily({self.field}: {values})"
+
     @property
     def values(self) -> Real:
         """The field's values, SI, (n,)."""

@@ -55,6 +55,10 @@ class Reproduction:
     screen: FlipFlowScreen
     figures: tuple[ReproducedFigure, ...]
 
+    def __repr__(self) -> str:
+        counted = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items() if count)
+        return f"Reproduction({len(self.figures)} figures; claims: {counted or 'none'})"
+
     @property
     def claims(self) -> tuple[DecidedClaim, ...]:
         """Every claim with its verdict, in the paper's order."""

@@ -84,6 +84,9 @@ class RunUp:
     power: Mapping[str, float]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"RunUp({self.outcome}, {self.final_speed:.6g} rad/s after {self.duration:.4g} s)"
+
     @property
     def duration(self) -> float:
         """Time calculated in s."""
