@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.errors import InputError
+from flipflow.errors import IncompleteError, InputError
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +140,24 @@ def test_loading_and_family_refuse_with_a_sentence(screen, call, words):
     """Speeds beside the operating region once ended in an error of numpy."""
     with pytest.raises(InputError, match=words):
         call(screen)
+
+
+def test_small_folds_at_first_contact_are_not_those_of_the_main_resonance(screen):
+    """e = 1 mm: two folds 0.07 rad/s apart where contact begins; the region goes on to the peak."""
+    small = screen.replace(clearance=1e-3)
+    region = ff.operating_region(small)
+    assert len(region.branch.folds) == 2
+    assert region.omega_lb is None
+    assert region.omega_ub is None
+    assert region.lower == region.omega_cs
+    assert region.upper == region.branch.peak("relative").omega
+    assert np.isfinite(
+        ff.loading(small, ff.Load(stiffness_factor=1.1)).with_stop.region.change
+    ).all()
+
+
+def test_a_machine_without_an_operating_region_says_so(screen):
+    """So much damping that both frames swing alike only above the antiresonance."""
+    bare = screen.replace(clearance=math.inf, shear_damping=35e3)
+    with pytest.raises(IncompleteError, match="no operating region"):
+        ff.loading(bare, ff.Load(stiffness_factor=1.1))

@@ -18,6 +18,7 @@ from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.analyses.transients import Transients, transients
 from flipflow.methods.options import Method, PiecewiseExact
+from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -28,10 +29,6 @@ from flipflow.results.sensitivity import OneAtATime
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
 CLOSE = 0.05
 TORNADO_SHARE = 0.05
-TORNADO_FIELDS = (
-    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
-    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
-)  # fmt: skip
 NO_LIMIT = (-math.inf, math.inf)
 
 
@@ -214,7 +211,7 @@ def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:
 
     5 % is the spread of Table 1 of the paper; what is zero, infinite or not given does not vary.
     """
-    present = {name: getattr(screen, name) for name in TORNADO_FIELDS}
+    present = {name: getattr(screen, name) or 0.0 for name in MOTION_FIELDS}
     vary = {
         name: ((1.0 - TORNADO_SHARE) * value, (1.0 + TORNADO_SHARE) * value)
         for name, value in present.items()

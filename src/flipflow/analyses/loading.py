@@ -204,7 +204,7 @@ def loading(
         For anything but a screen and a load, an interval beside the operating region, or a load
         that the screen has no data for.
     IncompleteError
-        When no branch could be started, or none reaches the operating region.
+        When no branch could be started, none reaches the operating region, or there is none.
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
@@ -240,6 +240,9 @@ def _compared(
 def _region(
     unloaded: Branch, loaded: Branch, ends: tuple[float, float], start: Start
 ) -> RegionChange:
+    if not ends[0] < ends[1]:
+        words = f"it would begin at {ends[0]:.6g} and end at {ends[1]:.6g} rad/s"
+        raise IncompleteError(f"The machine has no operating region: {words}.")
     omega = np.linspace(*ends, SAMPLES)
     amplitudes = [
         np.array([relative_from_below(branch, float(w)) for w in omega])

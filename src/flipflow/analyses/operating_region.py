@@ -22,9 +22,10 @@ from flipflow.methods.options import Method
 from flipflow.methods.special import CONTACT_BEGIN
 from flipflow.model.limits import Limits
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.results.branch import Branch
+from flipflow.results.branch import Branch, SpecialPoint
 
 LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
+MAIN_SHARE = 0.25  # of the peak: folds of smaller motions are not those of the main resonance
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
 JUMP_WORDS = "jump when the speed falls (w_lb)"
 ANTIRESONANCE_WORDS = "antiresonance of the main frame (w_ar)"
@@ -235,7 +236,7 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
     peak = branch.peak("relative")
     begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.omega < peak.omega]
     cs = begins[-1] if begins else None
-    lb, ub = _main_folds(branch)
+    lb, ub = _main_folds(branch, peak)
     span = (float(branch.omega.min()), float(branch.omega.max()))
     touched = bool(np.any(branch.traced.signature != 0))
     upper = peak.omega if lb is None else lb
@@ -259,11 +260,17 @@ def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
     )
 
 
-def _main_folds(branch: Branch) -> tuple[float | None, float | None]:
-    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next."""
+def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
+    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next.
+
+    None where the motion turns back only far below the peak, as it may where contact begins.
+    """
     folds = branch.folds
     if len(folds) < 2:
         return None, None
-    first = max(range(len(folds) - 1), key=lambda k: folds[k].amplitude("relative"))
+    sizes = [fold.amplitude("relative") for fold in folds]
+    first = max(range(len(folds) - 1), key=lambda k: sizes[k])
+    if max(sizes[first], sizes[first + 1]) < MAIN_SHARE * peak.amplitude("relative"):
+        return None, None
     pair = (folds[first].omega, folds[first + 1].omega)
     return min(pair), max(pair)

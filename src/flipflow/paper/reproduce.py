@@ -16,7 +16,7 @@ from flipflow.figures.parts import Figure
 from flipflow.io.project import load
 from flipflow.io.results import SUMMARY, document_of
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict, undecided
+from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.registry import FIGURES, chosen
 from flipflow.report.blocks import Table
@@ -37,7 +37,11 @@ class ReproducedFigure:
     name, title
         "figure-08", and what it shows.
     figure
-        None where it could not be computed; ``failure`` says why.
+        None where it could not be computed.
+    tables, claims
+        Tables of its page, and what the paper says of it, decided.
+    failure
+        Why it could not be computed, a sentence; empty where it was.
     """
 
     name: str
@@ -119,22 +123,21 @@ def reproduce(
 
 def _reproduced(one: PaperFigure[Any], screen: FlipFlowScreen) -> ReproducedFigure:
     if one.needs_stop and not screen.has_stop:
-        return _without(one, "a machine with stop")
+        return _without(one, "It needs a machine with stop.")
     try:
         data = one.compute(screen)
         picture, tables = one.draw(data), one.tables(data)
         claims = tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims)
-    except IncompleteError as error:
-        return _without(one, f"a branch to its end ({error})")
-    except MissingExtra as error:
-        return _without(one, f"an optional package ({error})")
+    except (IncompleteError, MissingExtra) as error:
+        return _without(one, str(error))
     return ReproducedFigure(one.name, one.title, picture, tables, claims)
 
 
-def _without(one: PaperFigure[Any], missing: str) -> ReproducedFigure:
-    evaluation: Evaluation = undecided(missing)
+def _without(one: PaperFigure[Any], why: str) -> ReproducedFigure:
+    """The figure that could not be computed, and its claims that cannot be decided."""
+    evaluation = Evaluation(Verdict.UNDECIDED, {}, why)
     claims = tuple(DecidedClaim(claim, one.name, evaluation) for claim in one.claims)
-    return ReproducedFigure(one.name, one.title, None, (), claims, f"It needs {missing}.")
+    return ReproducedFigure(one.name, one.title, None, (), claims, why)
 
 
 @document_of.register

@@ -14,7 +14,7 @@ from flipflow.figures.schematic import schematic
 from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.report.blocks import (
     Block,
@@ -30,11 +30,6 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import named, rpm
 from flipflow.report.registry import Part, section
 
-DRAWN = (
-    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
-    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
-    "clearance_minus",
-)  # fmt: skip
 SCHEMATIC = (
     "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "
     "relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds the gap per "
@@ -108,7 +103,7 @@ def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
     return {
         name: f"{SYMBOLS.get(name, FIELD[name].symbol)} = "
         f"{shown(value, FIELD[name].file_unit, FIELD[name].unit)}"
-        for name in DRAWN
+        for name in MOTION_FIELDS
         if (value := getattr(screen, name)) is not None
     }
 
