@@ -10,6 +10,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import IncompleteError, InputError
+from flipflow.io.derived import derive
 
 
 @pytest.fixture(scope="module")
@@ -161,3 +162,18 @@ def test_a_machine_without_an_operating_region_says_so(screen):
     bare = screen.replace(clearance=math.inf, shear_damping=35e3)
     with pytest.raises(IncompleteError, match="no operating region"):
         ff.loading(bare, ff.Load(stiffness_factor=1.1))
+
+
+def test_a_stop_without_gap_counts_where_both_frames_swing_alike(screen):
+    """The closed forms of w_ea, w_ar, w01 and w02 hold a bonded stop wherever they are asked for."""
+    bonded = screen.replace(clearance=0.0, isolation_damping=1.0, shear_damping=1.0, stop_damping=0)
+    response = ff.linear_response(bonded, 100.0)
+    at_ea = ff.linear_response(bonded, response.omega_ea)
+    assert at_ea.amplitude("main") == pytest.approx(at_ea.amplitude("relative"), rel=1e-6)
+    at_ar = ff.linear_response(bonded, response.omega_ar)
+    assert at_ar.amplitude("main") < 1e-3 * at_ar.amplitude("relative")
+    region = ff.operating_region(bonded)
+    derived = derive(bonded)
+    assert (region.omega_ea, region.omega_ar) == (response.omega_ea, response.omega_ar)
+    assert (derived.omega_ea, derived.omega_ar) == (response.omega_ea, response.omega_ar)
+    np.testing.assert_allclose(derived.natural_frequencies, response.natural_frequencies)

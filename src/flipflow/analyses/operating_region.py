@@ -231,8 +231,7 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
     IncompleteError
         When the branch has no points.
     """
-    effective = _bonded(screen)
-    ea, ar = equal_amplitude_frequency(effective), antiresonance_frequency(effective)
+    ea, ar = equal_amplitude_frequency(screen), antiresonance_frequency(screen)
     peak = branch.peak("relative")
     begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.omega < peak.omega]
     cs = begins[-1] if begins else None
@@ -245,19 +244,9 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
     if touched:
         note = "Contact begins below the speeds analysed: the region starts with them."
         return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
-    reaches = screen.has_stop and effective is screen
-    notes = ("The stop is not reached at any speed analysed.",) if reaches else ()
+    unused = screen.has_stop and not screen.stop().bonded
+    notes = ("The stop is not reached at any speed analysed.",) if unused else ()
     return Landmarks(ea, ar, cs, lb, ub, ea or span[0], ar or span[1], notes)
-
-
-def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
-    """A screen without gap on either side has one stiffer shear spring."""
-    if not (screen.has_stop and screen.stop().bonded):
-        return screen
-    return screen.replace(
-        shear_stiffness=screen.shear_stiffness + screen.stop_stiffness,
-        shear_damping=screen.shear_damping + screen.stop_damping,
-    )
 
 
 def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
