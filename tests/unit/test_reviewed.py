@@ -164,8 +164,27 @@ def test_a_machine_without_an_operating_region_says_so(screen):
         ff.loading(bare, ff.Load(stiffness_factor=1.1))
 
 
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: ff.simulate(s, [100.0, 120.0]), "omega = .*finite frequency"),
+        (lambda s: ff.poincare_section(s, [100.0, 120.0]), "omega = .*finite frequency"),
+        (lambda s: ff.poincare_section(s, 100.0, skip=-1), "skip = -1: .*from 0"),
+        (lambda s: ff.poincare_section(s, 100.0, skip="a"), "skip = 'a': .*from 0"),
+        (lambda s: ff.sweep(s, [100.0], initial=["x"] * 4), "initial = .*4 finite numbers"),
+        (lambda s: ff.periodic_orbits(s, 100.0, rng="a"), "rng = 'a'"),
+        (lambda s: ff.jump_risk(s, 100.0, rng=-1), "rng = -1"),
+        (lambda s: ff.basins(s, 100.0, {"relative": [0.0]}, most_turns="a"), "most_turns = 'a'"),
+    ],
+)
+def test_bad_arguments_are_refused_with_what_was_given(screen, call, words):
+    """The first of several speeds was once taken for all of them."""
+    with pytest.raises(InputError, match=words):
+        call(screen)
+
+
 def test_a_stop_without_gap_counts_where_both_frames_swing_alike(screen):
-    """The closed forms of w_ea, w_ar, w01 and w02 hold a bonded stop wherever they are asked for."""
+    """The closed forms of w_ea, w_ar, w01 and w02 hold a bonded stop wherever they stand."""
     bonded = screen.replace(clearance=0.0, isolation_damping=1.0, shear_damping=1.0, stop_damping=0)
     response = ff.linear_response(bonded, 100.0)
     at_ea = ff.linear_response(bonded, response.omega_ea)

@@ -15,7 +15,7 @@ from flipflow.analyses.linear import (
     equal_amplitude_frequency,
     linear_response,
 )
-from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.monitor import Monitor, silent
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import InputError
 from flipflow.methods.options import Method
@@ -144,7 +144,7 @@ def operating_region(
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
-    say = monitor or (lambda _sentence, _share: None)
+    say = monitor or silent
     loads = tuple(load_cases) or (Load(name="empty"),)
     span = analysed_range(screen) if omega is None else check_interval(omega)
     say("empty machine", 0.0)

@@ -9,9 +9,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.analyses.arguments import checked_count, checked_speed, initial_state
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
-from flipflow.analyses.sweep import MAX_PERIODS, check_count, checked_speeds, initial_state
+from flipflow.analyses.sweep import MAX_PERIODS
 from flipflow.errors import InputError
 from flipflow.methods.recording import Recording
 from flipflow.methods.settle import Settling
@@ -77,8 +78,8 @@ def simulate(
     IncompleteError
         Where a turn has too many contacts to be recorded.
     """
-    speed = float(checked_speeds(omega)[0])
-    check_count("periods", periods, MOST_PERIODS)
+    speed = checked_speed(omega)
+    checked_count("periods", periods, MOST_PERIODS)
     turn = 2.0 * math.pi / speed
     end = periods * turn
     system = system_of(machine)

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.analyses.arguments import checked_positive
 from flipflow.analyses.linear import linear_response
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.transient import (
     STATUS,
     at_rest,
-    check_positive,
     movable,
     normal_direction,
     run_history,
@@ -90,7 +90,7 @@ def start_up(
         Without damping, for a bad speed or duration, and for a drive that cannot be.
     """
     movable(machine)
-    given = None if speed is None else check_positive("speed", speed, "rad/s")
+    given = None if speed is None else checked_positive("speed", speed, "rad/s")
     shaft = _shaft(machine, drive, given, method)
     wanted = given or _working_speed(shaft)
     history = run_history(
@@ -137,7 +137,7 @@ def coast_down(
         Without damping, for a bad speed or duration, and for a drive that cannot be.
     """
     movable(machine)
-    omega = check_positive("speed", speed, "rad/s")
+    omega = checked_positive("speed", speed, "rad/s")
     shaft, slowest = _shaft(machine, drive, omega, method), -math.inf
     if isinstance(shaft, Drive):
         shaft, slowest = shaft.switched_off(), STOPPED * omega
@@ -187,7 +187,7 @@ def _longest(shaft: Drive | SpeedProfile, duration: float | None, usual: float) 
     """Longest time in s: as asked for, else that of the profile, else the usual one."""
     if duration is None:
         return shaft.duration if isinstance(shaft, SpeedProfile) else usual
-    seconds = check_positive("duration", duration, "s")
+    seconds = checked_positive("duration", duration, "s")
     if seconds > MOST_SECONDS:
         raise InputError("duration", duration, f"give at most {MOST_SECONDS:g} s")
     return seconds

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from flipflow import __version__
-from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.monitor import Monitor, silent
 from flipflow.figures.drawing import Drawing
 from flipflow.paper.claims import DecidedClaim, Number, Verdict
 from flipflow.paper.reproduce import PAPER, ReproducedFigure, Reproduction
@@ -68,7 +68,7 @@ def write_reproduction(
     StoreError
         When a file cannot be written.
     """
-    say = monitor or (lambda _sentence, _share: None)
+    say = monitor or silent
     drawn = [one for one in found.figures if one.figure is not None]
     names = []
     for k, one in enumerate(drawn):

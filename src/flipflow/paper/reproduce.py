@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flipflow import __version__
-from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.monitor import Monitor, silent
 from flipflow.analyses.reopen import CODEC
 from flipflow.errors import IncompleteError, InputError, MissingExtra, StoreError
 from flipflow.figures.drawing import Drawing
@@ -111,7 +111,7 @@ def reproduce(
     machine = load(MACHINE) if screen is None else screen
     if not isinstance(machine, FlipFlowScreen):
         raise InputError("screen", type(machine).__name__, "give a FlipFlowScreen")
-    say = monitor or (lambda _sentence, _share: None)
+    say = monitor or silent
     wanted = chosen(tuple(figures))
     made = []
     for k, one in enumerate(wanted):
