@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.analyses.assessment import input_hash
 from flipflow.errors import IncompleteError, InputError
 from flipflow.io.derived import derive
 
@@ -196,3 +198,11 @@ def test_a_stop_without_gap_counts_where_both_frames_swing_alike(screen):
     assert (region.omega_ea, region.omega_ar) == (response.omega_ea, response.omega_ar)
     assert (derived.omega_ea, derived.omega_ar) == (response.omega_ea, response.omega_ar)
     np.testing.assert_allclose(derived.natural_frequencies, response.natural_frequencies)
+
+
+def test_the_digest_of_the_input_holds_the_drive():
+    """The drive decides how the machine starts, which the assessment tells."""
+    project = ff.load_project("ffs0827")
+    driven = dataclasses.replace(project, drive=ff.Drive(inertia=1.0))
+    stiffer = dataclasses.replace(project, drive=ff.Drive(inertia=2.0))
+    assert len({input_hash(one) for one in (project, driven, stiffer)}) == 3

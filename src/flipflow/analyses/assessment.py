@@ -18,6 +18,7 @@ from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.analyses.transients import Transients, transients
 from flipflow.methods.options import Method, PiecewiseExact
+from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.project import Project
@@ -300,7 +301,7 @@ def verdict(
     """One sentence for the top of the report."""
     if omega is None:
         return "No operating speed is given: the allowed speed range stands below."
-    speed = f"{omega * 30.0 / math.pi:.4g} rpm"
+    speed = f"{omega * RPM:.4g} rpm"
     unknown = [case.name for case in cases if case.orbit is None]
     if unknown:
         return (
@@ -336,7 +337,7 @@ def _outside(omega: float, region: OperatingRegion) -> str:
     below = omega < region.lower
     end, words = (region.lower, region.ends[0]) if below else (region.upper, region.ends[1])
     side = "below" if below else "above"
-    return f", but {side} the operating region: {words} at {end * 30.0 / math.pi:.4g} rpm"
+    return f", but {side} the operating region: {words} at {end * RPM:.4g} rpm"
 
 
 def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
@@ -353,8 +354,8 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
 
 def _against(row: LimitRow) -> str:
     """Words such as: relative amplitude, full, 5.12 mm of 5 mm least."""
-    scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / 9.80665}
-    factor = scale.get(row.shown_unit, 30.0 / math.pi if row.shown_unit == "rpm" else 1.0)
+    scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / GRAVITY, "rpm": RPM}
+    factor = scale.get(row.shown_unit, 1.0)
     low, high = row.limit
     worst = row.worst if row.worst is not None else math.nan
     at_low = relative_margin(worst, low, math.inf) <= relative_margin(worst, -math.inf, high)
@@ -371,6 +372,7 @@ def input_hash(project: Project) -> str:
         "limits": dataclasses.asdict(project.limits),
         "cases": [dataclasses.asdict(load) for load in project.load_cases],
         "speed": project.speed,
+        "drive": None if project.drive is None else dataclasses.asdict(project.drive),
         "version": __version__,
     }
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]

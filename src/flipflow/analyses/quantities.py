@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.normal import NormalMotion, normal_motion
+from flipflow.model.constants import GRAVITY
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
 Subject = TypeVar("Subject")
-GRAVITY = 9.80665
 
 
 class _States(NamedTuple):

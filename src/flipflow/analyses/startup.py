@@ -27,6 +27,7 @@ from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.kernels.unsteady import SHAFT_STATES
 from flipflow.methods.time_stepping import RungeKutta, Stretch
+from flipflow.model.constants import GRAVITY
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
 from flipflow.model.elements import Unbalance
 from flipflow.model.screen import FlipFlowScreen
@@ -44,7 +45,6 @@ AT_REST, STOPPED = 0.02, 0.02
 NEAR = (0.8, 1.1)
 PASSING = (0.8, 1.25)
 FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
-GRAVITY = 9.80665
 
 
 def start_up(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.model import constants
+
 if TYPE_CHECKING:
     from flipflow.model.project import Project
 
-RPM = 30.0 / math.pi
+RPM = constants.RPM
 
 FILE_HELP = (
     "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without), rig-lin2024 "

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.io.files import write_file
+from flipflow.model.constants import RPM
 from flipflow.results.branch import Branch
 
-RPM = 30.0 / np.pi
 Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.system import Machine
 from flipflow.results.history import History
@@ -16,7 +16,6 @@ from flipflow.results.history import History
 Outcome = Literal[
     "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
 ]
-RPM = 30.0 / math.pi
 AT_SPEED = 0.95  # of the working speed: a motor's slip differs with its load
 
 
