@@ -12,7 +12,7 @@ import xarray
 
 import flipflow as ff
 from flipflow.analyses.frequency_response import described
-from flipflow.errors import InputError, StoreError
+from flipflow.errors import IncompleteError, InputError, StoreError
 from flipflow.io.response import write_response
 from flipflow.kernels import status
 from flipflow.methods.scratch import new_branch
@@ -71,6 +71,8 @@ def test_a_branch_that_could_not_be_started_is_saved(tmp_path, ending):
     record = new_branch(branch.solver.unknowns, 1)
     nothing = Traced.recorded(record, 0, status.NO_CONVERGENCE, branch.traced.course)
     empty = described(branch.machine, branch.method, branch.solver, nothing)
+    with pytest.raises(IncompleteError, match=r"no points\. No periodic motion"):
+        empty.orbits_at(155.0)
     ff.save(empty, tmp_path / f"branch.{ending}")
     if ending == "json":
         again = ff.open_result(tmp_path / "branch.json")
