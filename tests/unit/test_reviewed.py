@@ -177,6 +177,13 @@ def test_a_machine_without_an_operating_region_says_so(screen):
         (lambda s: ff.periodic_orbits(s, 100.0, rng="a"), "rng = 'a'"),
         (lambda s: ff.jump_risk(s, 100.0, rng=-1), "rng = -1"),
         (lambda s: ff.basins(s, 100.0, {"relative": [0.0]}, most_turns="a"), "most_turns = 'a'"),
+        (lambda s: ff.ramp(s, 100.0, 1.0), "omega = 100.0: .*two different"),
+        (lambda s: ff.ramp(s, (100.0, 100.0), 1.0), "omega = .*two different"),
+        (lambda s: ff.ramp(s, (100.0, 110.0), "fast"), "rate = 'fast'"),
+        (lambda s: ff.linear_response(s, "fast"), "omega = 'fast'"),
+        (lambda s: ff.operating_region(s, limits=3), "limits = 3"),
+        (lambda s: ff.operating_region(s, load_cases=ff.Load()), "load_cases = .*a list"),
+        (ff.assess, "project = 'FlipFlowScreen'"),
     ],
 )
 def test_bad_arguments_are_refused_with_what_was_given(screen, call, words):

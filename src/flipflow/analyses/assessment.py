@@ -17,6 +17,7 @@ from flipflow.analyses.operating_region import OperatingRegion, analysed_range, 
 from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.analyses.transients import Transients, transients
+from flipflow.errors import InputError
 from flipflow.methods.options import Method, PiecewiseExact
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
@@ -177,7 +178,15 @@ def assess(
         Called with a sentence and the share done, 0 to 1.
     omega, method
         As for :func:`~flipflow.operating_region`.
+
+    Raises
+    ------
+    InputError
+        For anything but a project.
     """
+    if not isinstance(project, Project):
+        remedy = "give a project, such as ff.load_project('ffs0827')"
+        raise InputError("project", type(project).__name__, remedy)
     region = operating_region(
         project.screen,
         project.limits,

@@ -116,7 +116,10 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     InputError
         For frequencies that are not finite or not above 0, and without any damping.
     """
-    frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    try:
+        frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give frequencies in rad/s, one or (n,)") from None
     if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies > 0.0)):
         raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
     system = system_of(machine).with_bonded()

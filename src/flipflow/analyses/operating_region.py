@@ -140,10 +140,15 @@ def operating_region(
     Raises
     ------
     InputError
-        For anything but a screen, whose frames the region speaks of, and for a bad interval.
+        For anything but a screen, whose frames the region speaks of, limits and loads, and for a
+        bad interval.
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
+    if limits is not None and not isinstance(limits, Limits):
+        raise InputError("limits", limits, "give an ff.Limits, or None for no limits")
+    if isinstance(load_cases, Load) or not all(isinstance(load, Load) for load in load_cases):
+        raise InputError("load_cases", load_cases, "give a list of ff.Load, such as [ff.Load()]")
     say = monitor or silent
     loads = tuple(load_cases) or (Load(name="empty"),)
     span = analysed_range(screen) if omega is None else check_interval(omega)
