@@ -13,7 +13,7 @@ from one_core import stay_on_one_core
 import flipflow as ff
 from flipflow.analyses.frequency_response import first_unknowns, solver_for
 from flipflow.kernels import arclength
-from flipflow.methods.solver import STEP_SHARE, eigenvalues_of
+from flipflow.methods.solver import STEP_SHARE
 from flipflow.methods.special import find_special_points
 
 ROWS = 25
@@ -37,7 +37,7 @@ def stages(machine, method):
     traced = solver.trace(start, low, course)
     lap()
     maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
-    eigenvalues = eigenvalues_of(maps)
+    eigenvalues = solver.eigenvalues(traced, maps)
     lap()
     find_special_points(solver, traced, maps, eigenvalues)
     lap()

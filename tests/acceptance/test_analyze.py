@@ -84,8 +84,8 @@ def test_feasible_window_is_inside_the_region_and_binds(analyzed):
         (("--speeds", "300 rpm", "1e9 rpm"), ("'300 rpm to 1e9 rpm'", "no screen runs above")),
         (("--speeds", "300", "900 rpm"), ("--speeds", "'300'")),
         (("--speeds", "2,5 Hz", "900 rpm"), ("--speeds", "'2,5 Hz'", "point")),
-        (("--harmonics", "0"), ("harmonics = 0", "1 to 200")),
-        (("--harmonics", "10000"), ("harmonics = 10000", "1 to 200")),
+        (("--harmonics", "0"), ("--harmonics = '0'", "1 to 200")),
+        (("--harmonics", "10000"), ("--harmonics = '10000'", "1 to 200")),
     ],
 )
 def test_bad_ranges_and_orders(monkeypatch, capsys, tmp_path, options, words):

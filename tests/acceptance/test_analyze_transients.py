@@ -9,7 +9,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.analyses.assessment import assess
-from flipflow.io.results import assessment_document
+from flipflow.io.assessment import assessment_document
 from flipflow.report.blocks import FigureBlock, Heading, Text
 from flipflow.report.registry import blocks_of
 
@@ -49,14 +49,15 @@ def test_numbers_are_those_of_the_analyses(project, assessment):
     assert document["reasons"] == {}
 
 
-def test_report_has_the_section_with_two_figures(assessment):
+def test_report_has_the_section_with_both_runs_side_by_side(assessment):
     found = blocks_of(assessment)
     titles = [block.text for block in found if isinstance(block, Heading)]
     assert titles.count("Start, stop and disturbances") == 1
-    figures = [block.figure.title for block in found if isinstance(block, FigureBlock)]
-    assert [title for title in figures if title in ("Start", "Coast-down")] == [
-        "Start", "Coast-down",
-    ]  # fmt: skip
+    figures = [block.figure for block in found if isinstance(block, FigureBlock)]
+    (both,) = (figure for figure in figures if figure.title == "Start and coast-down")
+    assert both.columns == 2
+    assert [panel.title for panel in both.panels] == ["Start", "Coast-down", "", "", "", ""]
+    assert [panel.y.label for panel in both.panels[4:]] == ["motor torque", "foundation force"]
 
 
 def test_words_of_the_empty_machine(assessment):

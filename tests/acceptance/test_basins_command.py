@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 import signal
+from importlib import resources
 
 import pytest
 
 import flipflow as ff
 from flipflow.cli.progress import stoppable
-from flipflow.errors import Cancelled
+from flipflow.errors import Cancelled, IncompleteError
 
 
 def test_command_line(command, monkeypatch, tmp_path):
@@ -47,6 +48,43 @@ def test_command_line_refuses_with_one_sentence(command, monkeypatch, tmp_path, 
     assert code == 2
     assert err.startswith("Error: ")
     assert err.count("\n") == 1
+
+
+# Frames that rattle between hard stops a tenth of a millimetre away, with hardly any damping.
+RATTLING = {
+    'damping = "9.866 kN s/m"\nnormal': 'damping = "0.1 kN s/m"\nnormal',
+    'damping = "2.605 kN s/m"\npieces': 'damping = "0.3 kN s/m"\npieces',
+    'damping = "2.605 kN s/m"\nlaw': 'damping = "0.265 kN s/m"\nlaw',
+    'clearance = "6 mm"': 'clearance = "0.1 mm"',
+    '"8100 kN/m"': '"10000 MN/m"',
+}
+
+
+def test_a_machine_without_motions_is_told_in_a_sentence(command, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    text = (resources.files("flipflow.io.machines") / "ffs0827.toml").read_text(encoding="utf-8")
+    for old, new in RATTLING.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (tmp_path / "hard.toml").write_text(text, encoding="utf-8")
+    words = ("basins", "hard.toml", "--force", "--speed", "300 rpm", "--cells", "4")
+    code, out, err = command(*words)
+    assert (code, out) == (3, "")
+    assert err.startswith("Error: No motion that repeats itself was found at 300 rpm")
+    assert err.count("\n") == 1
+
+
+def test_basins_are_kept_where_there_is_no_jump_risk(command, monkeypatch, tmp_path):
+    def on_the_edge(*_words, **_options):
+        raise IncompleteError("It stands on the edge of a jump.")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("flipflow.analyses.jump_risk.jump_risk", on_the_edge)
+    code, out, _ = command("basins", "ffs0827-linear", "--cells", "2")
+    assert code == 0
+    assert "Note: No jump risk: It stands on the edge of a jump." in out
+    document = json.loads((tmp_path / "ffs0827-linear-flipflow" / "basins.json").read_text())
+    assert document["jump_risk"] is None
 
 
 def test_interrupt_keeps_cells_and_ends_other_stages():

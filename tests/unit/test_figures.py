@@ -28,6 +28,7 @@ from flipflow.figures.print import _draw
 from flipflow.figures.response import cases_figure
 from flipflow.figures.scales import MM, RPM
 from flipflow.figures.schematic import schematic
+from flipflow.figures.transient import run_ups_figure
 
 
 @pytest.fixture(scope="module")
@@ -193,12 +194,94 @@ def test_band_holds_every_case_at_the_working_speed(assessment):
     assert high == pytest.approx(max(amplitudes), rel=2e-3)
 
 
+@pytest.fixture(scope="module")
+def linear():
+    return assess(ff.load_project("ffs0827-linear"))
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return assess(ff.load_project("rig-lin2024"))
+
+
 def test_energy_bars_add_up_to_what_is_fed_in(assessment):
     figure = energy_figure(assessment)
     for y, case in zip((3.0, 2.0, 1.0, 0.0), assessment.cases, strict=True):
         end = max(bar.high for bar in figure.panels[0].bars if bar.y == y)
         fed = case.energy["input"] + case.energy["normal"]
         assert end == pytest.approx(fed * 1e-3, rel=1e-9)
+
+
+def test_energy_names_no_damper_that_takes_nothing_and_small_power_in_watts(rig):
+    figure = energy_figure(rig)
+    assert {bar.name for bar in figure.panels[0].bars} == {
+        "isolation (c1)", "shear springs (c2)", "stops (c3)",
+    }  # fmt: skip
+    assert figure.panels[0].x.unit == "W"
+    assert figure.panels[0].bars[-1].text == "8.24 W"
+
+
+def test_a_machine_without_stop_is_not_said_to_leave_it(linear):
+    assert motions_figure(linear).caption.endswith("The machine has no stop.")
+    assert ff.figure(linear.cases[0].orbit).caption.startswith("The machine has no stop.")
+    assert "stop bends" not in portrait_figure(linear).caption
+
+
+def test_portraits_keep_clear_of_their_frame(assessment, linear, rig):
+    for one in (assessment, linear, rig):
+        panel = portrait_figure(one).panels[0]
+        for axis, values in ((panel.x, "x"), (panel.y, "y")):
+            reach = max(np.abs(getattr(trace, values)).max() for trace in panel.traces)
+            assert axis.bounds[1] == -axis.bounds[0] >= 1.05 * reach
+        assert all(abs(line.at) < panel.x.bounds[1] for line in panel.lines)
+
+
+def test_orbits_leave_no_empty_rows(assessment, linear):
+    for one in (assessment, linear):
+        figure = orbits_figure(one)
+        panel, rect = figure.panels[0], arrange(figure).rects[0]
+        wide, high = (axis.bounds[1] for axis in (panel.x, panel.y))
+        assert rect.height == pytest.approx(rect.width * high / wide, abs=8.0)
+
+
+def test_the_row_of_allowed_speeds_says_its_speeds_or_none(assessment, linear):
+    (note,) = region_figure(assessment.region).panels[0].notes
+    assert note.text == "845 to 860.7 rpm"
+    (note,) = region_figure(linear.region).panels[0].notes
+    assert note.text == "none"
+
+
+def test_labels_of_two_limits_keep_apart(linear):
+    lines = {line.text: line for line in cases_figure(linear).panels[0].lines}
+    assert lines["least 5 mm"].under
+    assert not lines["most 8 mm"].under
+
+
+def test_rows_of_the_legend_are_as_high_as_they_are_laid_out(assessment):
+    legend = described(cases_figure(assessment))["layout"]["legend"]
+    assert legend["tracegroupgap"] == 0
+
+
+def test_start_and_coast_down_stand_side_by_side(rig):
+    runs = rig.transients.start, rig.transients.coast_down
+    figure = run_ups_figure(runs)
+    assert [panel.title for panel in figure.panels[:3]] == ["Start", "Coast-down", ""]
+    assert [line.text for line in figure.panels[0].lines] == ["w01", "working speed"]
+    assert [line.text for line in figure.panels[1].lines] == ["w01", "running speed"]
+    alone = [ff.figure(run) for run in runs]
+    assert [one.title for one in alone] == ["Start", "Coast-down"]
+    assert [one.panels[1].y for one in alone] == [panel.y for panel in figure.panels[2:4]]
+
+
+def test_force_on_the_foundation_is_the_greatest_of_each_turn(rig):
+    """A thin line through the peaks, the greatest of all included, no saw between them."""
+    run = rig.transients.coast_down
+    (force,) = ff.figure(run).panels[2].traces
+    assert force.y.max() == pytest.approx(run.peaks["foundation_force"].value / 1e3)
+    turns = (run.history.angle[-1] - run.history.angle[0]) / (2.0 * np.pi)
+    assert force.x.size <= min(turns + 2.0, 1500.0)
+    rises = np.sign(np.diff(force.y))
+    assert (rises[1:] * rises[:-1] < 0.0).mean() < 0.1
 
 
 def test_region_shows_every_interval_of_every_case(assessment):

@@ -55,6 +55,17 @@ def test_a_change_in_a_called_file_is_never_stale(package: Path, tmp_path: Path)
     assert run(package, FLIPFLOW_CACHE_DIR=cache)[:2] == (7.0, 1), "the first folder still serves"
 
 
+def test_a_kernel_for_kernels_is_not_run_from_python(package: Path, tmp_path: Path) -> None:
+    """There is no machine code of it to run; the interpreter has to survive the attempt."""
+    call = "from tiny.outer import answer; from tiny.inner import factor; answer(2.0); factor(2.0)"
+    done = subprocess.run(
+        [sys.executable, "-c", call], cwd=package.parent, capture_output=True, text=True,
+        env={**os.environ, "FLIPFLOW_CACHE_DIR": str(tmp_path / "cache")}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "KeyError" in done.stderr
+
+
 def test_the_cache_stays_in_its_folder(package: Path, tmp_path: Path) -> None:
     """Nothing is written beside the sources."""
     cache = tmp_path / "cache"

@@ -20,7 +20,17 @@ from flipflow.figures.plotly import library
 from flipflow.report import first_page, summary, write_html
 from flipflow.report.blocks import Heading, Note, Table, Text, TitleBlock, Values, Verdict
 from flipflow.report.html import html
-from flipflow.report.numbers import bounds, multiplier, named, number, percent, quantity, rpm, speed
+from flipflow.report.numbers import (
+    bounds,
+    four_digits,
+    multiplier,
+    named,
+    number,
+    percent,
+    quantity,
+    rpm,
+    speed,
+)
 from flipflow.report.registry import Part, blocks_of, section
 
 LARGEST = 6e6
@@ -68,6 +78,12 @@ def test_quantities_come_with_their_unit():
     assert quantity(0.0051167, "mm", "m") == "5.12 mm"
     assert quantity(28.7359, "g", "m/s^2") == "2.93 g"
     assert quantity(None, "kN", "N") == "-"
+    assert quantity(math.nan, "mm", "m") == "-"
+    assert quantity(84.41, "kN", "N") == "84.4 N"
+    assert quantity(8.24, "kW", "W", with_unit=False) == "0.00824"
+    assert [four_digits(value) for value in (12.9, 713.0, 1971.2, 25000.0)] == [
+        "12.90", "713.0", "1971", "25000",
+    ]  # fmt: skip
     assert named("jump_margin", math.inf) == "no jump"
     assert rpm(850.0 * math.pi / 30.0) == "850"
     assert speed(850.0 * math.pi / 30.0) == "850 rpm (14.17 Hz, 89.01 rad/s)"
@@ -95,8 +111,8 @@ def test_the_report_opens_with_title_and_verdict(assessment):
     assert parts == [
         "The machine",
         "Results",
-        "Start, stop and disturbances",
         "What moves the amplitude",
+        "Start, stop and disturbances",
         "Appendix",
     ]
 

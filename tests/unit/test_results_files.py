@@ -15,7 +15,6 @@ from flipflow.analyses.frequency_response import described
 from flipflow.errors import IncompleteError, InputError, StoreError
 from flipflow.io.response import write_response
 from flipflow.kernels import status
-from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Traced
 
 
@@ -68,7 +67,7 @@ def test_what_cannot_be_opened_says_why(tmp_path):
 @pytest.mark.parametrize("ending", ["json", "nc", "csv"])
 def test_a_branch_that_could_not_be_started_is_saved(tmp_path, ending):
     branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 160.0))
-    record = new_branch(branch.solver.unknowns, 1)
+    record = branch.solver.new_branch(1)
     nothing = Traced.recorded(record, 0, status.NO_CONVERGENCE, branch.traced.course)
     empty = described(branch.machine, branch.method, branch.solver, nothing)
     with pytest.raises(IncompleteError, match=r"no points\. No periodic motion"):

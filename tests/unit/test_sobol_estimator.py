@@ -117,3 +117,20 @@ def test_without_salib_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "SALib.sample.sobol", None)
     with pytest.raises(MissingExtra, match="study"):
         saltelli_sample(2, 8, 0)
+
+
+def test_resamples_in_which_nothing_varies_give_no_interval():
+    """One group out of eight is unlike the others: many resamples leave it out."""
+    values = np.ones((8, 3, 1))
+    values[3] = [[2.0], [3.0], [1.5]]
+    found = indices(values)
+    assert np.isfinite(found.total).all()
+    assert np.isnan(found.total_confidence).all()
+
+
+def test_resamples_without_a_whole_group_give_no_interval():
+    values = ishigami(saltelli_sample(1, 8, 0) * np.ones(3))[:, :, None]
+    values[2:, 0] = np.nan
+    found = indices(values)
+    assert found.groups[0] == 2
+    assert np.isfinite(found.mean).all()

@@ -313,14 +313,12 @@ def verdict(
     speed = f"{omega * RPM:.4g} rpm"
     unknown = [case.name for case in cases if case.orbit is None]
     if unknown:
-        return (
-            f"{speed}: not judged, for the speeds analysed do not hold it in {', '.join(unknown)}."
-        )
+        where = "; ".join(unknown) if len(unknown) < len(cases) else "any load case"
+        return f"{speed}: not judged, for the speeds analysed do not hold it in {where}."
     lost = [case.name for case in cases if case.orbit is not None and not case.orbit.stable]
     if lost:
-        return (
-            f"{speed}: the motion is not sure to return after a disturbance in {', '.join(lost)}."
-        )
+        where = "; ".join(lost) if len(lost) < len(cases) else "every load case"
+        return f"{speed}: the motion is not sure to return after a disturbance in {where}."
     judged = [row for row in rows if row.margin is not None]
     unchecked = [row for row in rows if row.state == NOT_CHECKED and row.limit != NO_LIMIT]
     if not judged:

@@ -20,7 +20,7 @@ from flipflow.methods.options import (
     PiecewiseExact,
     SampledHarmonicBalance,
 )
-from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced, eigenvalues_of
+from flipflow.methods.solver import STEP_SHARE, Real, Solver, Traced
 from flipflow.methods.special import STABILITY_CHANGES, Found, find_special_points
 from flipflow.methods.stability import (
     UNDETERMINED,
@@ -102,7 +102,7 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
     if traced.omega.size == 0:
         return _finished(machine, method, solver, traced, np.zeros((0, 0, 0)), [], [])
     maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
-    eigenvalues = eigenvalues_of(maps)
+    eigenvalues = solver.eigenvalues(traced, maps)
     found, notes = find_special_points(solver, traced, maps, eigenvalues)
     return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
 

@@ -13,7 +13,6 @@ from flipflow.kernels import arclength
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.field_path import FieldPoint
 from flipflow.methods.options import Method
-from flipflow.methods.scratch import new_branch
 from flipflow.methods.settle import Settled
 from flipflow.methods.solver import Point, Solver, Traced
 from flipflow.model.screen import FlipFlowScreen
@@ -95,11 +94,12 @@ def _return_maps(document: Document, solver: Solver) -> np.ndarray[Any, np.dtype
 
 
 def _traced_from(document: Document, solver: Solver) -> Traced:
-    """The points of a branch as they were followed."""
+    """The points of a branch as they were followed, but for the depths: those are not kept."""
     u = array(document["unknowns"]).reshape(-1, solver.unknowns)
     points = u.shape[0]
     # One more than the points: the step at which the branch ended.
-    record = new_branch(solver.unknowns, points + 1, with_jacobian=solver.reads_jacobian)
+    record = solver.new_branch(points + 1)
+    record.depth[:] = np.nan
     record.u[:points] = u
     record.omega[:points] = document["omega"]
     record.tangent[:points] = array(document["tangent"]).reshape(points, solver.unknowns + 1)
@@ -191,6 +191,7 @@ def sweep_from(document: Document) -> Sweep:
         most_turns=document["most_turns"],
         solver=solver,
         version=document["version"],
+        complete=document.get("complete", True),
     )
 
 

@@ -311,7 +311,7 @@ def _notes(n: int, found: SobolIndices, failed: Real) -> Iterator[str]:
     if np.any(failed > 0.0):
         least = int(found.groups.min())
         yield (
-            f"Up to {100.0 * failed.max():.2g} % of the samples have no finite value; the whole "
+            f"Up to {100.0 * failed.max():.3g} % of the samples have no finite value; the whole "
             f"group around each is left out, and at least {least} of {n} groups remain."
         )
     if np.any(found.groups < LEAST_GROUPS):

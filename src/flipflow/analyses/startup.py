@@ -163,7 +163,8 @@ def default_drive(machine: Machine, speed: float | None, method: RungeKutta | No
         raise InputError("speed", None, "give the working speed, or a drive")
     power = POWER_FACTOR * steady_power(machine, speed, method)
     drive = assumed_drive(machine.eccentric_moment, speed, power)
-    word = f"rated power {power / 1e3:.3g} kW, four times what the dampers take at working speed"
+    rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
+    word = f"rated power {rated}, four times what the dampers take at working speed"
     return replace(drive, assumed=(word, *drive.assumed))
 
 

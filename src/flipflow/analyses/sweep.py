@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow import __version__
 from flipflow.analyses.arguments import checked_count, checked_speeds, initial_state
 from flipflow.analyses.monitor import Monitor
+from flipflow.errors import Cancelled
 from flipflow.methods.settle import MOST_TURNS, Settled, Settling
 from flipflow.model.system import Machine, system_of
 from flipflow.results.orbit import Orbit
@@ -49,7 +50,9 @@ def sweep(
     most_turns
         Most forcing periods waited at a step; what has not settled then is marked so.
     monitor
-        Called with a sentence and the share done; raise from it to cancel.
+        Called with a sentence and the share done. When it raises
+        :class:`~flipflow.errors.Cancelled`, the frequencies that are finished are kept and
+        returned, and ``complete`` is False.
 
     Returns
     -------
@@ -76,10 +79,14 @@ def sweep(
         rows.append(_kept(row))
         z = row.state
         if monitor is not None:
-            monitor(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
+            try:
+                monitor(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
+            except Cancelled:
+                break
+    done = len(rows)
     return Sweep(
-        machine, speeds, tuple(rows), tuple(jumps), max_periods, most_turns, settling.solver,
-        __version__,
+        machine, speeds[:done], tuple(rows), tuple(jumps), max_periods, most_turns,
+        settling.solver, __version__, complete=done == speeds.size,
     )  # fmt: skip
 
 

@@ -3,55 +3,62 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
 
-from flipflow.cli.options import File, Force, Json, Output, Speeds, speeds_of
+if TYPE_CHECKING:
+    from flipflow.analyses.assessment import Assessment
+    from flipflow.cli.destination import Destination
 
 
 def analyze(
     file: File,
-    output: Output = None,
+    output: Folder = None,
     json: Json = None,
     speeds: Speeds = None,
     harmonics: Annotated[
         int | None,
-        typer.Option("--harmonics", metavar="H", help="Harmonic balance instead of exact motion."),
+        whole("--harmonics", "H", 1, 200, "Harmonic balance instead of exact motion."),
     ] = None,
     force: Force = False,
 ) -> None:
     """Analyze a machine: verdict, allowed speed range, report."""
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
     project = load_project(file, force=force)
-    folder = output or Path(f"{project.name}-flipflow")
-    from flipflow.io.files import prepare_folder  # noqa: PLC0415
-
+    if project.speed is not None:
+        speed_of(project, None)
     options = _options(speeds, harmonics)
-    prepare_folder(folder)
-    from flipflow.analyses.assessment import assess  # noqa: PLC0415
-    from flipflow.cli.progress import with_progress  # noqa: PLC0415
+    with Destination(output or Path(f"{project.name}-flipflow"), json) as target:
+        from flipflow.report.html import require_templates  # noqa: PLC0415
 
-    assessment = with_progress(lambda monitor: assess(project, monitor, **options))
+        require_templates()
+        from flipflow.analyses.assessment import assess  # noqa: PLC0415
+        from flipflow.cli.progress import with_progress  # noqa: PLC0415
 
+        assessment = with_progress(lambda monitor: assess(project, monitor, **options))
+        _write(assessment, target)
+
+
+def _write(assessment: Assessment, target: Destination) -> None:
+    """The report, the numbers behind it, the summary in the terminal."""
+    from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
     from flipflow.io.assessment import assessment_document  # noqa: PLC0415
     from flipflow.io.response import write_response  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
 
     document = assessment_document(assessment)
-    write_html(assessment, folder / "report.html")
-    write_json(document, str(folder / "results.json"))
-    written = write_response(assessment, folder)
-    if json is not None:
-        write_json(document, json)
-    if json != "-":
-        out = console()
-        summary(assessment, out)
-        names = ", ".join(["report.html", "results.json", *written])
-        out.print(f"Written to {folder}: {names}", soft_wrap=True)
+    write_html(assessment, target.path("report.html"))
+    target.wrote("report.html")
+    target.data("results.json", document)
+    target.wrote(*write_response(assessment, target.path("")))
+    target.document(document)
+    if target.spoken:
+        summary(assessment, console())
+    target.tell()
 
 
 def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, Any]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from flipflow.cli.options import File, Force, Json, Output, Speed, speed_of
+from flipflow.cli.options import RPM, File, Folder, Force, Json, Speed, speed_of, whole
+from flipflow.cli.output import console
 from flipflow.cli.progress import progress, stoppable
 
 if TYPE_CHECKING:
@@ -18,52 +17,46 @@ if TYPE_CHECKING:
     from flipflow.results.basins import Basins
 
 CELLS = 80
-MOST_CELLS_ASIDE = 1000
 WINDOW = 2.0
 
 
 def basins(
     file: File,
     speed: Speed = None,
-    cells: Annotated[
-        int, typer.Option("--cells", metavar="N", help="N x N starting states.")
-    ] = CELLS,
-    output: Output = None,
+    cells: Annotated[int, whole("--cells", "N", 2, 1000, "N x N starting states.")] = CELLS,
+    output: Folder = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Show on which motion a machine settles, and what throws it off."""
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
-    from flipflow.errors import Cancelled, InputError  # noqa: PLC0415
-    from flipflow.io.files import prepare_folder  # noqa: PLC0415
+    """Show on which motion a machine settles, and what throws it."""
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
-    if not 2 <= cells <= MOST_CELLS_ASIDE:
-        raise InputError("--cells", cells, f"give a whole number from 2 to {MOST_CELLS_ASIDE}")
-    folder = output or Path(f"{project.name}-flipflow")
-    prepare_folder(folder)
-    found, risk = _computed(project.screen, omega, cells)
+    with Destination(output or Path(f"{project.name}-flipflow"), json) as target:
+        found, risk, reason = _computed(project.screen, omega, cells)
 
-    from flipflow.figures.dispatch import figure  # noqa: PLC0415  keeps --help quick
+        from flipflow.figures.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
-    document = _document(found, risk)
-    figure(found).write(folder / "basins.html")
-    write_json(document, str(folder / "basins.json"))
-    if json is not None:
-        write_json(document, json)
-    if json != "-":
-        _show(found, risk, console())
-        console().print(f"Written to {folder}: basins.html, basins.json", soft_wrap=True)
-    if not found.complete:
-        raise Cancelled("Stopped by the user; the cells that were finished are written.")
+        document = _document(found, risk)
+        target.picture("basins.html", figure(found))
+        target.data("basins.json", document)
+        target.document(document)
+        if target.spoken:
+            _show(found, risk, reason, console())
+        target.tell()
+        if not found.complete:
+            raise target.stopped(kept=True)
 
 
-def _computed(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Basins, JumpRisk | None]:
-    """Basins, then the jump risk unless the user stopped the run."""
+def _computed(
+    screen: FlipFlowScreen, omega: float, cells: int
+) -> tuple[Basins, JumpRisk | None, str]:
+    """Basins, then the jump risk, or why there is none: basins that are found are not lost."""
     from flipflow.analyses.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
     from flipflow.analyses.jump_risk import jump_risk  # noqa: PLC0415
+    from flipflow.errors import IncompleteError  # noqa: PLC0415
     from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
 
     with progress("starting") as monitor:
@@ -71,17 +64,31 @@ def _computed(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Basins,
         x, v = _window(screen, omega, cells)
         with stoppable(monitor, "cells") as told:
             found = basins_of(screen, omega, {"relative": x}, {"relative": v}, monitor=told)
-        risk = jump_risk(screen, omega, monitor=monitor) if found.complete else None
-    return found, risk
+        if not found.complete:
+            return found, None, ""
+        try:
+            return found, jump_risk(screen, omega, monitor=monitor), ""
+        except IncompleteError as error:
+            return found, None, str(error)
 
 
 def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]:
     """Relative states up to twice the largest motion's displacement and velocity."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.analyses.periodic_orbits import periodic_orbits  # noqa: PLC0415
+    from flipflow.analyses.periodic_orbits import (  # noqa: PLC0415
+        MOST_PERIODS,
+        periodic_orbits,
+    )
+    from flipflow.errors import IncompleteError  # noqa: PLC0415
 
-    orbits = periodic_orbits(screen, omega)
+    orbits = periodic_orbits(screen, omega) or periodic_orbits(screen, omega, MOST_PERIODS)
+    if not orbits:
+        raise IncompleteError(
+            f"No motion that repeats itself was found at {omega * RPM:.4g} rpm, so there is none "
+            "to settle on: try another --speed, or see with flipflow simulate what the machine "
+            "does."
+        )
     reach = max(float(np.abs(orbit.displacement("relative")).max()) for orbit in orbits)
     speed = max(float(np.abs(orbit.velocity("relative")).max()) for orbit in orbits)
     share = np.linspace(-WINDOW, WINDOW, cells)
@@ -95,24 +102,26 @@ def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
     return document_of(found) | {"jump_risk": None if risk is None else risk_summary(risk)}
 
 
-def _show(found: Basins, risk: JumpRisk | None, out: Console) -> None:
+def _show(found: Basins, risk: JumpRisk | None, reason: str, out: Console) -> None:
     from flipflow.report.jump_risk import millimetres, risk_words  # noqa: PLC0415  quick --help
     from flipflow.report.numbers import speed  # noqa: PLC0415
+    from flipflow.report.terminal import say  # noqa: PLC0415
 
     count = len(found.orbits)
     motions = f"{count} motion{'' if count == 1 else 's'}" if count else "no motion"
-    out.print(f"{speed(found.omega)}: {motions} the machine can settle on", style="bold")
+    say(out, f"{speed(found.omega)}: {motions} the machine can settle on", "bold")
     out.print()
     for orbit, share, (low, high) in zip(
         found.orbits, found.shares, found.share_intervals, strict=True
     ):
-        out.print(
+        say(
+            out,
             f"{millimetres(orbit):>8} relative amplitude: {100 * share:5.1f} % of the starting "
-            f"states ({100 * low:.1f} to {100 * high:.1f} %)"
+            f"states ({100 * low:.1f} to {100 * high:.1f} %)",
         )
-    for note in found.notes:
-        out.print(f"Note: {note}", style="yellow")
+    for note in (*found.notes, *([f"No jump risk: {reason}"] if reason else [])):
+        say(out, f"Note: {note}", "yellow")
     if risk is not None:
         out.print()
         for line in risk_words(risk):
-            out.print(line)
+            say(out, line)

@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from flipflow.cli.options import File, Force, Json
-from flipflow.cli.output import print_list, printable
+from flipflow.cli.output import console, print_list, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,15 +18,17 @@ if TYPE_CHECKING:
 
 def check(file: File, json: Json = None, force: Force = False) -> None:
     """Check a machine file: what it says, assumes and leaves open."""
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.check import check_project  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    result = check_project(load_project(file, force=force))
-    if json is not None:
-        write_json(result.document(), json)
-    if json != "-":
-        _show(result, console())
+    project = load_project(file, force=force)
+    with Destination(None, json) as target:
+        result = check_project(project)
+        target.document(result.document())
+        if target.spoken:
+            _show(result, console())
+        target.tell()
 
 
 def _show(result: Check, out: Console) -> None:

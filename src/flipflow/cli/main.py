@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
+import textwrap
+from collections.abc import Callable
+from functools import wraps
 from typing import Annotated
 
 import typer
@@ -11,6 +15,7 @@ from flipflow import __version__
 from flipflow.cli.analyze import analyze
 from flipflow.cli.basins import basins
 from flipflow.cli.check import check
+from flipflow.cli.destination import NOTHING, STOPPED
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
 from flipflow.cli.reproduce import reproduce
@@ -19,7 +24,7 @@ from flipflow.cli.sensitivity import sensitivity
 from flipflow.cli.simulate import simulate
 from flipflow.cli.startup import startup
 from flipflow.cli.sweep import sweep
-from flipflow.errors import FlipflowError
+from flipflow.errors import Cancelled, FlipflowError, StoreError
 
 app = typer.Typer(
     name="flipflow",
@@ -43,8 +48,23 @@ COMMANDS = (
     sensitivity,
     reproduce,
 )
-for command in COMMANDS:
-    app.command()(command)
+
+
+def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
+    """A command that Ctrl-C ends with a sentence, wherever it is."""
+
+    @wraps(command)
+    def run(*given: object, **options: object) -> None:
+        try:
+            command(*given, **options)
+        except KeyboardInterrupt:
+            raise Cancelled(f"{STOPPED}; {NOTHING}.") from None
+
+    return run
+
+
+for one in COMMANDS:
+    app.command()(_stoppable(one))
 
 
 def _show_version(wanted: bool) -> None:
@@ -68,15 +88,29 @@ def main() -> None:
     try:
         app()
     except FlipflowError as error:
-        typer.echo(f"Error: {_one_line(str(error))}", err=True)
+        head = "" if isinstance(error, Cancelled) else "Error: "
+        typer.echo(_for_terminal(f"{head}{_sentence(str(error))}"), err=True)
         sys.exit(error.exit_code)
+    except OSError as error:
+        # What is written to files has its own sentence; this is the terminal, or a pipe from it.
+        typer.echo(f"Error: what was found cannot be shown ({error.strerror}).", err=True)
+        sys.exit(StoreError.exit_code)
     except KeyboardInterrupt:
         sys.exit(130)
 
 
-def _one_line(text: str) -> str:
-    """Escape what is not printable: keys of a file may hold line breaks and control characters."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+def _sentence(text: str) -> str:
+    """One line with a full stop; keys of a file may hold line breaks and control characters."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return line if line.endswith((".", "?", ")")) else f"{line}."
+
+
+def _for_terminal(sentence: str) -> str:
+    """Break a sentence between words where a terminal would break it anywhere; not in a file."""
+    if not sys.stderr.isatty():
+        return sentence
+    width = shutil.get_terminal_size().columns
+    return textwrap.fill(sentence, width, break_long_words=False, break_on_hyphens=False)
 
 
 if __name__ == "__main__":

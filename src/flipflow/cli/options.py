@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     from flipflow.model.project import Project
 
 RPM = constants.RPM
+# Slower, a turn takes minutes of calculation; faster, no screen runs.
+SLOWEST, FASTEST = 1.0, 100_000.0
 
 FILE_HELP = (
     "Machine file, or a bundled name: ffs0827 (with stops), ffs0827-linear (without), rig-lin2024 "
@@ -29,14 +33,58 @@ Speeds = Annotated[
     typer.Option("--speeds", metavar="LOW HIGH", help='From and to: "300 rpm" "40 Hz".'),
 ]
 Output = Annotated[
-    Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and data.")
+    Path | None,
+    typer.Option("--output", "-o", metavar="DIR", help="Write figures into this folder."),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o", metavar="DIR", help="Folder for figures and data; else NAME-flipflow."
+    ),
 ]
 Json = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write it as JSON, - for the terminal.")
+    str | None,
+    typer.Option("--json", metavar="FILE", help="Write what is found as JSON; - prints it."),
 ]
 Force = Annotated[
     bool, typer.Option("--force", help="Let values through that look like a slip of units.")
 ]
+
+
+def whole(option: str, metavar: str, least: int, most: int, sentence: str) -> Any:
+    """An option that takes a whole number; another value is refused in one sentence."""
+    return typer.Option(
+        option, metavar=metavar, parser=str, callback=_read_whole(least, most), help=sentence
+    )
+
+
+def _read_whole(least: int, most: int) -> Callable[[typer.CallbackParam, Any], Any]:
+    def read(param: typer.CallbackParam, written: Any) -> Any:
+        if written is None:
+            return None
+        try:
+            number = int(written)
+        except ValueError:
+            number = least - 1
+        if not least <= number <= most:
+            from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+            remedy = f"give a whole number from {least} to {most}"
+            raise InputError(param.opts[0], written, remedy)
+        return number
+
+    return read
+
+
+@contextmanager
+def as_written(option: str, written: str) -> Iterator[None]:
+    """Let errors of what is made from an option name the option and what was written."""
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    try:
+        yield
+    except InputError as error:
+        raise InputError(option, written, error.remedy) from None
 
 
 def speed_of(project: Project, written: str | None) -> float:
@@ -46,20 +94,32 @@ def speed_of(project: Project, written: str | None) -> float:
     from flipflow.io.values import read_number  # noqa: PLC0415
 
     if written is not None:
-        return read_number(written, SPEED, label="--speed")
+        omega = read_number(written, SPEED, label="--speed")
+        _check_speed("--speed", written, omega)
+        return omega
     if project.speed is None:
         raise InputError("operation.speed", "(left out)", "give it, or --speed '850 rpm'")
+    _check_speed("operation.speed", f"{project.speed * RPM:.6g} rpm", project.speed)
     return project.speed
 
 
 def speeds_of(written: tuple[str, str]) -> tuple[float, float]:
     """Speeds (low, high) in rad/s as asked for."""
     from flipflow.analyses.frequency_response import check_interval  # noqa: PLC0415  quick --help
-    from flipflow.errors import InputError  # noqa: PLC0415
     from flipflow.io.units import parse_quantity  # noqa: PLC0415
 
     low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in written)
-    try:
-        return check_interval((low, high))
-    except InputError as error:
-        raise InputError("--speeds", " to ".join(written), error.remedy) from None
+    both = " to ".join(written)
+    with as_written("--speeds", both):
+        check_interval((low, high))
+    for omega in (low, high):
+        _check_speed("--speeds", both, omega)
+    return low, high
+
+
+def _check_speed(option: str, written: str, omega: float) -> None:
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    if not SLOWEST <= round(omega * RPM, 6) <= FASTEST:
+        remedy = f"give a speed from {SLOWEST:.0f} rpm to {FASTEST:.0f} rpm"
+        raise InputError(option, written, remedy)

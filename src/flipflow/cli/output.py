@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
 import sys
 from collections.abc import Iterable, Mapping
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 COLUMNS = 80
+TERMINAL = "-"
+JSON = "--json"
 
 
 def console() -> Console:
@@ -42,6 +45,29 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
+def check_json(target: str) -> None:
+    """See that a document can be written to ``target``, before there is one.
+
+    Raises
+    ------
+    InputError
+        For a folder, a file in a folder that is not there, and what is not the user's to write.
+    """
+    path = Path(target)
+    if target == TERMINAL:
+        return
+    if not target or "\0" in target:
+        raise InputError(JSON, target, "name a file, or - for the terminal")
+    if path.is_dir():
+        raise InputError(JSON, target, "this is a folder, name a file in it")
+    if not path.parent.is_dir():
+        raise InputError(
+            JSON, target, f"there is no folder {str(path.parent)!r}, make it or name another"
+        )
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(JSON, target, "it may not be written, name a file in a folder you own")
+
+
 def write_json(document: Mapping[str, object], target: str) -> None:
     """Write a document to a file, or to stdout for ``-``; what is not finite becomes null.
 
@@ -51,7 +77,7 @@ def write_json(document: Mapping[str, object], target: str) -> None:
         When the file cannot be written.
     """
     text = json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    if target == "-":
+    if target == TERMINAL:
         sys.stdout.write(text)
         return
     try:
@@ -59,7 +85,7 @@ def write_json(document: Mapping[str, object], target: str) -> None:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(
-            "--json", target, f"it cannot be written ({reason}), name a file in a folder you own"
+            JSON, target, f"it cannot be written ({reason}), name a file in a folder you own"
         ) from None
 
 

@@ -46,7 +46,8 @@ def with_progress(run: Callable[[Monitor], Result]) -> Result:
 def stoppable(tell: Monitor, stage: str) -> Iterator[Monitor]:
     """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
 
-    In other stages, and at the second time, Ctrl-C ends the program at once.
+    The stage is known by the first words of what it tells. In other stages, and at the second
+    time, Ctrl-C ends the program at once.
     """
     at = {"stage": "", "stop": ""}
 
@@ -57,7 +58,7 @@ def stoppable(tell: Monitor, stage: str) -> Iterator[Monitor]:
         tell(sentence, share)
 
     def interrupted(_number: int, _frame: FrameType | None) -> None:
-        if at["stage"] != stage or at["stop"]:
+        if not at["stage"].startswith(stage) or at["stop"]:
             raise KeyboardInterrupt
         at["stop"] = "asked"
 

@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flipflow.cli.options import Json, Output
+from flipflow.cli.output import console
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
 
     from flipflow.analyses.monitor import Monitor
-    from flipflow.paper.reproduce import Reproduction
+    from flipflow.model.screen import FlipFlowScreen
+    from flipflow.paper.reproduce import ReproducedFigure, Reproduction
 
 FOLDER = Path("reproduction")
 
@@ -21,7 +25,7 @@ FOLDER = Path("reproduction")
 def reproduce(
     figures: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[FIGURE]...", help="figure-08, or 8; all where none is named."),
+        typer.Argument(metavar="FIGURE", help="figure-08, or 8; all where none is named."),
     ] = None,
     output: Output = None,
     json: Json = None,
@@ -29,34 +33,56 @@ def reproduce(
         str, typer.Option("--machine", metavar="FILE", help="Another machine file.")
     ] = "ffs0827",
 ) -> None:
-    """Reproduce the paper: its figures, and every claim decided by computing it."""
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.files import prepare_folder  # noqa: PLC0415
+    """Reproduce the paper: its figures, a verdict on each claim."""
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load  # noqa: PLC0415
     from flipflow.paper.registry import chosen  # noqa: PLC0415
 
     names = tuple(figures or ())
-    chosen(names)
+    wanted = chosen(names)
     screen = load(machine)
     folder = output or FOLDER
-    prepare_folder(folder)
+    with Destination(folder, json) as target:
+        from flipflow.cli.progress import with_progress  # noqa: PLC0415
+        from flipflow.paper.page import write_reproduction  # noqa: PLC0415
+        from flipflow.report.html import require_templates  # noqa: PLC0415
 
-    from flipflow.cli.progress import with_progress  # noqa: PLC0415
-    from flipflow.paper.page import write_reproduction  # noqa: PLC0415
+        require_templates()
+
+        def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
+            found = _finished(screen, [one.name for one in wanted], monitor)
+            return found, write_reproduction(found, folder, monitor)
+
+        found, written = with_progress(run)
+        target.document(found.document())
+        if target.spoken:
+            _show(found, console())
+        count = (len(written) - 1) // 3
+        pictures = "1 figure" if count == 1 else f"{count} figures"
+        target.wrote(written[0], f"and {pictures} as HTML, SVG and PDF")
+        target.tell()
+        if len(found.figures) < len(wanted):
+            raise target.stopped(kept=True)
+
+
+def _finished(screen: FlipFlowScreen, names: Sequence[str], monitor: Monitor) -> Reproduction:
+    """One figure after the other; Ctrl-C ends it and keeps those that are finished."""
+    from flipflow.paper.reproduce import Reproduction  # noqa: PLC0415  quick --help
     from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
 
-    def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
-        found = reproduced(screen, names, monitor)
-        return found, write_reproduction(found, folder, monitor)
+    made: list[ReproducedFigure] = []
+    for k, name in enumerate(names):
+        monitor(name, k / len(names))
+        try:
+            made += reproduced(screen, (name,)).figures
+        except KeyboardInterrupt:
+            if not made:
+                raise
+            break
+    return Reproduction(screen, tuple(made))
 
-    found, written = with_progress(run)
-    if json is not None:
-        write_json(found.document(), json)
-    if json != "-":
-        _show(found, console(), folder, written)
 
-
-def _show(found: Reproduction, out: Console, folder: Path, written: tuple[str, ...]) -> None:
+def _show(found: Reproduction, out: Console) -> None:
     from rich.table import Table  # noqa: PLC0415  slow to import
     from rich.text import Text  # noqa: PLC0415
 
@@ -76,8 +102,3 @@ def _show(found: Reproduction, out: Console, folder: Path, written: tuple[str, .
     for figure in found.figures:
         if figure.failure:
             out.print(f"{figure.name} is not drawn. {figure.failure}", style="yellow")
-    pictures = (len(written) - 1) // 3
-    out.print(
-        f"Written to {folder}: {written[0]}, and {pictures} figures as HTML, SVG and PDF",
-        soft_wrap=True,
-    )

@@ -13,7 +13,9 @@ def schema(
     ] = "-",
 ) -> None:
     """Print the JSON schema of the machine file, for editors."""
-    from flipflow.cli.output import write_json  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.schema import machine_schema  # noqa: PLC0415
 
-    write_json(machine_schema(), json)
+    with Destination(None, json) as target:
+        target.document(machine_schema())
+        target.tell()

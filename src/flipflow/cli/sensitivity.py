@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flipflow.cli.options import File, Force, Json, Output, Speed, Speeds, speed_of, speeds_of
+from flipflow.cli.options import (
+    File,
+    Force,
+    Json,
+    Output,
+    Speed,
+    Speeds,
+    speed_of,
+    speeds_of,
+    whole,
+)
+from flipflow.cli.output import console
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
+    from flipflow.cli.destination import Destination
     from flipflow.model.project import Project
     from flipflow.results.sensitivity import Sensitivity
 
@@ -24,8 +35,8 @@ def sensitivity(
         typer.Option(
             "--vary",
             metavar="FIELD=RANGE",
-            help='What varies, once a field: "clearance=5.4 mm..6.6 mm", "floating_mass=+-5 %", '
-            '"shear_stiffness=2700 kN/m +/- 90 kN/m".',
+            help="What varies, once for each field: 'clearance=5.4 mm..6.6 mm', "
+            "'floating_mass=+-5 %', 'shear_stiffness=2700 kN/m +/- 90 kN/m'.",
         ),
     ] = None,
     quantity: Annotated[
@@ -33,18 +44,26 @@ def sensitivity(
     ] = "relative_amplitude",
     speed: Speed = None,
     speeds: Speeds = None,
-    n: Annotated[int, typer.Option("--n", help="Groups of samples, best a power of two.")] = 1024,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the sample.")] = 0,
+    n: Annotated[
+        int, whole("--n", "N", 2, 2**20, "Groups of samples, best a power of two.")
+    ] = 1024,
+    seed: Annotated[int, whole("--seed", "N", 0, 2**63 - 1, "Seed of the sample.")] = 0,
     branch: Annotated[
         str,
-        typer.Option("--branch", help="Motion that is meant: from-below, upper or lower."),
+        typer.Option(
+            "--branch", metavar="WORD", help="Motion that is meant: from-below, upper or lower."
+        ),
     ] = "from-below",
     output: Output = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Rank the fields of a machine by what they do to a quantity (Sobol indices)."""
-    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
+    """Rank a machine's fields by what they do to a quantity.
+
+    By Sobol indices: the share of the variance that each field explains.
+    """
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.io.vary import read_vary  # noqa: PLC0415
 
     project = load_project(file, force=force)
@@ -52,13 +71,9 @@ def sensitivity(
         typer.echo(f"Warning: {warning}", err=True)
     ranges = read_vary(vary or [], project.screen)
     omega = _omega(project, quantity, speed, speeds)
-    if output is not None:
-        from flipflow.io.files import prepare_folder  # noqa: PLC0415
-
-        prepare_folder(output)
     options = {"n": n, "rng": seed, "branch": branch}
-    result = _analysed((project.screen, ranges, quantity, omega), options)
-    _show(result, output, json)
+    with Destination(output, json) as target:
+        _write(_analysed((project.screen, ranges, quantity, omega), options), target)
 
 
 def _omega(
@@ -91,32 +106,26 @@ def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity
         return analysis(*question, monitor=tell, **options)
 
 
-def _show(result: Sensitivity, output: Path | None, json: str | None) -> None:
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
-
-    written = _written(result, output) if output is not None else ""
-    if json is not None:
+def _write(result: Sensitivity, target: Destination) -> None:
+    if target.folder is not None:
+        _write_folder(result, target)
+    if target.json is not None:
         from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-        write_json(document_of(result), json)
-    if json != "-":
+        target.document(document_of(result))
+    if target.spoken:
         from flipflow.report import summary  # noqa: PLC0415
 
-        out = console()
-        summary(result, out)
-        if written:
-            out.print(written, soft_wrap=True)
+        summary(result, console())
+    target.tell()
 
 
-def _written(result: Sensitivity, folder: Path) -> str:
-    """Write results and figures; the sentence that says where."""
+def _write_folder(result: Sensitivity, target: Destination) -> None:
     from flipflow.figures.sensitivity import sensitivity_figure, tornado_figure  # noqa: PLC0415
     from flipflow.io.results import save  # noqa: PLC0415
 
-    save(result, folder / "results.json")
-    names = ["results.json", "sensitivity.html"]
-    sensitivity_figure(result).write(folder / "sensitivity.html")
+    save(result, target.path("results.json"))
+    target.wrote("results.json")
+    target.picture("sensitivity.html", sensitivity_figure(result))
     if not result.over_frequency:
-        tornado_figure(result).write(folder / "tornado.html")
-        names.append("tornado.html")
-    return f"Written to {folder}: {', '.join(names)}"
+        target.picture("tornado.html", tornado_figure(result))

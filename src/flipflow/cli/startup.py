@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
-from flipflow.cli.output import console, print_list, printable, write_json
+from flipflow.cli.output import console, print_list, printable
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from flipflow.analyses.monitor import Monitor
+    from flipflow.cli.destination import Destination
     from flipflow.model.drive import Drive, SpeedProfile
     from flipflow.model.project import Project
     from flipflow.results.run_up import RunUp
 
+POWER = ("motor", "friction", "dampers")
+LONGEST = 3600.0  # s
 WORDS = {
     "main_amplitude": ("main frame, amplitude", 1e3, "mm"),
     "relative_amplitude": ("relative, amplitude", 1e3, "mm"),
@@ -45,31 +47,61 @@ def startup(
             "--profile", metavar="POINTS", help="Speed over time: '0 s: 0 rpm, 20 s: 850 rpm'."
         ),
     ] = None,
+    duration: Annotated[
+        str | None,
+        typer.Option("--duration", metavar="TIME", help="Longest time, for each run: '120 s'."),
+    ] = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Start a machine and let it coast down: reached, or captured; the peaks on the way."""
-    from flipflow.io.files import prepare_folder  # noqa: PLC0415
-    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
+    """Start a machine, let it coast down: reached or captured.
+
+    Shows the greatest amplitudes and forces on the way, and the speeds at which they occur.
+    """
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.project import load_project  # noqa: PLC0415
 
     project = load_project(file, force=force)
-    if speed is not None or profile is None:
+    if profile is not None:
+        given = {"--speed": speed, "--motor-power": motor_power, "--inertia": inertia}
+        _refuse_beside_profile(given | {"--duration": duration})
+    else:
         project = replace(project, speed=speed_of(project, speed))
     drive = _drive(project, motor_power, inertia, profile)
-    if output is not None:
-        prepare_folder(output)
-    start, coast = _calculated(project, drive)
-    runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
-    if json is not None:
-        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+    seconds = None if duration is None else _seconds(duration)
+    with Destination(output, json) as target:
+        start, coast = _calculated(project, drive, seconds)
+        runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
+        if output is not None:
+            _figures(runs, target)
+        if json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-        parts = {name: document_of(run) for name, run in runs.items()}
-        write_json({"schema": "flipflow/startup/1", "name": project.name, **parts}, json)
-    if output is not None:
-        _figures(runs, output)
-    if json != "-":
-        _show(project, start, coast, console())
+            parts = {name: document_of(run) for name, run in runs.items()}
+            target.document({"schema": "flipflow/startup/1", "name": project.name, **parts})
+        if target.spoken:
+            _show(project, start, coast, console())
+        target.tell()
+
+
+def _refuse_beside_profile(given: dict[str, str | None]) -> None:
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    for option, written in given.items():
+        if written is not None:
+            remedy = "--profile lays the speed down, leave one of them out"
+            raise InputError(option, written, remedy)
+
+
+def _seconds(written: str) -> float:
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.units import parse_quantity  # noqa: PLC0415
+
+    seconds = parse_quantity(written, "s", field="--duration", example="120 s")
+    if not 0.0 < seconds <= LONGEST:
+        raise InputError("--duration", written, f"give a time above 0 s and up to {LONGEST:.0f} s")
+    return seconds
 
 
 def _drive(
@@ -82,7 +114,10 @@ def _drive(
     from flipflow.model.drive import DRIVE_FIELDS, assumed_drive  # noqa: PLC0415
 
     if profile is not None:
-        return parse_profile(profile, "--profile")
+        laid_down = parse_profile(profile, "--profile")
+        if laid_down.duration > LONGEST:
+            raise InputError("--profile", profile, f"let it last at most {LONGEST:.0f} s")
+        return laid_down
     fields = {field.name: field for field in DRIVE_FIELDS}
     given = {
         name: read_number(text, fields[name], label=option)
@@ -106,7 +141,9 @@ def _drive(
     return replace(drive, inertia=given.get("inertia", drive.inertia))
 
 
-def _calculated(project: Project, drive: Drive | SpeedProfile | None) -> tuple[RunUp, RunUp | None]:
+def _calculated(
+    project: Project, drive: Drive | SpeedProfile | None, seconds: float | None
+) -> tuple[RunUp, RunUp | None]:
     """Start, and coast down where working speed is reached, with progress on stderr."""
     from flipflow.analyses.startup import coast_down, start_up  # noqa: PLC0415  keeps --help quick
     from flipflow.model.drive import Drive  # noqa: PLC0415
@@ -116,30 +153,37 @@ def _calculated(project: Project, drive: Drive | SpeedProfile | None) -> tuple[R
         def during(stage: str) -> Monitor:
             return lambda sentence, share: tell(f"{stage}, {sentence}", share)
 
-        start = start_up(project.screen, drive, speed=project.speed, monitor=during("start"))
+        start = start_up(
+            project.screen, drive, speed=project.speed, duration=seconds, monitor=during("start")
+        )
         if start.outcome != "reached" or not isinstance(start.drive, Drive):
             return start, None
         begin = start.final_speed
-        return start, coast_down(project.screen, begin, start.drive, monitor=during("coast-down"))
+        return start, coast_down(
+            project.screen, begin, start.drive, duration=seconds, monitor=during("coast-down")
+        )
 
 
-def _figures(runs: dict[str, RunUp], folder: Path) -> None:
+def _figures(runs: dict[str, RunUp], target: Destination) -> None:
     from flipflow.figures.transient import run_up_figure  # noqa: PLC0415  keeps --help quick
 
     for name, run in runs.items():
-        run_up_figure(run).write(folder / f"{name}.html")
+        target.picture(f"{name}.html", run_up_figure(run))
 
 
 def _show(project: Project, start: RunUp, coast: RunUp | None, out: Console) -> None:
-    name = printable(project.document.name)
-    out.print(f"{name}: {start.verdict}.", style="bold")
+    from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
+
+    name = printable(project.document.name or project.name)
+    say(out, f"{name}: {start.verdict}.", "bold")
     _run(start, "On the way up", out)
     if start.power:
-        parts = {"motor": "motor", "friction": "friction", "dampers": "dampers"}
-        shares = ", ".join(f"{word} {start.power[key] / 1e3:.3g} kW" for key, word in parts.items())
-        out.print(f"Mean power at the end: {shares}")
+        scale, unit = (1e-3, "kW") if max(start.power.values()) >= 100.0 else (1.0, "W")
+        shares = (f"{part} {start.power[part] * scale:.3g} {unit}" for part in POWER)
+        say(out, f"Mean power at the end: {', '.join(shares)}")
     if coast is not None:
-        out.print(f"\nSwitched off, it {coast.verdict}.", style="bold")
+        out.print()
+        say(out, f"Switched off, it {coast.verdict}.", "bold")
         _run(coast, "On the way down", out)
     notes = dict.fromkeys((*start.notes, *(coast.notes if coast is not None else ())))
     print_list(out, "Notes", notes)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flipflow.cli.options import RPM, File, Force, Json, Output, speeds_of
-from flipflow.cli.progress import progress
+from flipflow.cli.options import RPM, File, Force, Json, Output, speeds_of, whole
+from flipflow.cli.output import console, printable
+from flipflow.cli.progress import progress, stoppable
 
 if TYPE_CHECKING:
-    import numpy as np
     from rich.console import Console
 
     from flipflow.analyses.ramp import Ramp
@@ -18,7 +20,28 @@ if TYPE_CHECKING:
     from flipflow.model.project import Project
     from flipflow.results.sweep import Sweep
 
-MOST_STEPS = 20_000
+LONGEST_GLIDE = 600.0  # s
+
+
+@dataclass(frozen=True)
+class Passed:
+    """Speeds rising, then falling, and glides: all of it, or what Ctrl-C left."""
+
+    up: Sweep
+    down: Sweep | None
+    glides: tuple[Ramp, ...] = ()
+    complete: bool = False
+    no_glide: str = ""
+
+    @property
+    def sweeps(self) -> tuple[Sweep, ...]:
+        """Those that were begun."""
+        return (self.up,) if self.down is None else (self.up, self.down)
+
+    def whole(self, glide: Ramp) -> bool:
+        """Whether the speed of a glide came to where it should."""
+        last = self.up.omega[-1 if glide.rate > 0.0 else 0]
+        return math.isclose(glide.history.omega[-1], last, rel_tol=1e-6)
 
 
 def sweep(
@@ -27,118 +50,181 @@ def sweep(
         tuple[str, str],
         typer.Option("--speeds", metavar="LOW HIGH", help='From and to: "300 rpm" "40 Hz".'),
     ],
-    steps: Annotated[int, typer.Option("--steps", metavar="N", help="Speeds to settle at.")] = 100,
+    steps: Annotated[int, whole("--steps", "N", 2, 20_000, "Speeds to settle at.")] = 100,
     rate: Annotated[
-        float | None,
+        str | None,
         typer.Option("--rate", metavar="RPM/S", help="Glide at this rate, too: how late it jumps."),
     ] = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Raise the speed step by step, then lower it again: settled amplitudes and jumps."""
-    from flipflow.cli.output import console, write_json  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.files import prepare_folder  # noqa: PLC0415
+    """Raise the speed in steps, then lower it: amplitudes, jumps.
+
+    At each speed the machine settles from where the one before ended.
+    """
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
     project = load_project(file, force=force)
-    omega = _grid(speeds, steps)
-    if output is not None:
-        prepare_folder(output)
-    up, down = _swept(project, omega)
-    glides = () if rate is None else _glides(project, omega, rate)
-    if json is not None:
-        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-        both = {"up": document_of(up), "down": document_of(down)}
-        late = [vars(jump) for glide in glides for jump in glide.jumps]
-        document = {"schema": "flipflow/sweeps/1", "name": project.name, **both, "late": late}
-        write_json(document, json)
-    if output is not None:
-        _figure(project, up, down).write(output / "sweep.html")
-    if json != "-":
-        out = console()
-        _show(project, up, down, out)
-        for glide in glides:
-            _show_glide(glide, out)
+    ends = speeds_of(speeds)
+    gliding = None if rate is None else _rate(rate, ends)
+    with Destination(output, json) as target:
+        found = _passed(project, ends, steps, gliding)
+        if json is not None:
+            target.document(_document(project, found))
+        if output is not None:
+            target.picture("sweep.html", _figure(project, found.sweeps, ends))
+        if target.spoken:
+            _show(project, found, steps, console())
+        target.tell()
+        if not found.complete:
+            raise target.stopped(kept=True)
 
 
-def _grid(speeds: tuple[str, str], steps: int) -> np.ndarray:
+def _rate(written: str, ends: tuple[float, float]) -> float:
+    """Rate in rad/s^2, such that a glide takes no longer than can be carried."""
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    least = (ends[1] - ends[0]) * RPM / LONGEST_GLIDE
+    try:
+        rate = float(written)
+    except ValueError:
+        rate = math.nan
+    if not least <= rate < math.inf:
+        remedy = f"give a number of rpm per second, for these speeds at least {least:.2g}"
+        raise InputError("--rate", written, remedy)
+    return rate / RPM
+
+
+def _passed(project: Project, ends: tuple[float, float], steps: int, rate: float | None) -> Passed:
+    """Sweep up and down, then glide; Ctrl-C ends it and keeps what is finished."""
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    up, down = _swept(project, ends, steps)
+    if down is None or not down.complete:
+        return Passed(up, down)
+    try:
+        glides = () if rate is None else _glides(project, ends, rate)
+    except KeyboardInterrupt:
+        return Passed(up, down)
+    except InputError as error:
+        return Passed(up, down, complete=True, no_glide=error.remedy)
+    return Passed(up, down, glides, complete=True)
+
+
+def _swept(project: Project, ends: tuple[float, float], steps: int) -> tuple[Sweep, Sweep | None]:
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.errors import InputError  # noqa: PLC0415
+    from flipflow.analyses.sweep import sweep as settle  # noqa: PLC0415
 
-    if not 2 <= steps <= MOST_STEPS:
-        raise InputError("--steps", steps, f"give a whole number from 2 to {MOST_STEPS}")
-    return np.linspace(*speeds_of(speeds), steps)
-
-
-def _swept(project: Project, omega: np.ndarray) -> tuple[Sweep, Sweep]:
-    from flipflow.analyses.sweep import sweep as settle  # noqa: PLC0415  keeps --help quick
-
-    with progress("sweeping; the first run of a version compiles") as tell:
-        up = settle(project.screen, omega, monitor=lambda s, share: tell(s, 0.5 * share))
-        down = settle(
+    omega = np.linspace(*ends, steps)
+    with (
+        progress("sweeping; the first run of a version compiles") as tell,
+        stoppable(tell, "settled") as told,
+    ):
+        up = settle(project.screen, omega, monitor=lambda s, share: told(s, 0.5 * share))
+        if not up.complete:
+            return up, None
+        return up, settle(
             project.screen, omega[::-1], initial=up.rows[-1].state,
-            monitor=lambda s, share: tell(s, 0.5 + 0.5 * share),
+            monitor=lambda s, share: told(s, 0.5 + 0.5 * share),
         )  # fmt: skip
-    return up, down
 
 
-def _glides(project: Project, omega: np.ndarray, rate: float) -> tuple[Ramp, Ramp]:
+def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[Ramp, Ramp]:
     from flipflow.analyses.ramp import ramp  # noqa: PLC0415  keeps --help quick
 
-    ends = float(omega[0]), float(omega[-1])
     with progress("gliding; the first run of a version compiles") as tell:
-        up = ramp(project.screen, ends, rate / RPM, lambda s, share: tell(s, 0.5 * share))
-        down = ramp(
-            project.screen, ends[::-1], rate / RPM, lambda s, share: tell(s, 0.5 + 0.5 * share)
-        )
+        up = ramp(project.screen, ends, rate, lambda s, share: tell(s, 0.5 * share))
+        down = ramp(project.screen, ends[::-1], rate, lambda s, share: tell(s, 0.5 + 0.5 * share))
     return up, down
 
 
-def _show_glide(glide: Ramp, out: Console) -> None:
+def _document(project: Project, found: Passed) -> dict[str, Any]:
+    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+    return {
+        "schema": "flipflow/sweeps/1",
+        "name": project.name,
+        "up": document_of(found.up),
+        "down": None if found.down is None else document_of(found.down),
+        "late": [vars(jump) for glide in found.glides for jump in glide.jumps],
+        "glides": [
+            {"rate": glide.rate, "to": glide.history.omega[-1], "complete": found.whole(glide)}
+            for glide in found.glides
+        ],
+        "complete": found.complete,
+    }
+
+
+def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
+    from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
+
     word = "rising" if glide.rate > 0.0 else "falling"
     out.print(f"Speed {word} by {abs(glide.rate) * RPM:.4g} rpm/s:")
     for jump in glide.jumps:
-        out.print(
+        say(
+            out,
             f"  jumps at {jump.omega * RPM:.5g} rpm, {jump.late * RPM:.3g} rpm beyond the speed "
-            f"at which the motion ends ({jump.fold * RPM:.5g} rpm)"
+            f"at which the motion ends ({jump.fold * RPM:.5g} rpm)",
         )
     if not glide.jumps:
         out.print("  no jump")
+    if not whole:
+        say(
+            out,
+            f"  ended at {glide.history.omega[-1] * RPM:.4g} rpm, for want of steps: give a "
+            "greater --rate, or --speeds closer together",
+        )
 
 
-def _figure(project: Project, up: Sweep, down: Sweep) -> Figure:
+def _figure(project: Project, swept: tuple[Sweep, ...], ends: tuple[float, float]) -> Figure:
     from flipflow.analyses.frequency_response import frequency_response  # noqa: PLC0415
     from flipflow.figures.sweep import sweep_figure  # noqa: PLC0415
 
-    ends = float(up.omega[0]), float(up.omega[-1])
-    return sweep_figure((up, down), frequency_response(project.screen, ends))
+    return sweep_figure(swept, frequency_response(project.screen, ends))
 
 
-def _show(project: Project, up: Sweep, down: Sweep, out: Console) -> None:
-    low, high = up.omega[0] * RPM, up.omega[-1] * RPM
-    name = project.document.name or project.name
-    out.print(f"{name}: {up.omega.size} speeds from {low:.4g} to {high:.4g} rpm", style="bold")
-    for word, swept in (("rising", up), ("falling", down)):
-        amplitude = swept.amplitude("relative") * 1e3
-        top = int(amplitude.argmax())
-        out.print(
-            f"Speed {word}: greatest relative amplitude {amplitude[top]:.4g} mm at "
-            f"{swept.omega[top] * RPM:.4g} rpm"
+def _show(project: Project, found: Passed, steps: int, out: Console) -> None:
+    from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
+
+    low, high = min(found.up.omega) * RPM, max(found.up.omega) * RPM
+    name = printable(project.document.name or project.name)
+    count = f"{found.up.omega.size}" + ("" if found.up.complete else f" of {steps}")
+    say(out, f"{name}: {count} speeds from {low:.4g} to {high:.4g} rpm", "bold")
+    for word, swept in zip(("rising", "falling"), found.sweeps, strict=False):
+        _show_sweep(word, swept, steps, out)
+    for glide in found.glides:
+        _show_glide(glide, out, whole=found.whole(glide))
+    if found.no_glide:
+        say(out, f"Note: no glide: {found.no_glide}.", "yellow")
+
+
+def _show_sweep(word: str, swept: Sweep, steps: int, out: Console) -> None:
+    from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
+
+    amplitude = swept.amplitude("relative") * 1e3
+    top = int(amplitude.argmax())
+    say(
+        out,
+        f"Speed {word}: greatest relative amplitude {amplitude[top]:.4g} mm at "
+        f"{swept.omega[top] * RPM:.4g} rpm",
+    )
+    for jump in swept.jumps:
+        before, after = amplitude[jump.index - 1], amplitude[jump.index]
+        say(
+            out,
+            f"  jumps between {jump.omega_before * RPM:.5g} and "
+            f"{jump.omega_after * RPM:.5g} rpm, from {before:.4g} to {after:.4g} mm",
         )
-        for jump in swept.jumps:
-            before, after = amplitude[jump.index - 1], amplitude[jump.index]
-            out.print(
-                f"  jumps between {jump.omega_before * RPM:.5g} and "
-                f"{jump.omega_after * RPM:.5g} rpm, from {before:.4g} to {after:.4g} mm"
-            )
-        if not swept.jumps:
-            out.print("  no jump")
-        lingering = int((~swept.settled).sum())
-        if lingering:
-            out.print(f"  {lingering} speeds without a periodic motion of up to 6 turns")
-        several = sorted({int(n) for n in swept.periods if n > 1})
-        if several:
-            out.print(f"  motions that repeat after {', '.join(map(str, several))} turns")
+    if not swept.jumps:
+        out.print("  no jump")
+    if not swept.complete:
+        out.print(f"  stopped after {swept.omega.size} of {steps} speeds")
+    lingering = int((~swept.settled).sum())
+    if lingering:
+        out.print(f"  {lingering} speeds without a periodic motion of up to 6 turns")
+    several = sorted({int(n) for n in swept.periods if n > 1})
+    if several:
+        out.print(f"  motions that repeat after {', '.join(map(str, several))} turns")

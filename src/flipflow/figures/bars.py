@@ -9,7 +9,7 @@ from flipflow.analyses.feasible import CaseWindow
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.palette import CASES, HATCHES, case_colour
-from flipflow.figures.parts import Axis, Band, Bar, Figure, Line, Panel
+from flipflow.figures.parts import Axis, Band, Bar, Figure, Line, Note, Panel
 from flipflow.figures.scales import RPM
 
 TAKERS = {
@@ -18,6 +18,7 @@ TAKERS = {
     "stop": "stops (c3)",
     "normal": "isolation, normal direction (c1n)",
 }
+LEAST_KILOWATTS = 100.0  # W
 LIMIT_WORDS = {"stability": "returns after a disturbance", "speed": "speed of the drive"}
 
 
@@ -41,10 +42,17 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
     heights = {name: float(len(rows) - 1 - k) for k, name in enumerate(rows)}
     ends = _span(region)
     bars = [
-        Bar(rows[0], heights[rows[0]], low * RPM, high * RPM, 0.6, "allowed",
-            text=f"{low * RPM:.4g} to {high * RPM:.4g} rpm")
+        Bar(rows[0], heights[rows[0]], low * RPM, high * RPM, 0.6, "allowed")
+        for low, high in region.feasible
+    ]
+    # Notes, for lines cross this row and would cross the words of bars.
+    words = [
+        Note(high * RPM + 0.01 * (ends[1] - ends[0]), heights[rows[0]],
+             f"{low * RPM:.4g} to {high * RPM:.4g} rpm")
         for low, high in region.feasible
     ]  # fmt: skip
+    if not words:
+        words = [Note((ends[0] + ends[1]) / 2.0, heights[rows[0]], "none", "center")]
     lower, upper = max(region.lower * RPM, ends[0]), min(region.upper * RPM, ends[1])
     if lower < upper:
         bars.append(Bar(rows[1], heights[rows[1]], lower, upper, 0.6, "mark"))
@@ -61,7 +69,7 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
     bands = tuple(Band("x", low * RPM, high * RPM) for low, high in region.feasible)
     panel = Panel(
         Axis("shaft speed", "rpm", ends), Axis("", "", (-0.6, len(rows) - 0.4), ticks),
-        bars=tuple(bars), lines=lines, bands=bands,
+        bars=tuple(bars), lines=lines, bands=bands, notes=tuple(words),
     )  # fmt: skip
     caption = (
         "Each bar: the speeds at which a limit is met in a load case. The machine may run where "
@@ -76,21 +84,26 @@ def energy_figure(assessment: Assessment) -> Figure | None:
     cases = [case for case in assessment.cases if case.energy]
     if not cases:
         return None
+    takers = [name for name in TAKERS if any(case.energy.get(name) for case in cases)]
+    totals = [sum(case.energy.get(name, 0.0) for name in takers) for case in cases]
+    scale, unit = (1e-3, "kW") if max(totals) >= LEAST_KILOWATTS else (1.0, "W")
     bars: list[Bar] = []
     ticks = []
     for k, case in enumerate(cases):
         y = float(len(cases) - 1 - k)
         ticks.append((y, case.name))
         total = 0.0
-        for j, (name, word) in enumerate(TAKERS.items()):
-            power = case.energy.get(name, 0.0) * 1e-3
-            hatch = HATCHES[j % len(HATCHES)]
-            bars.append(Bar(word, y, total, total + power, 0.62, name, hatch, legend=k == 0))
+        for name in takers:
+            power = case.energy.get(name, 0.0) * scale
+            hatch = HATCHES[list(TAKERS).index(name)]
+            bars.append(
+                Bar(TAKERS[name], y, total, total + power, 0.62, name, hatch, legend=k == 0)
+            )
             total += power
-        bars[-1] = _labelled(bars[-1], f"{total:.3g} kW")
+        bars[-1] = _labelled(bars[-1], f"{total:.3g} {unit}")
     most = max(bar.high for bar in bars)
     panel = Panel(
-        Axis("mean power", "kW", (0.0, 1.15 * most)),
+        Axis("mean power", unit, (0.0, 1.15 * most)),
         Axis("", "", (-0.55, len(cases) - 0.45), tuple(ticks)),
         bars=tuple(bars),
     )

@@ -23,9 +23,11 @@ Found = Sequence[tuple[int, CaseAssessment, Orbit]]
 TURNS = 2
 POINTS = 181
 MOTION_HEIGHT = 186
+ORBIT_WIDTH, ORBIT_HEIGHTS, ORBIT_WORDS = 277.0, (60.0, 140.0), 71.0
+MARGIN, BESIDE = 1.08, 1.5  # round a portrait; a gap within this of its width is shown
 TICKS = tuple((90.0 * k, f"{90 * k}") for k in range(0, 4 * TURNS + 1, 2))
 CONTACT_WORDS = "Shaded: a stop is touched; dark on the plus side, light on the minus side."
-NO_CONTACT = "The stop is not reached."
+NO_CONTACT, NO_STOP = "The stop is not reached.", "The machine has no stop."
 ORBITS = (
     "Orbit: path of a frame in one turn, both axes at the same scale; dot: where it is when the "
     "unbalance points along x."
@@ -48,7 +50,8 @@ def orbit_figure(orbit: Orbit) -> Figure:
     """
     which = _across(orbit)
     touched = bool(orbit.contact_intervals)
-    caption = f"{CONTACT_WORDS if touched else NO_CONTACT} {PORTRAIT}"
+    said = CONTACT_WORDS if touched else NO_CONTACT if _stops(orbit) else NO_STOP
+    caption = f"{said} {PORTRAIT}"
     title = f"Motion at {orbit.omega * RPM:.4g} rpm"
     name = label(which)
     panels = (
@@ -79,7 +82,7 @@ def motions_figure(assessment: Assessment) -> Figure | None:
         _shaft(), Axis("relative motion (x2)", "mm"), traces,
         bands=tuple(contact_bands(orbit)), lines=gap_lines(orbit),
     )  # fmt: skip
-    said = f"The stop is not reached in case {case.name}."
+    said = f"The stop is not reached in case {case.name}." if case.screen.has_stop else NO_STOP
     if case.stop_reached:
         said = f"Shaded: the stop is touched, {_shares_of_turn(orbit)} (case {case.name})."
     orbits = _orbits(found)
@@ -98,13 +101,21 @@ def portrait_figure(assessment: Assessment) -> Figure | None:
     if not found:
         return None
     traces = tuple(_loop(orbit, "relative", case.name, k) for k, case, orbit in found)
+    width = MARGIN * max(float(np.abs(trace.x).max()) for trace in traces)
+    height = MARGIN * max(float(np.abs(trace.y).max()) for trace in traces)
+    lines = gap_lines(found[0][2], "x")
+    near = [abs(line.at) for line in lines if abs(line.at) < BESIDE * width]
+    width = max(width, *(MARGIN * at for at in near), 0.0)
     panel = Panel(
-        Axis("relative displacement (x2)", "mm"), Axis("relative velocity (x2')", "m/s"), traces,
-        lines=gap_lines(found[0][2], "x"),
-    )  # fmt: skip
+        Axis("relative displacement (x2)", "mm", (-width, width)),
+        Axis("relative velocity (x2')", "m/s", (-height, height)),
+        traces,
+        lines=tuple(line for line in lines if abs(line.at) < width),
+    )
+    bent = " Beyond the gap per side (e) the stop bends the loop." if lines else ""
     caption = (
-        f"{PORTRAIT} Beyond the gap per side (e) the stop bends the loop; a loop that closes "
-        "after one turn means that every turn is like the last."
+        f"{PORTRAIT}{bent} A loop that closes after one turn means that every turn is like the "
+        "last."
     )
     return Figure("Phase portrait", caption, (panel,), height=380)
 
@@ -114,16 +125,19 @@ def orbits_figure(assessment: Assessment) -> Figure | None:
     found = [one for one in _with_motion(assessment) if one[1].normal is not None]
     if not found:
         return None
-    columns = 2
     whole = _orbits(found)
-    bounds = (whole.x, whole.y) if whole is not None else None
+    if whole is None:
+        return None
     panels = tuple(
-        Panel(*bounds, tuple(_paths([one], legend=k == 0)), title=one[1].name, equal=True)
+        Panel(whole.x, whole.y, tuple(_paths([one], legend=k == 0)), title=one[1].name, equal=True)
         for k, one in enumerate(found)
-        if bounds is not None
     )
+    columns = 2
     rows = math.ceil(len(panels) / columns)
-    return Figure("Orbits of both frames", ORBITS, panels, columns, 60 + 172 * rows)
+    # At true scale the orbits are only as high as this; the rest of a row is for words.
+    orbit = min(max(ORBIT_WIDTH * _height_over_width(whole), ORBIT_HEIGHTS[0]), ORBIT_HEIGHTS[1])
+    height = 12 + round((ORBIT_WORDS + orbit) * rows)
+    return Figure("Orbits of both frames", ORBITS, panels, columns, height)
 
 
 def contact_bands(orbit: Orbit) -> Iterator[Band]:
@@ -263,6 +277,12 @@ def _paths(found: Found, *, legend: bool) -> Iterator[Trace]:
 def _shares(orbits: Panel) -> tuple[float, float]:
     """Widths of the columns such that the orbits fill their panel at true scale."""
     room, chrome = 545.0, 66.0
-    aspect = orbits.x.bounds[1] / orbits.y.bounds[1] if orbits.x.bounds and orbits.y.bounds else 1.0
-    share = min(max((MOTION_HEIGHT - chrome) * aspect / room, 0.2), 0.55)
+    share = (MOTION_HEIGHT - chrome) / _height_over_width(orbits) / room
+    share = min(max(share, 0.2), 0.55)
     return share, 1.0 - share
+
+
+def _height_over_width(orbits: Panel) -> float:
+    if orbits.x.bounds is None or orbits.y.bounds is None:
+        return 1.0
+    return orbits.y.bounds[1] / orbits.x.bounds[1]

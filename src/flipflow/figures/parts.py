@@ -123,7 +123,8 @@ class Line:
     """A reference line across the panel at ``at`` on the x or y axis.
 
     The label of a vertical line stands above the panel; that of a horizontal one stands on the
-    line, its middle at the share ``text_at`` of the panel's width; 0 and 1 are flush.
+    line, or ``under`` it, its middle at the share ``text_at`` of the panel's width; 0 and 1 are
+    flush.
     """
 
     axis: Literal["x", "y"]
@@ -132,6 +133,7 @@ class Line:
     colour: str = "limit"
     dash: str = "dot"
     text_at: float = 1.0
+    under: bool = False
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ from flipflow.figures.parts import Axis, Bar, Cells, Figure, Line, Panel, Trace
 Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 SYMBOLS = {"triangle": "triangle-up", "cross": "x-thin-open"}
+VEIL = "rgba(255,255,255,0.85)"  # behind words that lines may cross
 MARKS_SHOWN = 9
 # The bar of tools would cover the legend; zoom, pan and reset work with the mouse alone.
 CONFIG = {"displayModeBar": False, "displaylogo": False, "responsive": False, "showTips": False}
@@ -106,7 +107,8 @@ def _frame(figure: Figure) -> Json:
         "paper_bgcolor": "white", "plot_bgcolor": "white", "barmode": "overlay",
         "hoverlabel": {"bgcolor": "white", "bordercolor": INK, "font": {"color": INK}},
         "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "top", "xanchor": "left",
-                   "bgcolor": "rgba(255,255,255,0)", "itemsizing": "trace"},
+                   "bgcolor": "rgba(255,255,255,0)", "itemsizing": "trace",
+                   "tracegroupgap": 0},
         "shapes": [], "annotations": [],
     }  # fmt: skip
 
@@ -273,7 +275,7 @@ def _annotations(panel: Panel, key: str, geometry: Geometry, index: int) -> Iter
         }  # fmt: skip
     for note in panel.notes:
         yield data | {"text": note.text, "x": note.x, "y": note.y, "showarrow": False,
-                      "xanchor": note.anchor, "align": note.anchor,
+                      "xanchor": note.anchor, "align": note.anchor, "bgcolor": VEIL,
                       "font": {"color": COLOURS[note.colour]}}  # fmt: skip
 
 
@@ -285,7 +287,7 @@ def _line_label(line: Line, data: Json, over: Json, place: Label | None) -> Json
                         "xshift": place.shift}  # fmt: skip
     return label | {"xref": over["xref"], "yref": data["yref"], "x": line.text_at, "y": line.at,
                     "xanchor": SIDES.get(line.text_at, "center"),
-                    "yanchor": "bottom"}  # fmt: skip
+                    "yanchor": "top" if line.under else "bottom"}  # fmt: skip
 
 
 def _plain(values: NDArray[np.float64]) -> list[float | None]:

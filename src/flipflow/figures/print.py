@@ -34,6 +34,7 @@ MARKS = {
     "diamond": "D", "cross": "x",
 }  # fmt: skip
 MARKS_SHOWN = 9
+VEIL = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0}
 FAMILIES = ("Arial", "Liberation Sans", "DejaVu Sans")
 STYLE = {
     "font.size": FONT * POINT,
@@ -179,7 +180,7 @@ def _draw_labels(axes: Axes, panel: Panel, geometry: Geometry, index: int) -> No
             _draw_line_label(axes, line, geometry.labels[index].get(k))
     for note in panel.notes:
         axes.text(note.x, note.y, note.text.replace("<br>", "\n"), color=COLOURS[note.colour],
-                  ha=note.anchor, va="center")  # fmt: skip
+                  ha=note.anchor, va="center", bbox=VEIL)  # fmt: skip
 
 
 def _draw_line_label(axes: Axes, line: Line, place: Label | None) -> None:
@@ -192,9 +193,10 @@ def _draw_line_label(axes: Axes, line: Line, place: Label | None) -> None:
     else:
         side = SIDES.get(line.text_at, "center")
         inwards = {"left": 3.0, "right": -3.0}.get(side, 0.0)
-        axes.annotate(line.text, (line.text_at, line.at), (inwards, 2.0),
+        up, foot = (-2.0, "top") if line.under else (2.0, "bottom")
+        axes.annotate(line.text, (line.text_at, line.at), (inwards, up),
                       xycoords=("axes fraction", "data"), textcoords="offset points",
-                      ha=side, va="bottom", color=colour)  # fmt: skip
+                      ha=side, va=foot, color=colour)  # fmt: skip
 
 
 def _set_axis(axes: Axes, axis: Axis, way: str) -> None:

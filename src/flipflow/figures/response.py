@@ -243,7 +243,13 @@ def _cases_panel(
             *_working(assessment.omega, text=near is not None),
             *_jump_lines(jumps, brief=True),
             *(
-                Line("y", limit * MM, f"{word} {limit * MM:.3g} mm" if word else "", text_at=at)
+                Line(
+                    "y",
+                    limit * MM,
+                    f"{word} {limit * MM:.3g} mm" if word else "",
+                    text_at=at,
+                    under=word == "least",
+                )
                 for limit, word, at in zip(limits, words, (1.0, 0.0), strict=False)
             ),
         ),

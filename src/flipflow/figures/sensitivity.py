@@ -62,7 +62,7 @@ def tornado_figure(result: Sensitivity | OneAtATime, omega: float | None = None)
     at = _place(result, omega)
     panel = _tornado_panel(result, at)
     caption = _one_at_a_time().capitalize()
-    return Figure(_title(result, at), caption, (panel,), height=110 + 32 * len(result.names))
+    return Figure(_title(result, at), caption, (panel,), height=90 + 26 * len(result.names))
 
 
 def index_order(result: Sensitivity) -> list[int]:

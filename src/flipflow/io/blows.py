@@ -28,4 +28,7 @@ def parse_blow(text: str, field: str) -> Impulse:
     except ValueError:
         raise InputError(field, text, f"give the impulse as a number, as {EXAMPLE}") from None
     t = parse_quantity(when.strip(), "s", field=field, example="2 s")
-    return Impulse(t, words[0], size)
+    try:
+        return Impulse(t, words[0], size)
+    except InputError as error:
+        raise InputError(field, text, error.remedy) from None

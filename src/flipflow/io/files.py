@@ -22,7 +22,9 @@ def prepare_folder(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        remedy = f"it cannot be written ({error.strerror}); name a folder you own"
+        in_the_way = isinstance(error, (FileExistsError, NotADirectoryError))
+        reason = "a file is in its way" if in_the_way else error.strerror
+        remedy = f"it cannot be written ({reason}), name a folder you own"
         raise InputError("--output", str(folder), remedy) from None
 
 

@@ -9,7 +9,7 @@ from flipflow.errors import InputError
 from flipflow.io.units import parse_quantity
 from flipflow.model.fields import FIELD, Field
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.vary import Normal
+from flipflow.model.vary import Normal, variations
 
 OPTION = "--vary"
 EXAMPLE = 'write for example "clearance=5.4 mm..6.6 mm"'
@@ -36,7 +36,7 @@ def read_vary(words: Iterable[str], screen: FlipFlowScreen) -> dict[str, object]
         field = _field(name, word)
         if field.name in found:
             raise InputError(OPTION, word, f"{field.name} is given twice, name each field once")
-        found[field.name] = _range(field, text, word, screen)
+        found[field.name] = _checked(field, text, word, screen)
     if not found:
         raise InputError(OPTION, "(left out)", EXAMPLE)
     return found
@@ -51,12 +51,28 @@ def _field(name: str, word: str) -> Field:
     return known[name]
 
 
+def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen) -> object:
+    """A range that analyses take; what they would refuse names the option as it was written."""
+    if field.whole:
+        raise InputError(OPTION, word, f"{field.name} is counted, vary what has values between")
+    given = _range(field, text, word, screen)
+    if isinstance(given, tuple) and not given[0] < given[1]:
+        raise InputError(OPTION, word, "the range is empty or reversed, give the lower end first")
+    try:
+        variations({field.name: given}, screen)
+    except InputError as error:
+        raise InputError(OPTION, word, error.remedy) from None
+    return given
+
+
 def _range(field: Field, text: str, word: str, screen: FlipFlowScreen) -> object:
     if text.startswith(PLUS_MINUS):
         return _about(field, text.removeprefix(PLUS_MINUS), word, screen)
     if SPREAD in text:
-        mean, _, std = text.partition(SPREAD)
-        return Normal(_number(field, mean), _number(field, std))
+        mean, std = (_number(field, part) for part in text.split(SPREAD, 1))
+        if not std > 0.0:
+            raise InputError(OPTION, word, "give a standard deviation above 0")
+        return Normal(mean, std)
     low, dots, high = text.partition("..")
     if not dots:
         raise InputError(OPTION, word, EXAMPLE)

@@ -13,17 +13,18 @@ from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
 from flipflow.kernels.plan import Int, Real
-from flipflow.kernels.problem import residual, signature, unknown_scale
+from flipflow.kernels.problem import depths, residual, signature, unknown_scale
 
 NEWTON_MOST = 8
-NEWTON_FEW, NEWTON_MANY = 3, 5
+NEWTON_FEW, NEWTON_MANY = 3, 4
 QUICK, SHARP = 1e-6, 1e-10
 GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
 LONGEST, SHORTEST = 1.0, 1e-10
-TOLERATED = 1e-2
-TURN_MOST, ASTRAY_MOST = 0.90, 0.2
+FAR = 2.0
+TOLERATED = 1e-4
+TURN_MOST, ASTRAY_MOST, ASTRAY_AT_CORNER = 0.90, 0.05, 0.3
 AWAY, BACK = 3.0, 0.9
-CONTACT_STEP, STRAND_STEP, LABOURED_STEP = 0.03, 1e-4, 1e-3
+CONTACT_STEP, STRAND_STEP, SHORT_STEP = 0.03, 1e-4, 1e-3
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
 
@@ -36,6 +37,7 @@ class Branch(NamedTuple):
     jacobian: Real  # (P, n, n) dr/du, or (P, 0, 0) where nothing is read off it
     side: Real  # (P,) sign of det [J; tangent]
     signature: Int  # (P,)
+    depth: Real  # (P, m, 2) greatest depth in m beyond each gap, plus and minus side
     iterations: Int  # (P,) Newton iterations
     rejected: Int  # (P,) steps rejected on the way to the point
     reason: Int  # (P,) why the last of them was
@@ -67,6 +69,7 @@ class Corrector(NamedTuple):
     A: Real  # (n + 1, n + 1)
     b: Real  # (n + 1,)
     pivot: Int  # (n + 1,)
+    depth: Real  # (m, 2) depth beyond each gap, as a branch records it
 
 
 @kernel
@@ -171,6 +174,7 @@ def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
         branch.tangent[p, k] = work.tangent[k] * work.scale[k]
     branch.signature[p] = signature(problem)
     branch.side[p] = work.side[0]
+    depths(problem, float(work.w[n]), branch.depth[p])
 
 
 @kernel
@@ -190,9 +194,9 @@ def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course
 
 @kernel
 def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course) -> bool:
-    """Guess a step along the tangent of point p; True when it ends on a bound of omega.
+    """Guess a step along the branch from point p; True when it ends on a bound of omega.
 
-    A guess beyond the bound is drawn back to it and corrected at that omega.
+    A guess beyond the bound is drawn back along the tangent and corrected at that omega.
     """
     n = work.r.shape[0]
     omega = branch.omega[p] + step * work.before[n] * work.scale[n]
@@ -207,7 +211,44 @@ def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course
         work.border[k] = 0.0 if ends else work.before[k]
     work.guess[n] = omega
     work.border[n] = 1.0 if ends else work.before[n]
+    if not ends and p > 0 and branch.signature[p] == branch.signature[p - 1]:
+        chord = chord_to(work, branch, p)
+        if step < FAR * chord:
+            bend(work, branch, p, step, chord)
     return ends
+
+
+@kernel
+def chord_to(work: Corrector, branch: Branch, p: int) -> float:
+    """The way from point p - 1 to point p, in steps, into work.b; its length."""
+    n = work.r.shape[0]
+    square = 0.0
+    for k in range(n + 1):
+        here = branch.u[p, k] if k < n else branch.omega[p]
+        before = branch.u[p - 1, k] if k < n else branch.omega[p - 1]
+        work.b[k] = (here - before) / work.scale[k]
+        square += work.b[k] ** 2
+    return math.sqrt(square)
+
+
+@kernel
+def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> None:
+    """Turn the guess on the tangent of point p into one on the cubic through p - 1 and p.
+
+    With h the chord, left in work.b by ``chord_to``, d its direction, t and t' the tangents at p
+    and p - 1 and r = step / h, that is step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')) farther.
+    """
+    norm = 0.0
+    for k in range(work.b.shape[0]):
+        norm += (branch.tangent[p - 1, k] / work.scale[k]) ** 2
+    norm = math.sqrt(norm)
+    ratio = step / chord
+    for k in range(work.b.shape[0]):
+        d = work.b[k] / chord
+        behind = branch.tangent[p - 1, k] / (work.scale[k] * norm)
+        second = 2.0 * work.before[k] - 3.0 * d + behind
+        third = work.before[k] - 2.0 * d + behind
+        work.guess[k] += step * work.scale[k] * ratio * (second + ratio * third)
 
 
 @kernel
@@ -230,7 +271,7 @@ def judge(
     lies on another strand that runs the other way.
     """
     n = work.r.shape[0]
-    laboured = iterations > NEWTON_MANY and step > LABOURED_STEP
+    laboured = iterations > NEWTON_MANY and step > SHORT_STEP
     if code != status.OK or laboured:
         return REASON_NEWTON
     if work.w[n] > course.upper or work.w[n] < course.lower:
@@ -241,7 +282,9 @@ def judge(
         work.side[0] = -work.side[0]
         for k in range(work.tangent.shape[0]):
             work.tangent[k] = -work.tangent[k]
-    if abs(cosine) < TURN_MOST or astray(work) > ASTRAY_MOST * step:
+    # Where two contacts change at once the branch has a corner, which only a short step may turn.
+    off = ASTRAY_MOST if step > SHORT_STEP else ASTRAY_AT_CORNER
+    if abs(cosine) < TURN_MOST or astray(work) > off * step:
         return REASON_TURN
     if work.side[0] != branch.side[p] and step > STRAND_STEP:
         return REASON_STRAND
@@ -327,54 +370,3 @@ def trace(
         recall(problem, work, branch, p, course)
         p += 1
     return status.POINT_LIMIT, p
-
-
-@kernel
-def correct_between(
-    problem: Any, work: Corrector, branch: Branch, p: int, share: float, course: Course
-) -> int:
-    """A point of the branch between points p and p + 1: in the plane at ``share`` of their chord.
-
-    It stands in work.w, its Jacobian in work.J, its tangent, in the branch's direction, in
-    work.tangent (scaled by work.scale).
-    """
-    n = work.r.shape[0]
-    recall(problem, work, branch, p, course)
-    norm = 0.0
-    for k in range(n + 1):
-        first = branch.u[p, k] if k < n else branch.omega[p]
-        last = branch.u[p + 1, k] if k < n else branch.omega[p + 1]
-        work.guess[k] = first + share * (last - first)
-        work.border[k] = (last - first) / work.scale[k]
-        norm += work.border[k] ** 2
-    for k in range(n + 1):
-        work.border[k] /= math.sqrt(norm)
-        work.before[k] = work.border[k]
-    code, _ = correct(problem, work, SHARP)
-    if code != status.OK:
-        return code
-    new_tangent(work)
-    return residual(problem, work.w, float(work.w[n]), work.r, work.J)
-
-
-TRACE_ALL = -1
-
-
-@kernel(entry=True)
-def follow(
-    problem: Any,
-    work: Corrector,
-    branch: Branch,
-    u: Real,
-    omega: float,
-    course: Course,
-    p: int,
-    share: float,
-) -> tuple[int, int]:
-    """Trace the branch from (u, omega), or find its point at ``share`` of step p >= 0.
-
-    One entry for both: each entry is optimised anew with all that it calls.
-    """
-    if p == TRACE_ALL:
-        return trace(problem, work, branch, u, omega, course)
-    return correct_between(problem, work, branch, p, share, course), p

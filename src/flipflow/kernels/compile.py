@@ -21,6 +21,9 @@ from typing import Any, ParamSpec, TypeVar, cast, overload
 
 import numba
 from numba import config
+from numba.extending import overload as numba_overload
+
+from flipflow.kernels.parts import PartCompiler
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -56,13 +59,26 @@ def kernel(
 
 
 def _compile(function: Callable[P, R], *, entry: bool, inline: bool) -> Callable[P, R]:
-    options: dict[str, Any] = {"forceinline": inline, "no_cfunc_wrapper": True, "_nrt": False}
-    options["no_cpython_wrapper"] = not entry
+    options: dict[str, Any] = _OPTIONS if entry else _PART_OPTIONS
     with _CacheFolder():
-        compiled = numba.njit(
-            cache=entry, nogil=True, error_model="numpy", fastmath={"contract"}, **options
-        )(function)
+        compiled = numba.njit(cache=entry, forceinline=inline, **options)(function)
     return cast("Callable[P, R]", compiled)
+
+
+_OPTIONS: dict[str, Any] = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cfunc_wrapper": True,
+    "_nrt": False,
+}
+_PART_OPTIONS = _OPTIONS | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler}
+
+
+def chosen_by_type(function: Callable[P, R]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Let kernels call a plain function: decorates what returns the one to run for given types."""
+    decorate = numba_overload(function, jit_options=_PART_OPTIONS)
+    return cast("Callable[[Callable[..., Any]], Callable[..., Any]]", decorate)
 
 
 def cache_folder() -> Path:

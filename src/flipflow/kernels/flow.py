@@ -184,6 +184,32 @@ def segment_state(
 
 
 @kernel(inline=True)
+def segment_motion(
+    plan: Plan, flow: Flow, e: int, omega: float, coordinate: Real, motion: GapMotion
+) -> None:
+    """Segment e as sums of exponentials in given coordinates (G, N), the drive as the last term."""
+    slot = flow.slot[e]
+    count = plan.mode_count[slot]
+    n = coordinate.shape[1]
+    turn = exponential(1j * omega * flow.start[e])
+    motion.rate[count] = 1j * omega
+    for i in range(count):
+        motion.rate[i] = plan.rate[slot, i]
+    for g in range(coordinate.shape[0]):
+        motion.offset[g] = 0.0
+        driven = 0j
+        for k in range(n):
+            motion.offset[g] += coordinate[g, k] * plan.rest[slot, k]
+            driven += coordinate[g, k] * flow.drive[slot, k]
+        motion.amplitude[g, count] = driven * turn
+        for i in range(count):
+            shape = 0j
+            for k in range(n):
+                shape += coordinate[g, k] * plan.right[slot, k, i]
+            motion.amplitude[g, i] = plan.weight[slot, i] * shape * flow.modes[e, i]
+
+
+@kernel(inline=True)
 def kick_sign(before: int, after: int) -> float:
     """Sign of c M^-1 d d^T in the saltation of a change of contact.
 

@@ -5,20 +5,14 @@ from __future__ import annotations
 import math
 
 from flipflow.kernels import status
-from flipflow.kernels.balance import (
-    Balance,
-    contact_forces,
-    contact_integrals,
-    prepare_receptance,
-    record_contacts,
-    set_series,
-)
+from flipflow.kernels.balance import contact_forces, prepare_receptance
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.dense import lu_factor, lu_solve
-from flipflow.kernels.flow import run_flow, segment_state
+from flipflow.kernels.flow import run_flow, segment_motion, segment_state
 from flipflow.kernels.gapmotion import GapMotion, exponential, extremes, prepare_search
 from flipflow.kernels.plan import Complex, Int, Real
 from flipflow.kernels.sampled import Sampled, sampled_forces
+from flipflow.kernels.series import Balance, contact_integrals, record_contacts, set_series
 from flipflow.kernels.shooting import Shooting, shoot
 
 ROUNDING = 1e-9
@@ -54,7 +48,7 @@ def observe_flow(
         for g in range(coordinate.shape[0]):
             low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
         for e in range(flow.segments[0]):
-            _coordinate_segment(problem, e, omega[p], coordinate, motion)
+            segment_motion(plan, flow, e, omega[p], coordinate, motion)
             count = plan.mode_count[flow.slot[e]] + 1
             prepare_search(motion, count)
             for g in range(coordinate.shape[0]):
@@ -78,33 +72,6 @@ def _turn_after(problem: Shooting, z: Real, omega: float, turn: float, waiting: 
     for k in range(flow.z.shape[0]):
         z[k] = flow.z[k]
     return run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
-
-
-@kernel(inline=True)
-def _coordinate_segment(
-    problem: Shooting, e: int, omega: float, coordinate: Real, motion: GapMotion
-) -> None:
-    """Segment e as sums of exponentials in the given coordinates, the drive as the last term."""
-    plan, flow = problem.plan, problem.flow
-    slot = flow.slot[e]
-    count = plan.mode_count[slot]
-    n = coordinate.shape[1]
-    turn = exponential(1j * omega * flow.start[e])
-    motion.rate[count] = 1j * omega
-    for i in range(count):
-        motion.rate[i] = plan.rate[slot, i]
-    for g in range(coordinate.shape[0]):
-        motion.offset[g] = 0.0
-        driven = 0j
-        for k in range(n):
-            motion.offset[g] += coordinate[g, k] * plan.rest[slot, k]
-            driven += coordinate[g, k] * flow.drive[slot, k]
-        motion.amplitude[g, count] = driven * turn
-        for i in range(count):
-            shape = 0j
-            for k in range(n):
-                shape += coordinate[g, k] * plan.right[slot, k, i]
-            motion.amplitude[g, i] = plan.weight[slot, i] * shape * flow.modes[e, i]
 
 
 @kernel(inline=True)
@@ -231,7 +198,7 @@ def corrected(
 def _correct_state(
     problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real, out: Real
 ) -> tuple[int, float, float]:
-    """One Newton step of z in place, and the length of it and of the next, infinite when longer."""
+    """A Newton step of z in place unless it is rounding; its length and the next's, or infinity."""
     size = delta.shape[0]
     n = size // 2
     for k in range(size):
@@ -241,6 +208,13 @@ def _correct_state(
     if code != status.OK:
         return code, math.inf, math.inf
     _store_map(problem, out)
+    # Steps within the rounding of the flow do not shrink; relative to the motion they are nothing.
+    size_of_motion = 0.0
+    for k in range(n):
+        size_of_motion = max(size_of_motion, abs(z[k]), abs(z[n + k]) / omega)
+    rounding = ROUNDING * size_of_motion
+    if first <= rounding:
+        return code, 0.0, first
     if not math.isfinite(first):
         return code, math.inf, math.inf
     for k in range(size):
@@ -248,11 +222,7 @@ def _correct_state(
     code, last = _newton_step(problem, z, omega, A, pivot, delta)
     if code != status.OK:
         return code, first, math.inf
-    # Steps within the rounding of the flow do not shrink; relative to the motion they are nothing.
-    size_of_motion = 0.0
-    for k in range(n):
-        size_of_motion = max(size_of_motion, abs(z[k]), abs(z[n + k]) / omega)
-    if not last <= max(0.5 * first, ROUNDING * size_of_motion):
+    if not last <= max(0.5 * first, rounding):
         return code, first, math.inf
     _store_map(problem, out)
     return code, first, last

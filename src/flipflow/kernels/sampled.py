@@ -20,16 +20,14 @@ import math
 from typing import NamedTuple
 
 from flipflow.kernels.balance import (
-    Balance,
-    amplitude_of,
     prepare_receptance,
     series_scale,
-    set_series,
     write_block,
     write_residual,
 )
 from flipflow.kernels.compile import kernel
 from flipflow.kernels.plan import Complex, Int, Real
+from flipflow.kernels.series import Balance, amplitude_of, series_depths, set_series
 
 
 class Sampled(NamedTuple):
@@ -163,6 +161,12 @@ def passages(problem: Sampled) -> int:
     for j in range(problem.beyond.shape[0]):
         total += problem.beyond[j] + 1000 * j * problem.beyond[j]
     return total
+
+
+@kernel
+def sampled_depths(problem: Sampled, omega: float, depth: Real) -> None:
+    """Greatest depth in m beyond each gap, (m, 2), as the series itself has it."""
+    series_depths(problem.balance, omega, depth)
 
 
 @kernel

@@ -11,7 +11,14 @@ from typing import NamedTuple
 
 from flipflow.kernels import status
 from flipflow.kernels.compile import kernel
-from flipflow.kernels.flow import Flow, carry_tangent, contact_number, run_flow
+from flipflow.kernels.flow import (
+    Flow,
+    carry_tangent,
+    contact_number,
+    run_flow,
+    segment_motion,
+)
+from flipflow.kernels.gapmotion import extremes, prepare_search
 from flipflow.kernels.plan import Complex, Plan, Real
 
 
@@ -79,6 +86,30 @@ def shooting_step(problem: Shooting, z: Real, omega: float, r: Real, J: Real) ->
 def crossings(problem: Shooting) -> int:
     """A number that changes when the contacts met in a turn change: crossings, spring by spring."""
     return contact_number(problem.flow)
+
+
+@kernel
+def flow_depths(problem: Shooting, omega: float, depth: Real) -> None:
+    """Greatest depth in m beyond each gap in the recorded flow, (m, 2): plus and minus side.
+
+    Half a turn tells both of a motion that is its own mirror image after it.
+    """
+    plan, flow, motion = problem.plan, problem.flow, problem.flow.motion
+    for j in range(depth.shape[0]):
+        depth[j, 0], depth[j, 1] = -math.inf, -math.inf
+    for e in range(flow.segments[0]):
+        segment_motion(plan, flow, e, omega, plan.direction, motion)
+        count = plan.mode_count[flow.slot[e]] + 1
+        prepare_search(motion, count)
+        for j in range(depth.shape[0]):
+            low, high = extremes(motion, count, j, flow.length[e])
+            depth[j, 0], depth[j, 1] = max(depth[j, 0], high), max(depth[j, 1], -low)
+    for j in range(depth.shape[0]):
+        if problem.sign < 0.0:
+            depth[j, 0] = max(depth[j, 0], depth[j, 1])
+            depth[j, 1] = depth[j, 0]
+        depth[j, 0] -= plan.gap_plus[j]
+        depth[j, 1] -= plan.gap_minus[j]
 
 
 @kernel

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.kernels import status
-from flipflow.kernels.balance import Balance
 from flipflow.kernels.flow import Flow
 from flipflow.kernels.observe import describe_balance, describe_sampled, observe_series
 from flipflow.kernels.sampled import Sampled
+from flipflow.kernels.series import Balance
 from flipflow.methods.motion import Motion, Pieces, SeriesMotion
 from flipflow.methods.scratch import new_balance, new_gap_motion, new_sampled
 from flipflow.methods.solver import Complex, Real, Solver
@@ -40,6 +40,7 @@ class BalanceSolver(Solver):
         self._new_work()
         empty = np.zeros(0)
         self._last = empty, empty, empty.astype(np.complex128)
+        self._last_maps = empty, empty, (empty, empty)
 
     def _formulated(self) -> Balance | Sampled:
         """The equations that are solved, over the present balance."""
@@ -85,11 +86,16 @@ class BalanceSolver(Solver):
     def corrected_maps(self, u: Real, omega: Real) -> tuple[Real, Real]:
         """Maps (P, 2 N, 2 N) of the exact flow beside the series, and its distance (P,) in m.
 
-        The distance is infinite where no exact motion is near.
+        The distance is infinite where no exact motion is near. The last answer is kept: those
+        that make up the multipliers of a branch also tell which of its folds are the machine's.
         """
-        nothing = np.zeros(0, np.int64), np.zeros((omega.size, 0, self.system.size), np.complex128)
-        states = self.states(u, omega)
-        return self.corrected(states, omega, *nothing, half_turn=self.half_turn)
+        kept_u, kept_omega, maps = self._last_maps
+        if not (np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega)):
+            states, size = self.states(u, omega), self.system.size
+            nothing = np.zeros(0, np.int64), np.zeros((omega.size, 0, size), np.complex128)
+            maps = self.corrected(states, omega, *nothing, half_turn=self.half_turn)
+            self._last_maps = u.copy(), omega.copy(), maps
+        return maps
 
     def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
         return self.harmonics, self._describe(u, omega)

@@ -24,11 +24,9 @@ from flipflow.errors import IncompleteError
 from flipflow.kernels import status
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Point, Real, Traced
 
 BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
-FEW = 4
 FOLLOWED = (1.0, 4.0)
 EDGE = 1e-6
 ZERO = 1e-3
@@ -100,10 +98,10 @@ class ExactBeside:
         values = test(first), test(last)
         if not values[0] * values[1] < 0.0:
             return False
-        record = new_branch(self.exact.unknowns, 2, with_jacobian=False)
-        record.tangent[:] = 0.0
+        record = self.exact.new_branch(2)
         for k, end in enumerate((first, last)):
-            record.u[k], record.omega[k], record.tangent[k, -1] = end.u, end.omega, 1.0
+            record.u[k], record.omega[k] = end.u, end.omega
+        record.tangent[:] = np.append(last.u - first.u, last.omega - first.omega)
         chord = Traced.recorded(record, 2, status.OK, self.traced.course)
 
         def value(share: float) -> float:
@@ -123,26 +121,12 @@ class ExactBeside:
         ``side`` tells for each point of the branch whether an odd number of eigenvalues should
         lie beyond +1.
         """
+        maps, distance = self.solver.corrected_maps(self.traced.u, self.traced.omega)
+        beyond = np.linalg.det(np.eye(maps.shape[-1]) - maps) < 0.0
+        on_side = (beyond == side) & np.isfinite(distance)
         ends = [0, *(int(position) + 1 for position in positions), side.size]
-        shown = [self._is_on_side(first, last, side) for first, last in pairwise(ends)]
+        shown = [bool(on_side[first:last].any()) for first, last in pairwise(ends)]
         return [before and after for before, after in pairwise(shown)]
-
-    def _is_on_side(self, first: int, last: int, side: NDArray[np.bool_]) -> bool:
-        """Whether an exact motion beside points first ... last - 1 has the parity it should."""
-        points = np.arange(first, last)
-        ends = np.minimum(points - first, last - 1 - points)
-        inmost = points[np.argsort(-ends, kind="stable")]
-        begin, count = 0, FEW
-        while begin < points.size:
-            some = np.sort(inmost[begin : begin + count])
-            u, omega = self.traced.u[some], self.traced.omega[some]
-            maps, distance = self.solver.corrected_maps(u, omega)
-            known = np.isfinite(distance)
-            beyond = np.linalg.det(np.eye(maps.shape[-1]) - maps[known]) < 0.0
-            if np.any(beyond == side[some][known]):
-                return True
-            begin, count = begin + count, 4 * count
-        return False
 
 
 def unconfirmed_note(kind: str, omegas: Sequence[float]) -> str:

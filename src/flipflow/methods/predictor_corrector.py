@@ -16,19 +16,17 @@ from numpy.typing import NDArray
 
 from flipflow.kernels import status
 from flipflow.kernels.arclength import (
-    ASTRAY_MOST,
     AWAY,
     BACK,
     CONTACT_STEP,
     GROW,
     HALVE,
-    LABOURED_STEP,
     LONGEST,
     NEWTON_FEW,
-    NEWTON_MANY,
     NEWTON_MOST,
     QUICK,
     SHARP,
+    SHORT_STEP,
     SHORTEST,
     SHRINK,
     STRAND_STEP,
@@ -37,6 +35,8 @@ from flipflow.kernels.arclength import (
 
 Real = NDArray[np.float64]
 FIRST_STEP, POINTS_MOST = 0.1, 5000
+# A step along the tangent strays farther, and Newton takes longer, than one along the cubic.
+ASTRAY_MOST, NEWTON_MANY = 0.2, 5
 NEAR, CLOSE, SAME = 1e-2, 1e-3, 1e-7
 
 
@@ -237,7 +237,7 @@ def solved(A: Real, b: Real) -> Real | None:
 
 def refused(equations: Equations, last: Solved, new: Solved, guess: Real, step: float) -> bool:
     """Whether a step is laboured, far or bent, changes its contacts, or lands elsewhere."""
-    laboured = new.iterations > NEWTON_MANY and step > LABOURED_STEP
+    laboured = new.iterations > NEWTON_MANY and step > SHORT_STEP
     outside = not equations.lower <= new.w[-1] <= equations.upper
     bent = abs(float(new.tangent @ last.tangent)) < TURN_MOST
     astray = float(np.linalg.norm((new.w - guess) / new.scale)) > ASTRAY_MOST * step

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.kernels.arclength import Branch, Corrector
-from flipflow.kernels.balance import Balance
 from flipflow.kernels.flow import Flow
 from flipflow.kernels.gapmotion import Contact, GapMotion
 from flipflow.kernels.plan import Plan
 from flipflow.kernels.sampled import Sampled
+from flipflow.kernels.series import Balance
 from flipflow.kernels.shooting import Shooting
 
 MOST_SEGMENTS = 600
@@ -80,7 +80,7 @@ def new_shooting(plan: Plan, *, half_turn: bool, length: float, turns: int = 1) 
     )
 
 
-def new_corrector(unknowns: int) -> Corrector:
+def new_corrector(unknowns: int, gaps: int) -> Corrector:
     """Scratch of the bordered Newton solves."""
     n = unknowns
     return Corrector(
@@ -96,10 +96,11 @@ def new_corrector(unknowns: int) -> Corrector:
         A=np.zeros((n + 1, n + 1)),
         b=np.zeros(n + 1),
         pivot=np.zeros(n + 1, np.int64),
+        depth=np.zeros((gaps, 2)),
     )
 
 
-def new_branch(unknowns: int, points: int, *, with_jacobian: bool = True) -> Branch:
+def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = True) -> Branch:
     """Record of a branch of up to ``points`` points."""
     n = unknowns
     return Branch(
@@ -109,6 +110,7 @@ def new_branch(unknowns: int, points: int, *, with_jacobian: bool = True) -> Bra
         jacobian=np.empty((points, n, n) if with_jacobian else (points, 0, 0)),
         side=np.empty(points),
         signature=np.empty(points, np.int64),
+        depth=np.empty((points, gaps, 2)),
         iterations=np.empty(points, np.int64),
         rejected=np.zeros(points, np.int64),
         reason=np.zeros(points, np.int64),

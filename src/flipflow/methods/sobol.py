@@ -130,28 +130,35 @@ def _fill(found: SobolIndices, columns: NDArray[np.int64], values: Real, counts:
     values = (values - values.mean(axis=(0, 1))) / values.std(axis=(0, 1))
     estimators = _salib("SALib.analyze.sobol")
     A, B = values[:, 0], values[:, -1]
-    variance = _resampled_variance(A, B, counts)
-    weights = counts / counts.sum(axis=1, keepdims=True)
+    drawn = counts.sum(axis=1, keepdims=True)
+    weights = np.divide(counts, drawn, out=np.full_like(counts, np.nan), where=drawn > 0.0)
+    variance = _resampled_variance(A, B, weights)
     for i in range(values.shape[1] - 2):
         AB = values[:, i + 1]
         found.first_order[moving, i] = estimators.first_order(A, AB, B)
         found.total[moving, i] = estimators.total_order(A, AB, B)
         # A resample is a weighted mean: all of them are one matrix product.
-        first = weights @ (B * (AB - A)) / variance
-        total = 0.5 * weights @ (A - AB) ** 2 / variance
+        first = _shares(weights @ (B * (AB - A)), variance)
+        total = _shares(0.5 * weights @ (A - AB) ** 2, variance)
         found.first_order_confidence[moving, i] = NORMAL_95 * first.std(axis=0, ddof=1)
         found.total_confidence[moving, i] = NORMAL_95 * total.std(axis=0, ddof=1)
+
+
+def _shares(parts: Real, variance: Real) -> Real:
+    """Shares of the variance; none of a resample in which nothing varies."""
+    nothing = np.full_like(parts, np.nan)
+    return np.divide(parts, variance, out=nothing, where=variance > 0.0)
 
 
 def _widths(found: SobolIndices) -> tuple[Real, Real]:
     return found.first_order_confidence, found.total_confidence
 
 
-def _resampled_variance(A: Real, B: Real, counts: Real) -> Real:
+def _resampled_variance(A: Real, B: Real, weights: Real) -> Real:
     """Variance over A and B of each resample, (resamples, K)."""
-    weights = 0.5 * counts / counts.sum(axis=1, keepdims=True)
-    mean = weights @ (A + B)
-    return np.asarray(weights @ (A**2 + B**2) - mean**2)
+    half = 0.5 * weights
+    mean = half @ (A + B)
+    return np.asarray(half @ (A**2 + B**2) - mean**2)
 
 
 def _salib(module: str) -> Any:

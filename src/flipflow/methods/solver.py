@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flipflow.errors import IncompleteError
 from flipflow.kernels import arclength, status
 from flipflow.kernels.flow import Flow
+from flipflow.kernels.follow import FOLD, TRACE_ALL, follow
 from flipflow.kernels.observe import corrected
 from flipflow.kernels.shooting import Shooting
 from flipflow.methods.motion import Motion
@@ -36,6 +37,7 @@ class Traced:
     tangent: Real
     jacobian: Real
     signature: NDArray[np.int64]
+    depth: Real
     iterations: NDArray[np.int64]
     rejected: NDArray[np.int64]
     reason: NDArray[np.int64]
@@ -54,6 +56,7 @@ class Traced:
             record.tangent[:points],
             record.jacobian[:points],
             record.signature[:points],
+            record.depth[:points],
             record.iterations[:points],
             record.rejected[: points + 1],
             record.reason[: points + 1],
@@ -82,6 +85,7 @@ class Traced:
             jacobian=np.concatenate([self.jacobian[turned], ahead.jacobian]),
             side=np.concatenate([-self.record.side[turned], ahead.record.side[: ahead.omega.size]]),
             signature=np.concatenate([self.signature[turned], ahead.signature]),
+            depth=np.concatenate([self.depth[turned], ahead.depth]),
             iterations=np.concatenate([self.iterations[turned], ahead.iterations]),
             rejected=rejected,
             reason=reason,
@@ -190,9 +194,14 @@ class Solver(ABC):
 
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
-        record = new_branch(self.unknowns, POINTS_MOST, with_jacobian=self.reads_jacobian)
-        code, points = self._follow(record, u, omega, course)
+        record = self.new_branch(POINTS_MOST)
+        code, points, _ = self._follow(record, u, omega, course)
         return Traced.recorded(record, points, code, course)
+
+    def new_branch(self, points: int) -> arclength.Branch:
+        """An empty record for up to ``points`` points."""
+        gaps = len(self.builder.springs)
+        return new_branch(self.unknowns, gaps, points, with_jacobian=self.reads_jacobian)
 
     def _follow(
         self,
@@ -200,18 +209,19 @@ class Solver(ABC):
         u: Real,
         omega: float,
         course: arclength.Course,
-        p: int = arclength.TRACE_ALL,
-        share: float = 0.0,
-    ) -> tuple[int, int]:
+        p: int = TRACE_ALL,
+        shares: tuple[float, float] = (0.0, 0.0),
+        test: int = 0,
+    ) -> tuple[int, int, float]:
         """The compiled loop, begun anew whenever it finds a configuration missing."""
         while True:
-            code, points = arclength.follow(
-                self.problem, self.work, record, u, omega, course, p, share
+            code, points, share = follow(
+                self.problem, self.work, record, u, omega, course, p, *shares, test
             )
             if code != status.MISSING_CONFIGURATION:
-                return code, points
+                return code, points, share
             self.add_missing_configuration()
-            if p == arclength.TRACE_ALL:
+            if p == TRACE_ALL:
                 record.rejected[:] = 0
                 record.reason[:] = arclength.REASON_NONE
 
@@ -224,7 +234,20 @@ class Solver(ABC):
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
-        code, _ = self._follow(traced.record, traced.u[p], 0.0, traced.course, p, share)
+        return self.zero_between(traced, FOLD, p, share, share)[1]
+
+    def zero_between(
+        self, traced: Traced, test: int, p: int, low: float, high: float
+    ) -> tuple[float, Point]:
+        """Share and point between two shares of step p where a test of the kernels is zero.
+
+        Raises
+        ------
+        IncompleteError
+            When the branch cannot be corrected there.
+        """
+        course = traced.course
+        code, _, share = self._follow(traced.record, traced.u[p], 0.0, course, p, (low, high), test)
         if code != status.OK:
             omega = traced.omega[p]
             raise IncompleteError(
@@ -232,13 +255,25 @@ class Solver(ABC):
             )
         u, omega = self.work.w[:-1].copy(), float(self.work.w[-1])
         jacobian = self.work.J[:, :-1].copy()
-        return Point(self, u, omega, float(self.work.tangent[-1]), jacobian)
+        return share, Point(self, u, omega, float(self.work.tangent[-1]), jacobian)
+
+    def eigenvalues(self, traced: Traced, maps: Real) -> Complex:
+        """Eigenvalues (P, 2 N) of return maps; without contact those of the open machine."""
+        plan, shooting = self.builder.plan, self.shooting(half_turn=self.half_turn)
+        rate = plan.rate[0, : plan.mode_count[0]]
+        rate = np.concatenate([rate, rate[rate.imag > 0.0].conj()])
+        free = np.all(traced.depth < 0.0, axis=(1, 2))
+        duration = shooting.fraction * 2.0 * np.pi / traced.omega[free]
+        found = np.empty(maps.shape[:-1], np.complex128)
+        found[free] = shooting.sign * np.exp(duration[:, None] * rate)
+        found[~free] = eigenvalues_of(maps[~free])
+        return found
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
         course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, arclength.SHARP)
-        record = new_branch(self.unknowns, 1, with_jacobian=self.reads_jacobian)
-        _, points = self._follow(record, u, omega, course)
+        record = self.new_branch(1)
+        _, points, _ = self._follow(record, u, omega, course)
         if points == 0:
             return None
         return Point(self, record.u[0], omega, float(record.tangent[0, -1]), record.jacobian[0])
@@ -288,7 +323,7 @@ class Solver(ABC):
         return self._shooting[half_turn]
 
     def _new_work(self) -> None:
-        self.work = new_corrector(self.unknowns)
+        self.work = new_corrector(self.unknowns, len(self.builder.springs))
         self._shooting: dict[bool, Shooting] = {}
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.errors import IncompleteError
+from flipflow.kernels.follow import FOLD as OF_FOLD
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.confirm import ExactBeside, unconfirmed_note
 from flipflow.methods.solver import Point, Real, Solver, Traced, eigenvalues_of
@@ -27,6 +28,7 @@ from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_
 SHARE_TOLERANCE = 1e-10
 DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
 BOTTOM_STEPS = 15
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
@@ -58,7 +60,8 @@ class Found:
 class Test:
     """One test function: its values at the branch points and anywhere between.
 
-    ``suspects`` are steps without a change of sign that may hide two zeros all the same.
+    ``suspects`` are steps without a change of sign that may hide two zeros all the same;
+    ``zero`` finds one between two shares of a step where kernels know the test.
     """
 
     kind: str
@@ -67,6 +70,7 @@ class Test:
     spring: int = -1
     side: int = 0
     suspects: tuple[int, ...] = ()
+    zero: Callable[[int, float, float], tuple[float, Point]] | None = None
 
 
 def find_special_points(
@@ -158,7 +162,13 @@ def _map_tests(
     hidden = partial(_plunges, arc=_arc(traced), signature=traced.signature)
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
-        Test(FOLD, fold, lambda point: point.omega_tangent, suspects=hidden(fold)),
+        Test(
+            FOLD,
+            fold,
+            lambda point: point.omega_tangent,
+            suspects=hidden(fold),
+            zero=partial(solver.zero_between, traced, OF_FOLD),
+        ),
         Test(kind, flips, _minus_one_test, suspects=hidden(flips)),
         Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
     ]
@@ -169,19 +179,20 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
     springs = solver.builder.springs
     if not springs:
         return []
-    low, high = solver.gap_extremes(traced.u, traced.omega)
     tests = []
     for j, spring in enumerate(springs):
-        for side, gap in zip((1, -1), spring.gaps, strict=True):
+        for at, side in enumerate((1, -1)):
+            gap = spring.gaps[at]
             if np.isinf(gap) or (side < 0 and solver.half_turn):
                 continue
-            depth = (high[:, j] if side > 0 else -low[:, j]) - gap
 
             def evaluate(point: Point, j: int = j, side: int = side, gap: float = gap) -> float:
                 least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
                 return float((most[0, j] if side > 0 else -least[0, j]) - gap)
 
-            tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side))
+            depth = traced.depth[:, j, at]
+            zero = partial(solver.zero_between, traced, 2 * j + at)
+            tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side, zero=zero))
     return tests
 
 
@@ -252,24 +263,44 @@ def _dips(values: Real) -> list[int]:
 def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool) -> float | None:
     """Share in step p where the test has the other sign, None when it never has.
 
-    A plunge that has ended halfway, no lower than the ends, goes no further.
+    A plunge that is nowhere between lower than at the ends has ended.
     """
-    ends = np.abs(test.values[p : p + 2])
     sign = float(np.sign(test.values[p]))
+    low, high = 0.0, 1.0
 
     def height(share: float) -> float:
         return sign * test.evaluate(solver.between(traced, p, share))
 
-    if plunges and height(0.5) > ends.min():
-        return None
+    if plunges:
+        first, last = np.abs(test.values[p : p + 2])
+        heights = [first, *(height(share) for share in QUARTERS[1:-1]), last]
+        lowest = int(np.argmin(heights))
+        if lowest in (0, len(QUARTERS) - 1):
+            return None
+        low, high = QUARTERS[lowest - 1], QUARTERS[lowest + 1]
     best = minimize_scalar(
-        height, bounds=(0.0, 1.0), method="bounded", options={"maxiter": BOTTOM_STEPS}
+        height, bounds=(low, high), method="bounded", options={"maxiter": BOTTOM_STEPS}
     )
     return float(best.x) if best.fun < 0.0 else None
 
 
 def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high: float) -> Found:
     """Root of the test on corrected points between two shares of step p."""
+    if test.zero is not None:
+        share, point = test.zero(p, low, high)
+    else:
+        share, point = _zero_between(solver, traced, test, p, low, high)
+    kind = test.kind
+    if kind == CONTACT_BEGIN:
+        deeper = test.values[p + 1] > 0.0 if high == 1.0 else test.values[p] < 0.0
+        kind = CONTACT_BEGIN if deeper == (point.omega_tangent > 0.0) else CONTACT_END
+    return Found(kind, p, share, point, test.spring, test.side)
+
+
+def _zero_between(
+    solver: Follower, traced: Any, test: Test, p: int, low: float, high: float
+) -> tuple[float, Point]:
+    """Share and point of the root, by a test that only Python can evaluate."""
     last: dict[float, Point] = {}
 
     def value(share: float) -> float:
@@ -279,12 +310,7 @@ def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high:
         return test.evaluate(last[share])
 
     share = float(brentq(value, low, high, xtol=SHARE_TOLERANCE, rtol=1e-12))
-    point = last[share] if share in last else solver.between(traced, p, share)
-    kind = test.kind
-    if kind == CONTACT_BEGIN:
-        rises = (value(high) - value(low)) * point.omega_tangent > 0.0
-        kind = CONTACT_BEGIN if rises else CONTACT_END
-    return Found(kind, p, share, point, test.spring, test.side)
+    return share, last[share] if share in last else solver.between(traced, p, share)
 
 
 def _is_real(found: Found) -> bool:

@@ -17,11 +17,10 @@ from flipflow.errors import IncompleteError
 from flipflow.kernels import arclength, status
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.predictor_corrector import CLOSE, NEAR, SAME
-from flipflow.methods.scratch import new_branch
 from flipflow.methods.solver import Point, Real, Solver, Traced
 from flipflow.methods.stability import determinant_plus
 
-FINER = (1.0, 0.1, 0.01, 0.001)
+FINER = (1.0, 0.05, 0.01, 0.001)
 SMALL = 1e-3
 SECANT, SECANT_MOST = 1e-6, 30
 
@@ -184,7 +183,7 @@ def beside(child: Solver, parent: Point, course: arclength.Course) -> Point:
     weight = np.concatenate([np.ones(n), np.full(n, 1.0 / parent.omega)])
     away = SMALL * critical / np.abs(critical * weight).max()
     away *= max(np.abs(parent.u * weight).max(), child.length)
-    record = new_branch(child.unknowns, 2)
+    record = child.new_branch(2)
     record.u[:] = parent.u, parent.u + away
     record.omega[:] = parent.omega
     record.tangent[:] = np.append(away, 0.0)

@@ -11,7 +11,7 @@ from flipflow.figures.curves import Curve
 from flipflow.figures.palette import STABILITY_WORDS
 from flipflow.io.units import in_unit
 from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Values, cells
-from flipflow.report.numbers import multiplier, number, quantity, rpm
+from flipflow.report.numbers import four_digits, multiplier, number, quantity, rpm
 from flipflow.report.registry import Part, section
 from flipflow.results.branch import Branch, SpecialPoint
 
@@ -26,7 +26,7 @@ KINDS = {"contact begin": "contact begins", "contact end": "contact ends"}
 @section(Assessment, Part.APPENDIX, 10)
 def branches(assessment: Assessment) -> Iterator[Block]:
     """How each branch went, and how exact it is."""
-    yield Heading("Appendix", 1)
+    yield Heading("Appendix", 1, new_page=False)
     columns = (
         Column("Load case"),
         Column("Range", "rpm"),
@@ -137,9 +137,9 @@ def _point_row(name: str, point: SpecialPoint, jumps: Mapping[float, str]) -> tu
     return cells(
         name,
         happens,
-        rpm(point.omega),
-        f"{in_unit(point.omega, 'Hz', 'rad/s'):.4g}",
-        f"{point.omega:.4g}",
+        four_digits(in_unit(point.omega, "rpm", "rad/s")),
+        four_digits(in_unit(point.omega, "Hz", "rad/s")),
+        four_digits(point.omega),
         quantity(point.amplitude("relative"), "mm", "m", with_unit=False),
     )
 

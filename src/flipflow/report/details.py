@@ -27,7 +27,8 @@ from flipflow.report.blocks import (
     Table,
     cells,
 )
-from flipflow.report.numbers import named, rpm
+from flipflow.report.first_page import overleaf
+from flipflow.report.numbers import four_digits, named, rpm
 from flipflow.report.registry import Part, section
 
 SCHEMATIC = (
@@ -47,7 +48,7 @@ SYMBOLS = {
 def machine(assessment: Assessment) -> Iterator[Block]:
     """The machine as a drawing."""
     screen = assessment.project.screen
-    yield Heading("The machine", 1)
+    yield Heading("The machine", 1, new_page=not list(overleaf(assessment)))
     yield DrawingBlock(Drawing("Schematic", SCHEMATIC, schematic(screen, drawn_values(screen))))
 
 
@@ -138,8 +139,7 @@ def _derived(check: Check) -> Table:
         Column("rad/s", numeric=True),
     )
     rows = tuple(
-        cells(s.meaning, s.name, f"{s.rpm:.4g}", f"{s.hz:.4g}", f"{s.rad_s:.4g}")
-        for s in check.speeds
+        cells(s.meaning, s.name, *map(four_digits, (s.rpm, s.hz, s.rad_s))) for s in check.speeds
     )
     return Table("Speeds that follow", columns, rows, "Empty machine, no stop touched.")
 

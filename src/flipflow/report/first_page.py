@@ -37,7 +37,7 @@ NO_NORMAL = (
 NO_LIMIT = (-math.inf, math.inf)
 # What an A4 page has room for beside all that stands there always: rows of load cases, a line of
 # a note being as high as so many rows; lines of notes when the table of load cases is overleaf.
-MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 105
+MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 118
 MOST_NAMED = 4
 OVERLEAF, OVERLEAF_TITLE = 'under "Load cases and notes" on the next page', "Load cases and notes"
 CASE_COLUMNS = (
@@ -180,7 +180,7 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
             ("Shear springs", _line(assessment, "shear_strain")),
             ("Stop springs", _line(assessment, "stop_force", "stop_piece_force")),
             ("Exciter, bearings", _line(assessment, "exciter_force", "bearing_force")),
-            ("Power, throw", f"{_line(assessment, 'dissipated_power')}; {_throw(assessment)}"),
+            ("Power, throw", _power_and_throw(assessment)),
         )
     )
 
@@ -333,5 +333,8 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     return f"{', '.join(parts)}{where}"
 
 
-def _throw(assessment: Assessment) -> str:
-    return _line(assessment, "throw_number", lowest=True)
+def _power_and_throw(assessment: Assessment) -> str:
+    power = _line(assessment, "dissipated_power")
+    throw = _line(assessment, "throw_number", lowest=True)
+    # Where both lack the same data they are named once.
+    return throw if throw.startswith(power) else f"{power}; {throw}"

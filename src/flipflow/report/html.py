@@ -6,12 +6,16 @@ import os
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flipflow.analyses.assessment import Assessment
 from flipflow.errors import MissingExtra, StoreError
 from flipflow.figures.plotly import START, element, library
 from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
+
+if TYPE_CHECKING:
+    import jinja2
 
 TEMPLATES = "templates"
 
@@ -84,26 +88,40 @@ def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
     MissingExtra
         When jinja2 is not installed.
     """
+    return (
+        require_templates()
+        .get_template("report.html")
+        .render(
+            blocks=blocks,
+            title=title,
+            kind=kind,
+            footer=footer,
+            style=_template("report.css"),
+            library=library(),
+            start=START,
+            element=element,
+        )
+    )
+
+
+def require_templates() -> jinja2.Environment:
+    """What fills the templates; called before long work, so that it is not lost for want of it.
+
+    Raises
+    ------
+    MissingExtra
+        When jinja2 is not installed.
+    """
     try:
         import jinja2  # noqa: PLC0415  an extra
     except ImportError as error:
         raise MissingExtra("Reports need jinja2: pip install 'flipflow[report]'.") from error
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
-    )
-    return environment.get_template("report.html").render(
-        blocks=blocks,
-        title=title,
-        kind=kind,
-        footer=footer,
-        style=_template("report.css"),
-        library=library(),
-        start=START,
-        element=element,
     )
 
 

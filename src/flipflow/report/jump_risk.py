@@ -42,6 +42,21 @@ def risk_words(risk: JumpRisk) -> list[str]:
     return words
 
 
+def moment_words(risk: JumpRisk) -> str:
+    """When the least blow and the least lump do it, for a reader who knows their sizes."""
+    words = ["The working motion is the one reached from below."]
+    if blow := risk.worst_impulse:
+        words.append(
+            f"The worst moment for the {blow.frame} frame is {_degrees(blow.phase)} of the "
+            f"unbalance, for a blow along the surface towards {'+x' if blow.impulse > 0 else '-x'}."
+        )
+    if lump := risk.worst_lump:
+        words.append(
+            f"The lump lands at {_degrees(lump.phase)} and leaves with the feed within the turn."
+        )
+    return " ".join([*words, *risk.notes])
+
+
 def _degrees(phase: float) -> str:
     return f"{math.degrees(phase):.0f} deg"
 

@@ -8,6 +8,7 @@ from flipflow.analyses.quantities import QUANTITIES
 from flipflow.io.units import in_unit
 
 NOTHING = "-"
+LEAST_KILO = 100.0  # N or W; what is less is shown without kilo
 
 
 def number(value: float) -> str:
@@ -20,10 +21,17 @@ def number(value: float) -> str:
     return text if "e" in text else text.rstrip(".")
 
 
+def four_digits(value: float) -> str:
+    """Four significant digits, zeros at the end too, so that a column of numbers is even."""
+    return f"{value:.0f}" if abs(value) >= 999.95 else f"{value:#.4g}"
+
+
 def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool = True) -> str:
     """An SI value in the unit to show."""
-    if value is None:
+    if value is None or math.isnan(value):
         return NOTHING
+    if with_unit and shown_unit == f"k{unit}" and 0.0 < abs(value) < LEAST_KILO:
+        shown_unit = unit
     text = number(in_unit(value, shown_unit, unit)) if math.isfinite(value) else number(value)
     return f"{text} {shown_unit}".strip() if with_unit else text
 
@@ -38,7 +46,8 @@ def named(name: str, value: float | None, *, with_unit: bool = True) -> str:
 
 def rpm(omega: float) -> str:
     """A speed in rpm, four significant digits."""
-    return f"{in_unit(omega, 'rpm', 'rad/s'):.4g}"
+    value = in_unit(omega, "rpm", "rad/s")
+    return f"{value:.0f}" if value >= 999.95 else f"{value:.4g}"
 
 
 def speed(omega: float) -> str:

@@ -46,13 +46,13 @@ def figures_of_indices(result: Sensitivity) -> Iterator[Block]:
     yield FigureBlock(sensitivity_figure(result))
 
 
-@section(Assessment, Part.DETAILS, 80)
+@section(Assessment, Part.DETAILS, 65)
 def tornado(assessment: Assessment) -> Iterator[Block]:
     """What moves the amplitude most, one value of the empty machine at a time."""
     found = assessment.tornado
     if found is None or not np.isfinite(found.nominal):
         return
-    yield Heading("What moves the amplitude", 1)
+    yield Heading("What moves the amplitude", 1, new_page=False)
     yield Text(
         "The relative amplitude of the empty machine at working speed when one value alone is 5 % "
         "lower or higher; the longest bar is the value to make and keep most exactly."

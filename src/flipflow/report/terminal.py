@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Mapping
 from functools import singledispatch
 from typing import TYPE_CHECKING
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 # Names of the machine file that no column has room for; they break after their section.
 LONG_WORD = re.compile(r"\S{15,}")
 WITHIN = re.compile(r"\.(?=\w)")
+# A number and the unit behind it belong on one line.
+BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|deg|g|Hz|k?[NWJ]|kg m/s|k?g|mm|rad/s|rpm|s)(?![\w/]))")
+HARD_BLANK = "\N{NO-BREAK SPACE}"
 STYLES = {
     "pass": "green",
     "attention": "bold yellow",
@@ -43,6 +47,13 @@ def summary(result: object, console: Console, files: Mapping[str, str] | None = 
         _show(Values(tuple(files.items())), console)
 
 
+def say(console: Console, text: str, style: str = "") -> None:
+    """Print a sentence, broken between words but not between a number and its unit."""
+    tied = BEFORE_UNIT.sub(HARD_BLANK, text)
+    lines = textwrap.wrap(tied, console.width, break_long_words=False, break_on_hyphens=False)
+    console.print("\n".join(lines).replace(HARD_BLANK, " "), style=style or None)
+
+
 @singledispatch
 def _show(block: Block, console: Console) -> None:
     """Blocks that a terminal cannot show are left out."""
@@ -50,17 +61,17 @@ def _show(block: Block, console: Console) -> None:
 
 @_show.register(Verdict)
 def _(block: Verdict, console: Console) -> None:
-    console.print(block.text, style=STYLES[block.state] if block.state != "not checked" else "bold")
+    say(console, block.text, STYLES[block.state] if block.state != "not checked" else "bold")
 
 
 @_show.register(Text)
 def _(block: Text, console: Console) -> None:
-    console.print(f"{block.lead} {block.text}".strip())
+    say(console, f"{block.lead} {block.text}".strip())
 
 
 @_show.register(Note)
 def _(block: Note, console: Console) -> None:
-    console.print(f"Note: {block.text}", style="yellow")
+    say(console, f"Note: {block.text}", "yellow")
 
 
 @_show.register(Values)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from flipflow.analyses.assessment import Assessment
 from flipflow.analyses.jump_risk import JumpRisk
 from flipflow.analyses.transients import Transients
-from flipflow.figures.transient import run_up_figure
+from flipflow.figures.transient import run_ups_figure
 from flipflow.report.blocks import Block, Column, FigureBlock, Heading, Note, Table, Text, cells
-from flipflow.report.jump_risk import millimetres, risk_words
+from flipflow.report.jump_risk import millimetres, moment_words
 from flipflow.report.numbers import NOTHING, number, quantity, rpm
 from flipflow.report.registry import Part, section
 from flipflow.results.run_up import RunUp
@@ -20,6 +20,7 @@ PEAKS = (
     ("foundation_force", "Force on the foundation", "kN", "N"),
     ("stop_force", "Force on the stops of a side", "kN", "N"),
 )
+ASSUMED = "Assumed: "
 CANNOT_JUMP = "cannot jump: no other motion was found"
 NO_SPEED = "not checked, for the machine file gives no working speed."
 
@@ -27,7 +28,7 @@ NO_SPEED = "not checked, for the machine file gives no working speed."
 @section(Assessment, Part.DETAILS, 70, brief=True)
 def start_and_stop(assessment: Assessment) -> Iterator[Block]:
     """Start, coast-down and jump risk in a line each."""
-    yield Heading("Start, stop and disturbances", 1)
+    yield Heading("Start, stop and disturbances", 1, new_page=False)
     found = assessment.transients
     if found is None:
         yield Text(NO_SPEED, "Start, stop and disturbances:")
@@ -45,11 +46,16 @@ def start_and_stop_details(assessment: Assessment) -> Iterator[Block]:
         return
     runs = [run for run in (found.start, found.coast_down) if run is not None]
     if found.jump is not None and found.jump.others:
-        yield Text(" ".join(risk_words(found.jump)))
-    if runs:
-        yield _peaks_table(found)
-    yield from (Note(note) for note in dict.fromkeys(n for run in runs for n in run.notes))
-    yield from (FigureBlock(run_up_figure(run)) for run in runs)
+        yield Text(moment_words(found.jump))
+    if not runs:
+        return
+    yield _peaks_table(found)
+    notes = dict.fromkeys(note for run in runs for note in run.notes)
+    yield from (Note(note) for note in notes if not note.startswith(ASSUMED))
+    assumed = [note.removeprefix(ASSUMED).rstrip(".") for note in notes if note.startswith(ASSUMED)]
+    if assumed:
+        yield Note(f"{ASSUMED}{'; '.join(assumed)}.")
+    yield FigureBlock(run_ups_figure(runs))
 
 
 def start_words(found: Transients) -> str:

@@ -136,6 +136,7 @@ def sweep_document(sweep: Sweep) -> Document:
         "jumps": [dataclasses.asdict(jump) for jump in sweep.jumps],
         "max_periods": sweep.max_periods,
         "most_turns": sweep.most_turns,
+        "complete": sweep.complete,
         "states": [plain(row.recent) for row in sweep.rows],
         "points": [None if row.point is None else _point_document(row.point) for row in sweep.rows],
     }

@@ -54,6 +54,8 @@ class Sweep:
         The solver of motions of one forcing period.
     version
         Version of flipflow.
+    complete
+        Whether every frequency was passed; a cancelled sweep keeps those it has finished.
     """
 
     machine: Machine
@@ -64,6 +66,7 @@ class Sweep:
     most_turns: int
     solver: ExactSolver
     version: str
+    complete: bool = True
 
     def __repr__(self) -> str:
         ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s"

@@ -1,0 +1,125 @@
+"""Where a command writes its files: seen to before anything is computed, said at the end."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol, Self
+
+from flipflow.cli.output import COLUMNS, TERMINAL, check_json, console, write_json
+from flipflow.errors import Cancelled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+CLOCK = 0.05  # s by which the clock of files may be late
+STOPPED, NOTHING = "Stopped by the user", "nothing is written"
+
+
+class Picture(Protocol):
+    """What writes itself to a file, as a figure does."""
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write to a file, in the format its ending names."""
+
+
+class Destination:
+    """A folder for figures and data, and a file or the terminal for a JSON document.
+
+    Made before anything is computed, it refuses what cannot be written. In a ``with`` block
+    Ctrl-C ends the command by a sentence that says what is written.
+
+    Parameters
+    ----------
+    folder
+        What ``--output`` names; None where nothing but the terminal is written to.
+    json
+        What ``--json`` names; ``-`` is the terminal, which then shows nothing else.
+    """
+
+    def __init__(self, folder: Path | None, json: str | None) -> None:
+        if folder is not None:
+            from flipflow.io.files import prepare_folder  # noqa: PLC0415  keeps --help quick
+
+            prepare_folder(folder)
+        if json is not None:
+            check_json(json)
+        self.folder, self.json = folder, json
+        self._begun = time.time()
+        self._names: list[str] = []
+        self._places: list[str] = []
+
+    def __enter__(self) -> Self:
+        """Begin the work that ends in this destination."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, _error: object, _trace: TracebackType | None
+    ) -> None:
+        """Turn Ctrl-C into the sentence that ends a stopped command."""
+        if kind is not None and issubclass(kind, KeyboardInterrupt):
+            raise self.stopped() from None
+
+    @property
+    def spoken(self) -> bool:
+        """Whether the terminal is for words; else it is for JSON alone."""
+        return self.json != TERMINAL
+
+    def picture(self, name: str, picture: Picture) -> None:
+        """Write a figure into the folder."""
+        picture.write(self.path(name))
+        self.wrote(name)
+
+    def data(self, name: str, document: Mapping[str, object]) -> None:
+        """Write a JSON document into the folder."""
+        write_json(document, str(self.path(name)))
+        self.wrote(name)
+
+    def document(self, document: Mapping[str, object]) -> None:
+        """Write the JSON document where ``--json`` asks for it."""
+        if self.json is not None:
+            write_json(document, self.json)
+            if self.spoken:
+                self._places.append(self.json)
+
+    def path(self, name: str) -> Path:
+        """Where a file of the folder stands."""
+        return Path(self.folder or "") / name
+
+    def wrote(self, *names: str) -> None:
+        """Note files of the folder that something else has written."""
+        self._names += names
+
+    def tell(self) -> None:
+        """Say in the terminal what is written where; nothing where nothing is."""
+        for line in self._lines() if self.spoken else ():
+            # A path stays on one line, so that it can be copied.
+            console().print(line, soft_wrap=True)
+
+    def stopped(self, *, kept: bool = False) -> Cancelled:
+        """The error that ends a command after Ctrl-C; ``kept``: what was finished is shown."""
+        places = [str(self.folder)] * self._touched() + self._places
+        if places:
+            return Cancelled(f"{STOPPED}; what was finished is in {' and '.join(places)}.")
+        return Cancelled(f"{STOPPED}; {'what was finished is shown' if kept else NOTHING}.")
+
+    def _touched(self) -> bool:
+        """Whether a file of the folder was written since the command began."""
+        files = () if self.folder is None else self.folder.iterdir()
+        return any(file.stat().st_mtime > self._begun - CLOCK for file in files)
+
+    def _lines(self) -> Iterable[str]:
+        if self._names:
+            head, names = f"Written to {self.folder}:", ", ".join(self._names)
+            if len(head) + 1 + len(names) <= COLUMNS:
+                yield f"{head} {names}"
+            else:
+                yield head
+                yield from textwrap.wrap(
+                    names, COLUMNS, initial_indent="  ", subsequent_indent="  "
+                )
+        yield from (f"Written to {place}" for place in self._places)

@@ -1,0 +1,58 @@
+"""How kernels that only kernels call are compiled: to code that their callers take in, no further.
+
+numba by itself optimises every function with all that it calls, and makes machine code of it, so
+that what lies deep is done again at each level above: two thirds of LLVM's time. Only entries are
+run by themselves; the rest is optimised once, within them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class PartLibrary(JITCodeLibrary):
+    """A kernel with those it calls, neither optimised together nor made machine code of."""
+
+    def finalize(self) -> None:
+        """Take in what the kernel calls; nothing can be added any more."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001  as numba's own does
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(NativeLowering):
+    """numba's lowering into a :class:`PartLibrary`."""
+
+    _name = "flipflow_part_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower the function and let callers find it."""
+        state.library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        # Callers find the code by a built-in function of its own; called from Python this one,
+        # the look-up in an empty dictionary, raises, whatever the arguments.
+        name = dict[Any, Any]().__getitem__
+        state.targetctx.insert_user_function(name, state.cr.fndesc, [state.library])
+        state.cr = state.cr._replace(cfunc=name)
+        return True
+
+
+class PartCompiler(CompilerBase):
+    """numba's passes with that lowering."""
+
+    def define_pipelines(self) -> list[Any]:
+        """The one pipeline."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (PartLowering if each is NativeLowering else each, why) for each, why in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
