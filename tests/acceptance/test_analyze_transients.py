@@ -9,7 +9,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.analyses.assessment import assess
-from flipflow.io.results import assessment_document
+from flipflow.io.assessment import assessment_document
 from flipflow.report.blocks import FigureBlock, Heading, Text
 from flipflow.report.registry import blocks_of
 

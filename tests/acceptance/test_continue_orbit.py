@@ -259,9 +259,10 @@ def test_figures(tmp_path, exact, leaning, subharmonic) -> None:
     curve = ff.continue_orbit(leaning[0].orbits_at(57.7)[0], "clearance", (1.5e-3, 2.5e-3))
     ff.figure(curve).write(tmp_path / "clearance.svg")
     ff.save(curve, tmp_path / "clearance.json")
-    document = ff.open_result(tmp_path / "clearance.json")
-    assert document["schema"] == "flipflow/field-branch/1"
-    assert document["field"] == "clearance"
+    again = ff.open_result(tmp_path / "clearance.json")
+    assert again.field == "clearance"
+    np.testing.assert_array_equal(again.values, curve.values)
+    assert again.stability.tolist() == curve.stability.tolist()
 
 
 def test_bad_input(exact, leaning, chain) -> None:

@@ -167,9 +167,28 @@ def test_history_reads_like_an_orbit(start):
     assert history.normal_displacement.shape == history.t.shape
 
 
+@pytest.mark.parametrize(
+    ("friction", "duration", "outcome"), [(0.0, 0.05, "unfinished"), (40.0, 5.0, "not started")]
+)
+def test_a_shaft_that_had_no_time_is_not_one_that_is_stuck(screen, friction, duration, outcome):
+    motor = ff.Motor(synchronous_speed=157.0, rated_power=5500.0)
+    drive = ff.Drive(inertia=0.9, motor=motor, friction=friction)
+    run = ff.start_up(screen, drive, duration=duration)
+    assert (float(drive.torque(0.0)) < friction) == (outcome == "not started")
+    assert run.outcome == outcome
+    assert run.final_speed < 0.02 * run.speed
+
+
+@pytest.mark.parametrize("drive", [3.0, "5.5 kW"])
+def test_what_is_no_drive_is_refused(screen, drive):
+    for call in (ff.start_up, lambda s, d: ff.coast_down(s, WORKING, d)):
+        with pytest.raises(InputError, match="drive = "):
+            call(screen, drive)
+
+
 @pytest.mark.parametrize("change", [
     {"speed": -1.0}, {"speed": math.inf}, {"duration": 0.0}, {"duration": math.nan},
-    {"duration": 1e9},
+    {"duration": 1e9}, {"speed": "fast"}, {"duration": "long"}, {"method": 3},
 ])  # fmt: skip
 def test_bad_arguments(screen, change):
     with pytest.raises(InputError, match=next(iter(change))):
@@ -179,9 +198,12 @@ def test_bad_arguments(screen, change):
 def test_figure_and_file(start, tmp_path):
     assert len(ff.figure(start).panels) == 3
     ff.save(start, tmp_path / "start.json")
-    document = ff.open_result(tmp_path / "start.json")
+    document = json.loads((tmp_path / "start.json").read_text())
     assert document["schema"] == "flipflow/run-up/1"
     assert document["outcome"] == "reached"
+    again = ff.open_result(tmp_path / "start.json")
+    assert again.verdict == start.verdict
+    np.testing.assert_array_equal(again.history.x, start.history.x)
 
 
 def run(monkeypatch, capsys, *words):

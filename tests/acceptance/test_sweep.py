@@ -126,7 +126,7 @@ def test_bad_glides_are_refused(screen, omega, rate, field) -> None:
         ff.ramp(screen, omega, rate)
 
 
-def test_a_cancelled_sweep_keeps_the_speeds_it_has_passed(screen):
+def test_a_cancelled_sweep_keeps_the_speeds_it_has_passed(screen, tmp_path):
     def stop(_sentence, share):
         if share > 0.5:
             raise Cancelled("stopped")
@@ -135,6 +135,10 @@ def test_a_cancelled_sweep_keeps_the_speeds_it_has_passed(screen):
     found = ff.sweep(screen, omega, monitor=stop)
     assert not found.complete
     np.testing.assert_array_equal(found.omega, omega[:3])
+    ff.save(found, tmp_path / "sweep.json")
+    again = ff.open_result(tmp_path / "sweep.json")
+    assert not again.complete
+    np.testing.assert_array_equal(again.omega, omega[:3])
     whole = ff.sweep(screen, omega)
     assert whole.complete
     np.testing.assert_array_equal(found.amplitude("main"), whole.amplitude("main")[:3])

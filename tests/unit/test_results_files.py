@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
 import numpy as np
 import pytest
+import xarray
 
 import flipflow as ff
-from flipflow.errors import InputError, StoreError
+from flipflow.analyses.frequency_response import described
+from flipflow.errors import IncompleteError, InputError, StoreError
+from flipflow.io.response import write_response
+from flipflow.kernels import status
+from flipflow.methods.solver import Traced
 
 
 @pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(3)], ids=repr)
@@ -56,3 +62,38 @@ def test_what_cannot_be_opened_says_why(tmp_path):
         ff.open_result(tmp_path / "other.json")
     with pytest.raises(InputError, match=r"written as \.json"):
         ff.save(ff.load_project("ffs0827"), tmp_path / "x.nc")
+
+
+@pytest.mark.parametrize("ending", ["json", "nc", "csv"])
+def test_a_branch_that_could_not_be_started_is_saved(tmp_path, ending):
+    branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 160.0))
+    record = branch.solver.new_branch(1)
+    nothing = Traced.recorded(record, 0, status.NO_CONVERGENCE, branch.traced.course)
+    empty = described(branch.machine, branch.method, branch.solver, nothing)
+    with pytest.raises(IncompleteError, match=r"no points\. No periodic motion"):
+        empty.orbits_at(155.0)
+    ff.save(empty, tmp_path / f"branch.{ending}")
+    if ending == "json":
+        again = ff.open_result(tmp_path / "branch.json")
+        assert again.status is empty.status
+        assert again.omega.size == 0
+
+
+def test_load_cases_with_foreign_letters_are_written(tmp_path):
+    """NetCDF holds the name of a case as UTF-8."""
+    name = "na\u00df, 20 \u00b0C"
+    project = ff.load_project("ffs0827")
+    case = dataclasses.replace(project.load_cases[0], name=name)
+    changed = dataclasses.replace(project, load_cases=(case,), speed=None)
+    write_response(ff.assess(changed, omega=(85.0, 90.0)), tmp_path)
+    with xarray.open_dataset(tmp_path / "response.nc") as table:
+        assert table["case"].flag_meanings == f"0: {name}"
+    assert name in (tmp_path / "response.csv").read_text(encoding="utf-8")
+
+
+def test_a_file_that_cannot_be_put_in_place_leaves_nothing_behind(tmp_path):
+    (tmp_path / "taken.json").mkdir()
+    branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 151.0))
+    with pytest.raises(InputError, match="cannot be written"):
+        ff.save(branch, tmp_path / "taken.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.json"]

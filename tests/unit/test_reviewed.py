@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
 
 import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.errors import InputError
+from flipflow.analyses.assessment import input_hash
+from flipflow.errors import IncompleteError, InputError
+from flipflow.io.derived import derive
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +45,34 @@ def test_springs_are_counted_as_given():
     np.testing.assert_allclose(orbit.stop_force(0), 0.5 * x, atol=1e-12)
     beyond = np.where(np.abs(x) > 0.5, x - np.sign(x) * 0.5, 0.0)
     np.testing.assert_allclose(orbit.stop_force(1), 3.0 * beyond, atol=1e-9)
-    with pytest.raises(InputError, match="2 springs"):
-        orbit.stop_force(2)
+    touched = np.abs(x) > 0.5
+    assert {touch.spring for touch in orbit.contact_intervals} == {1}
+    assert orbit.contact_share(0) == 1.0
+    assert orbit.contact_share(1) == pytest.approx(touched[:-1].mean(), abs=0.01)
+    square = orbit.velocity(0) ** 2
+    assert orbit.mean_square_velocity(0, 0) == pytest.approx(square[:-1].mean(), rel=1e-6)
+    part = np.where(touched, square, 0.0)[:-1].mean()
+    assert orbit.mean_square_velocity(0, 1) == pytest.approx(part, rel=0.02)
+    for asked in (
+        orbit.stop_force,
+        orbit.contact_share,
+        lambda k: orbit.mean_square_velocity(0, k),
+    ):
+        with pytest.raises(InputError, match="2 springs"):
+            asked(2)
+
+
+def test_a_file_holds_the_force_of_every_spring(tmp_path):
+    """A spring without gap stands in the file of a motion, too."""
+    springs = [ff.ClearanceSpring([1.0], 0.5, 0.0, 0.0), ff.ClearanceSpring([1.0], 3.0, 0.0, 0.5)]
+    system = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], springs, ff.HarmonicForce([1.0]))
+    orbit = ff.frequency_response(system, (0.1, 1.0)).orbits_at(0.5)[0]
+    ff.save(orbit, tmp_path / "orbit.json")
+    document = json.loads((tmp_path / "orbit.json").read_text())
+    assert len(document["stop_force"]) == 2
+    np.testing.assert_allclose(document["stop_force"][1], orbit.stop_force(1))
+    assert {touch["spring"] for touch in document["contacts"]} == {1}
+    assert ff.figure(orbit).panels
 
 
 def test_branch_that_starts_between_the_folds_comes_from_below(screen):
@@ -97,3 +127,89 @@ def test_high_orders_of_unequal_gaps_fit_the_memory(screen):
     lean = screen.replace(clearance=6e-3, clearance_minus=math.inf)
     branch = ff.frequency_response(lean, (100.0, 101.0), ff.HarmonicBalance(120, points=3))
     assert branch.complete
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: ff.loading(s, ff.Load(), omega=(5.0, 20.0)), "omega = .*operating region is"),
+        (lambda s: ff.loading(s, ff.Load(), omega=(205.0, 230.0)), "omega = .*operating region is"),
+        (lambda s: ff.loading(s, 1.1), "load = .*ff.Load"),
+        (lambda s: ff.response_family(s, {"clearance": ["a"]}), "clearance.*numbers"),
+        (lambda s: ff.response_family(s, [1.0]), "vary = .*one field"),
+    ],
+)
+def test_loading_and_family_refuse_with_a_sentence(screen, call, words):
+    """Speeds beside the operating region once ended in an error of numpy."""
+    with pytest.raises(InputError, match=words):
+        call(screen)
+
+
+def test_small_folds_at_first_contact_are_not_those_of_the_main_resonance(screen):
+    """e = 1 mm: two folds 0.07 rad/s apart where contact begins; the region goes on to the peak."""
+    small = screen.replace(clearance=1e-3)
+    region = ff.operating_region(small)
+    assert len(region.branch.folds) == 2
+    assert region.omega_lb is None
+    assert region.omega_ub is None
+    assert region.lower == region.omega_cs
+    assert region.upper == region.branch.peak("relative").omega
+    assert np.isfinite(
+        ff.loading(small, ff.Load(stiffness_factor=1.1)).with_stop.region.change
+    ).all()
+
+
+def test_a_machine_without_an_operating_region_says_so(screen):
+    """So much damping that both frames swing alike only above the antiresonance."""
+    bare = screen.replace(clearance=math.inf, shear_damping=35e3)
+    with pytest.raises(IncompleteError, match="no operating region"):
+        ff.loading(bare, ff.Load(stiffness_factor=1.1))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: ff.simulate(s, [100.0, 120.0]), "omega = .*finite frequency"),
+        (lambda s: ff.poincare_section(s, [100.0, 120.0]), "omega = .*finite frequency"),
+        (lambda s: ff.poincare_section(s, 100.0, skip=-1), "skip = -1: .*from 0"),
+        (lambda s: ff.poincare_section(s, 100.0, skip="a"), "skip = 'a': .*from 0"),
+        (lambda s: ff.sweep(s, [100.0], initial=["x"] * 4), "initial = .*4 finite numbers"),
+        (lambda s: ff.periodic_orbits(s, 100.0, rng="a"), "rng = 'a'"),
+        (lambda s: ff.jump_risk(s, 100.0, rng=-1), "rng = -1"),
+        (lambda s: ff.basins(s, 100.0, {"relative": [0.0]}, most_turns="a"), "most_turns = 'a'"),
+        (lambda s: ff.ramp(s, 100.0, 1.0), "omega = 100.0: .*two different"),
+        (lambda s: ff.ramp(s, (100.0, 100.0), 1.0), "omega = .*two different"),
+        (lambda s: ff.ramp(s, (100.0, 110.0), "fast"), "rate = 'fast'"),
+        (lambda s: ff.linear_response(s, "fast"), "omega = 'fast'"),
+        (lambda s: ff.operating_region(s, limits=3), "limits = 3"),
+        (lambda s: ff.operating_region(s, load_cases=ff.Load()), "load_cases = .*a list"),
+        (ff.assess, "project = 'FlipFlowScreen'"),
+    ],
+)
+def test_bad_arguments_are_refused_with_what_was_given(screen, call, words):
+    """The first of several speeds was once taken for all of them."""
+    with pytest.raises(InputError, match=words):
+        call(screen)
+
+
+def test_a_stop_without_gap_counts_where_both_frames_swing_alike(screen):
+    """The closed forms of w_ea, w_ar, w01 and w02 hold a bonded stop wherever they stand."""
+    bonded = screen.replace(clearance=0.0, isolation_damping=1.0, shear_damping=1.0, stop_damping=0)
+    response = ff.linear_response(bonded, 100.0)
+    at_ea = ff.linear_response(bonded, response.omega_ea)
+    assert at_ea.amplitude("main") == pytest.approx(at_ea.amplitude("relative"), rel=1e-6)
+    at_ar = ff.linear_response(bonded, response.omega_ar)
+    assert at_ar.amplitude("main") < 1e-3 * at_ar.amplitude("relative")
+    region = ff.operating_region(bonded)
+    derived = derive(bonded)
+    assert (region.omega_ea, region.omega_ar) == (response.omega_ea, response.omega_ar)
+    assert (derived.omega_ea, derived.omega_ar) == (response.omega_ea, response.omega_ar)
+    np.testing.assert_allclose(derived.natural_frequencies, response.natural_frequencies)
+
+
+def test_the_digest_of_the_input_holds_the_drive():
+    """The drive decides how the machine starts, which the assessment tells."""
+    project = ff.load_project("ffs0827")
+    driven = dataclasses.replace(project, drive=ff.Drive(inertia=1.0))
+    stiffer = dataclasses.replace(project, drive=ff.Drive(inertia=2.0))
+    assert len({input_hash(one) for one in (project, driven, stiffer)}) == 3

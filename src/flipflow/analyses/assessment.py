@@ -11,17 +11,16 @@ from dataclasses import dataclass
 
 from flipflow import __version__
 from flipflow.analyses.feasible import limit_bounds, missing_for, missing_words, working_motion
+from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import NormalMotion
-from flipflow.analyses.operating_region import (
-    Monitor,
-    OperatingRegion,
-    analysed_range,
-    operating_region,
-)
+from flipflow.analyses.operating_region import OperatingRegion, analysed_range, operating_region
 from flipflow.analyses.quantities import QUANTITIES, Working
 from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.analyses.transients import Transients, transients
+from flipflow.errors import InputError
 from flipflow.methods.options import Method, PiecewiseExact
+from flipflow.model.constants import GRAVITY, RPM
+from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -32,10 +31,6 @@ from flipflow.results.sensitivity import OneAtATime
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
 CLOSE = 0.05
 TORNADO_SHARE = 0.05
-TORNADO_FIELDS = (
-    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
-    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
-)  # fmt: skip
 NO_LIMIT = (-math.inf, math.inf)
 
 
@@ -161,6 +156,10 @@ class Assessment:
     version: str
     input_hash: str
 
+    def __repr__(self) -> str:
+        name = self.project.document.name or self.project.name
+        return f"Assessment({name}: {self.verdict})"
+
 
 def assess(
     project: Project,
@@ -179,7 +178,15 @@ def assess(
         Called with a sentence and the share done, 0 to 1.
     omega, method
         As for :func:`~flipflow.operating_region`.
+
+    Raises
+    ------
+    InputError
+        For anything but a project.
     """
+    if not isinstance(project, Project):
+        remedy = "give a project, such as ff.load_project('ffs0827')"
+        raise InputError("project", type(project).__name__, remedy)
     region = operating_region(
         project.screen,
         project.limits,
@@ -214,7 +221,7 @@ def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:
 
     5 % is the spread of Table 1 of the paper; what is zero, infinite or not given does not vary.
     """
-    present = {name: getattr(screen, name) for name in TORNADO_FIELDS}
+    present = {name: getattr(screen, name) or 0.0 for name in MOTION_FIELDS}
     vary = {
         name: ((1.0 - TORNADO_SHARE) * value, (1.0 + TORNADO_SHARE) * value)
         for name, value in present.items()
@@ -303,7 +310,7 @@ def verdict(
     """One sentence for the top of the report."""
     if omega is None:
         return "No operating speed is given: the allowed speed range stands below."
-    speed = f"{omega * 30.0 / math.pi:.4g} rpm"
+    speed = f"{omega * RPM:.4g} rpm"
     unknown = [case.name for case in cases if case.orbit is None]
     if unknown:
         where = "; ".join(unknown) if len(unknown) < len(cases) else "any load case"
@@ -337,7 +344,7 @@ def _outside(omega: float, region: OperatingRegion) -> str:
     below = omega < region.lower
     end, words = (region.lower, region.ends[0]) if below else (region.upper, region.ends[1])
     side = "below" if below else "above"
-    return f", but {side} the operating region: {words} at {end * 30.0 / math.pi:.4g} rpm"
+    return f", but {side} the operating region: {words} at {end * RPM:.4g} rpm"
 
 
 def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
@@ -354,8 +361,8 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
 
 def _against(row: LimitRow) -> str:
     """Words such as: relative amplitude, full, 5.12 mm of 5 mm least."""
-    scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / 9.80665}
-    factor = scale.get(row.shown_unit, 30.0 / math.pi if row.shown_unit == "rpm" else 1.0)
+    scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / GRAVITY, "rpm": RPM}
+    factor = scale.get(row.shown_unit, 1.0)
     low, high = row.limit
     worst = row.worst if row.worst is not None else math.nan
     at_low = relative_margin(worst, low, math.inf) <= relative_margin(worst, -math.inf, high)
@@ -372,6 +379,7 @@ def input_hash(project: Project) -> str:
         "limits": dataclasses.asdict(project.limits),
         "cases": [dataclasses.asdict(load) for load in project.load_cases],
         "speed": project.speed,
+        "drive": None if project.drive is None else dataclasses.asdict(project.drive),
         "version": __version__,
     }
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]

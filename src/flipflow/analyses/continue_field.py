@@ -32,6 +32,7 @@ from flipflow.methods.special import (
 )
 from flipflow.methods.stability import UNDETERMINED, determinant_plus, neimark_sacker
 from flipflow.methods.switching import image
+from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.results.branch import SpecialPoint
 from flipflow.results.field_branch import FieldBranch, FieldSpecialPoint
@@ -39,11 +40,6 @@ from flipflow.results.orbit import Orbit
 from flipflow.results.status import BranchStatus
 
 CUSP = "cusp"
-FIELDS = (
-    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
-    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
-    "clearance_minus",
-)  # fmt: skip
 
 
 def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float]) -> FieldBranch:
@@ -125,8 +121,8 @@ def _screen_and_value(orbit: Orbit, field: str) -> tuple[FlipFlowScreen, float]:
     if not isinstance(machine, FlipFlowScreen):
         remedy = "only a FlipFlowScreen has fields; a MechanicalSystem is followed over 'omega'"
         raise InputError("field", field, remedy)
-    if field not in FIELDS:
-        raise InputError("field", field, f"choose one of omega, {', '.join(FIELDS)}")
+    if field not in MOTION_FIELDS:
+        raise InputError("field", field, f"choose one of omega, {', '.join(MOTION_FIELDS)}")
     value = getattr(machine, field)
     if value is None or math.isinf(value):
         raise InputError(field, value, "give the machine a finite value of it first")

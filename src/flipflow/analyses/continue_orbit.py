@@ -11,12 +11,7 @@ from flipflow.errors import InputError, SampledContactWarning
 from flipflow.kernels import arclength
 from flipflow.methods.balance import BalanceSolver, SampledSolver
 from flipflow.methods.exact import ExactSolver
-from flipflow.methods.options import (
-    HarmonicBalance,
-    Method,
-    PiecewiseExact,
-    SampledHarmonicBalance,
-)
+from flipflow.methods.options import Method, PiecewiseExact
 from flipflow.methods.solver import STEP_SHARE, Point, Solver
 from flipflow.methods.special import DOUBLING, SYMMETRY
 from flipflow.methods.stability import UNDETERMINED
@@ -32,6 +27,7 @@ from flipflow.methods.switching import (
 )
 from flipflow.model.system import Machine
 from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.results.document import method_of
 from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
 
@@ -83,7 +79,7 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
         raise InputError("interval", interval, remedy)
     solver = solver_like(orbit, type(orbit.point.solver))
     u = orbit.unknowns if solver is orbit.point.solver else solver.unknowns_from(orbit.motion)
-    method = _method_of(solver)
+    method = method_of(solver)
     if isinstance(solver, SampledSolver):
         warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
     followed = follow_both_ways(solver, u, orbit.omega, _course(low, high, method))
@@ -167,14 +163,6 @@ def _exact_point(point: SpecialPoint) -> Point:
             "point", point, "no exact motion has such a point near; use PiecewiseExact"
         )
     return exact
-
-
-def _method_of(solver: Solver) -> Method:
-    if isinstance(solver, SampledSolver):
-        return SampledHarmonicBalance(solver.order, solver.samples, solver.sharpness)
-    if isinstance(solver, BalanceSolver):
-        return HarmonicBalance(solver.order)
-    return PiecewiseExact()
 
 
 def _course(low: float, high: float, method: Method) -> arclength.Course:

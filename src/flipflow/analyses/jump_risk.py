@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.analyses.arguments import is_number
 from flipflow.analyses.attractors import Attractors
 from flipflow.analyses.blows import Blows
 from flipflow.analyses.frequency_response import first_unknowns
-from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.monitor import Monitor, silent
 from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.settle import is_stable
@@ -180,7 +182,7 @@ def jump_risk(
         When no stable motion is reached from below.
     """
     _check_impulse(largest_impulse)
-    say = monitor or (lambda _sentence, _share: None)
+    say = monitor or silent
     say("motions", 0.0)
     omega = motion.omega if isinstance(motion, Orbit) else motion
     attractors = Attractors(machine, omega, rng, threads)
@@ -225,8 +227,7 @@ def jump_risk(
 def _check_impulse(largest: object) -> None:
     if largest is None:
         return
-    number = isinstance(largest, (int, float)) and not isinstance(largest, bool)
-    if not (number and 0.0 < largest <= MOST_IMPULSE):  # type: ignore[operator]
+    if not is_number(largest) or not 0.0 < cast("float", largest) <= MOST_IMPULSE:
         remedy = f"give an impulse above 0 and up to {MOST_IMPULSE:g} kg m/s"
         raise InputError("largest_impulse", largest, remedy)
 

@@ -38,6 +38,10 @@ class LinearResponse:
     system: MechanicalSystem
     omega: Real
 
+    def __repr__(self) -> str:
+        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        return f"LinearResponse({self.omega.size} frequencies, {ends})"
+
     @cached_property
     def complex_amplitudes(self) -> NDArray[np.complex128]:
         """X of x = Re(X exp(i omega t)) in m, (n, N)."""
@@ -54,7 +58,7 @@ class LinearResponse:
     @cached_property
     def natural_frequencies(self) -> Real:
         """Undamped natural frequencies in rad/s, rising, (N,): K v = w^2 M v."""
-        return np.sqrt(np.maximum(_modes(self.system)[0], 0.0))
+        return natural_frequencies(self.machine)
 
     @cached_property
     def shapes(self) -> Real:
@@ -112,7 +116,10 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     InputError
         For frequencies that are not finite or not above 0, and without any damping.
     """
-    frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    try:
+        frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give frequencies in rad/s, one or (n,)") from None
     if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies > 0.0)):
         raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
     system = system_of(machine).with_bonded()
@@ -121,19 +128,35 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
 
 
 def equal_amplitude_frequency(machine: Machine) -> float | None:
-    """w_ea = k2 / sqrt(2 m2 k2 - c2^2); None where damping rules it out (paper, 2.2)."""
+    """w_ea = k2 / sqrt(2 m2 k2 - c2^2) in rad/s; None where damping rules it out (paper, 2.2).
+
+    A stop without gap adds its stiffness and damping to k2 and c2.
+    """
     if not isinstance(machine, FlipFlowScreen):
         return None
-    k2, c2, m2 = machine.shear_stiffness, machine.shear_damping, machine.floating_mass
+    (k2, c2), m2 = _between_frames(machine), machine.floating_mass
     square = 2.0 * m2 * k2 - c2**2
     return k2 / math.sqrt(square) if square > 0.0 else None
 
 
 def antiresonance_frequency(machine: Machine) -> float | None:
-    """w_ar = sqrt(k2 / m2) (paper, 2.2)."""
+    """w_ar = sqrt(k2 / m2) in rad/s (paper, 2.2); k2 as of :func:`equal_amplitude_frequency`."""
     if not isinstance(machine, FlipFlowScreen):
         return None
-    return math.sqrt(machine.shear_stiffness / machine.floating_mass)
+    return math.sqrt(_between_frames(machine)[0] / machine.floating_mass)
+
+
+def _between_frames(screen: FlipFlowScreen) -> tuple[float, float]:
+    """Stiffness and damping between the frames as long as no gap closes."""
+    k2, c2 = screen.shear_stiffness, screen.shear_damping
+    if not screen.stop().bonded:
+        return k2, c2
+    return k2 + screen.stop_stiffness, c2 + screen.stop_damping
+
+
+def natural_frequencies(machine: Machine) -> Real:
+    """Undamped natural frequencies in rad/s without contact, rising, (N,): K v = w^2 M v."""
+    return np.sqrt(np.maximum(_modes(machine.system().with_bonded())[0], 0.0))
 
 
 def bonded_natural_frequencies(machine: Machine) -> Real:

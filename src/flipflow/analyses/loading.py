@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from flipflow.analyses.frequency_response import frequency_response
 from flipflow.analyses.operating_region import Landmarks, analysed_range, landmarks
-from flipflow.errors import InputError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.options import Method
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.results.branch import Branch
@@ -169,6 +169,10 @@ class Loading:
     with_stop: LoadedMachine | None
     without_stop: LoadedMachine
 
+    def __repr__(self) -> str:
+        stop = "without stop" if self.with_stop is None else "with and without stop"
+        return f"Loading({self.load.name or 'load'}, {stop})"
+
 
 def loading(
     screen: FlipFlowScreen,
@@ -197,12 +201,15 @@ def loading(
     Raises
     ------
     InputError
-        For anything but a screen, a bad interval, or a load that the screen has no data for.
+        For anything but a screen and a load, an interval beside the operating region, or a load
+        that the screen has no data for.
     IncompleteError
-        When no branch could be started.
+        When no branch could be started, none reaches the operating region, or there is none.
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
+    if not isinstance(load, Load):
+        raise InputError("load", load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
     bare = screen.replace(clearance=math.inf, clearance_minus=None)
     stopped = _compared(screen, load, omega, method) if screen.has_stop else None
     return Loading(screen, load, stopped, _compared(bare, load, omega, method))
@@ -220,6 +227,9 @@ def _compared(
     branches = [frequency_response(one, omega or wide, method) for one in (screen, heavy)]
     unloaded, loaded = branches
     marks, heavy_marks = landmarks(screen, unloaded), landmarks(heavy, loaded)
+    if omega is not None and not (omega[0] < marks.upper and marks.lower < omega[1]):
+        ends = f"{marks.lower:.6g} to {marks.upper:.6g} rad/s"
+        raise InputError("omega", omega, f"the operating region is {ends}; give speeds around it")
     late = None
     if heavy_marks.lower < marks.upper:
         late = _region(unloaded, loaded, (heavy_marks.lower, marks.upper), "loaded")
@@ -230,12 +240,22 @@ def _compared(
 def _region(
     unloaded: Branch, loaded: Branch, ends: tuple[float, float], start: Start
 ) -> RegionChange:
+    if not ends[0] < ends[1]:
+        words = f"it would begin at {ends[0]:.6g} and end at {ends[1]:.6g} rad/s"
+        raise IncompleteError(f"The machine has no operating region: {words}.")
     omega = np.linspace(*ends, SAMPLES)
     amplitudes = [
-        np.array([_amplitude(branch, float(w)) for w in omega]) for branch in (unloaded, loaded)
+        np.array([relative_from_below(branch, float(w)) for w in omega])
+        for branch in (unloaded, loaded)
     ]
     before, after = amplitudes
     size = np.abs(after - before)
+    if not np.isfinite(size).any():
+        why = " ".join(one.status.value for one in (unloaded, loaded) if not one.complete)
+        raise IncompleteError(
+            "No motion of both the empty and the loaded machine is known in the operating region, "
+            f"{ends[0]:.6g} to {ends[1]:.6g} rad/s. {why}".strip()
+        )
 
     def found(index: int, sign: float) -> Change:
         return _refined(unloaded, loaded, omega, size, index, sign)
@@ -250,7 +270,7 @@ def _refined(
     """The least (sign 1) or greatest (-1) change between the neighbours of a sample."""
 
     def at(w: float) -> Change:
-        return Change(w, _amplitude(unloaded, w), _amplitude(loaded, w))
+        return Change(w, relative_from_below(unloaded, w), relative_from_below(loaded, w))
 
     low, high = omega[max(index - 1, 0)], omega[min(index + 1, omega.size - 1)]
     best = minimize_scalar(
@@ -263,6 +283,7 @@ def _refined(
     return between if inside else sampled
 
 
-def _amplitude(branch: Branch, omega: float) -> float:
+def relative_from_below(branch: Branch, omega: float) -> float:
+    """Relative amplitude in m at a speed in rad/s as it rises slowly; NaN without a motion."""
     orbit = branch.orbit_from_below(omega)
     return math.nan if orbit is None else orbit.amplitude("relative")

@@ -15,16 +15,17 @@ from flipflow.analyses.linear import (
     equal_amplitude_frequency,
     linear_response,
 )
-from flipflow.analyses.monitor import Monitor as Monitor  # noqa: PLC0414  assessment reads it here
+from flipflow.analyses.monitor import Monitor, silent
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import InputError
 from flipflow.methods.options import Method
 from flipflow.methods.special import CONTACT_BEGIN
 from flipflow.model.limits import Limits
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.results.branch import Branch
+from flipflow.results.branch import Branch, SpecialPoint
 
 LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
+MAIN_SHARE = 0.25  # of the peak: folds of smaller motions are not those of the main resonance
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
 JUMP_WORDS = "jump when the speed falls (w_lb)"
 ANTIRESONANCE_WORDS = "antiresonance of the main frame (w_ar)"
@@ -78,6 +79,11 @@ class OperatingRegion:
     cases: tuple[CaseWindow, ...]
     branches: tuple[Branch, ...]
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        ends = f"{self.lower:.6g} to {self.upper:.6g} rad/s"
+        allowed = f"{len(self.feasible)} allowed intervals over {len(self.cases)} load cases"
+        return f"OperatingRegion({ends}, {allowed})"
 
     @property
     def contact_speeds(self) -> Mapping[int, float]:
@@ -134,11 +140,16 @@ def operating_region(
     Raises
     ------
     InputError
-        For anything but a screen, whose frames the region speaks of, and for a bad interval.
+        For anything but a screen, whose frames the region speaks of, limits and loads, and for a
+        bad interval.
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
-    say = monitor or (lambda _sentence, _share: None)
+    if limits is not None and not isinstance(limits, Limits):
+        raise InputError("limits", limits, "give an ff.Limits, or None for no limits")
+    if isinstance(load_cases, Load) or not all(isinstance(load, Load) for load in load_cases):
+        raise InputError("load_cases", load_cases, "give a list of ff.Load, such as [ff.Load()]")
+    say = monitor or silent
     loads = tuple(load_cases) or (Load(name="empty"),)
     span = analysed_range(screen) if omega is None else check_interval(omega)
     say("empty machine", 0.0)
@@ -225,12 +236,11 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
     IncompleteError
         When the branch has no points.
     """
-    effective = _bonded(screen)
-    ea, ar = equal_amplitude_frequency(effective), antiresonance_frequency(effective)
+    ea, ar = equal_amplitude_frequency(screen), antiresonance_frequency(screen)
     peak = branch.peak("relative")
     begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.omega < peak.omega]
     cs = begins[-1] if begins else None
-    lb, ub = _main_folds(branch)
+    lb, ub = _main_folds(branch, peak)
     span = (float(branch.omega.min()), float(branch.omega.max()))
     touched = bool(np.any(branch.traced.signature != 0))
     upper = peak.omega if lb is None else lb
@@ -239,26 +249,22 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
     if touched:
         note = "Contact begins below the speeds analysed: the region starts with them."
         return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
-    reaches = screen.has_stop and effective is screen
-    notes = ("The stop is not reached at any speed analysed.",) if reaches else ()
+    unused = screen.has_stop and not screen.stop().bonded
+    notes = ("The stop is not reached at any speed analysed.",) if unused else ()
     return Landmarks(ea, ar, cs, lb, ub, ea or span[0], ar or span[1], notes)
 
 
-def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
-    """A screen without gap on either side has one stiffer shear spring."""
-    if not (screen.has_stop and screen.stop().bonded):
-        return screen
-    return screen.replace(
-        shear_stiffness=screen.shear_stiffness + screen.stop_stiffness,
-        shear_damping=screen.shear_damping + screen.stop_damping,
-    )
+def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
+    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next.
 
-
-def _main_folds(branch: Branch) -> tuple[float | None, float | None]:
-    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next."""
+    None where the motion turns back only far below the peak, as it may where contact begins.
+    """
     folds = branch.folds
     if len(folds) < 2:
         return None, None
-    first = max(range(len(folds) - 1), key=lambda k: folds[k].amplitude("relative"))
+    sizes = [fold.amplitude("relative") for fold in folds]
+    first = max(range(len(folds) - 1), key=lambda k: sizes[k])
+    if max(sizes[first], sizes[first + 1]) < MAIN_SHARE * peak.amplitude("relative"):
+        return None, None
     pair = (folds[first].omega, folds[first + 1].omega)
     return min(pair), max(pair)

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import OMEGA_MOST, first_unknowns
+from flipflow.analyses.arguments import checked_count, checked_generator, checked_speed
+from flipflow.analyses.frequency_response import first_unknowns
 from flipflow.analyses.monitor import Monitor
-from flipflow.analyses.sweep import check_count
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import IncompleteError
 from flipflow.methods.settle import Settling
 from flipflow.methods.solver import Point, Real
 from flipflow.methods.two_event import TwoEventProblem
@@ -64,9 +64,9 @@ def periodic_orbits(
     InputError
         For a frequency that is not finite or not above 0, or periods outside 1 to 6.
     """
-    check_count("max_periods", max_periods, MOST_PERIODS)
-    search = _Search(machine, _checked(omega), max_periods)
-    starts = _starts(search.settling, search.omega, np.random.default_rng(rng))
+    checked_count("max_periods", max_periods, MOST_PERIODS)
+    search = _Search(machine, checked_speed(omega), max_periods)
+    starts = _starts(search.settling, search.omega, checked_generator(rng))
     if TwoEventProblem.applies(search.settling.solver.builder):
         starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
     for k, start in enumerate(starts):
@@ -83,18 +83,10 @@ def attracting_orbits(
 
     Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
     """
-    search = _Search(machine, _checked(omega), 1)
-    for start in _starts(search.settling, search.omega, np.random.default_rng(rng)):
+    search = _Search(machine, checked_speed(omega), 1)
+    for start in _starts(search.settling, search.omega, checked_generator(rng)):
         search.try_settled(start)
     return tuple(orbit for orbit in search.orbits() if orbit.stable)
-
-
-def _checked(omega: object) -> float:
-    if isinstance(omega, bool) or not isinstance(omega, (int, float)) or not math.isfinite(omega):
-        raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    if not 0.0 < omega <= OMEGA_MOST:
-        raise InputError("omega", omega, f"give a frequency above 0 and up to {OMEGA_MOST:g} rad/s")
-    return float(omega)
 
 
 class _Search:

@@ -10,17 +10,18 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.normal import NormalMotion, normal_motion
+from flipflow.model.constants import GRAVITY
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.results.orbit import Orbit
 
 Real = NDArray[np.float64]
-GRAVITY = 9.80665
+Subject = TypeVar("Subject")
 
 
 class _States(NamedTuple):
@@ -74,8 +75,8 @@ class Working:
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """One number that says how a machine works.
+class Quantity(Generic[Subject]):
+    """One number that says how a machine works, read off one of its motions.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ class Quantity:
     sentence
         What it is.
     evaluate
-        Its value in SI for a :class:`Working`, None where data are missing.
+        Its value in SI for a :class:`Working`, None where data are missing or there is none.
     needs
         Fields of the screen without which it is None.
     """
@@ -97,7 +98,7 @@ class Quantity:
     unit: str
     shown_unit: str
     sentence: str
-    evaluate: Callable[[Working], float | None]
+    evaluate: Callable[[Subject], float | None]
     needs: tuple[str, ...] = ()
 
 
@@ -157,7 +158,7 @@ def _exciter_force(w: Working) -> float:
 
 _NORMAL = ("normal_stiffness", "normal_damping")
 
-_ALL = (
+_ALL: tuple[Quantity[Working], ...] = (
     Quantity(
         "relative_amplitude", "relative amplitude", "|x2|", "m", "mm",
         "Half the peak-to-peak motion between the frames; it tightens and slackens the panels.",
@@ -245,4 +246,4 @@ _ALL = (
     ),
 )  # fmt: skip
 
-QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _ALL}
+QUANTITIES: Mapping[str, Quantity[Working]] = {quantity.name: quantity for quantity in _ALL}

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import check_interval, frequency_response
+from flipflow.analyses.arguments import checked_positive, checked_speeds
+from flipflow.analyses.frequency_response import frequency_response
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
 from flipflow.analyses.transient import Start, normal_direction, run_history, swings
@@ -70,6 +71,11 @@ class Ramp:
     branch: Branch
     jumps: tuple[LateJump, ...]
 
+    def __repr__(self) -> str:
+        first, last = self.history.omega[0], self.history.omega[-1]
+        ends = f"{first:.6g} to {last:.6g} rad/s"
+        return f"Ramp({ends} at {self.rate:.4g} rad/s^2, {len(self.jumps)} jumps)"
+
     def amplitude(self, which: Coordinate) -> tuple[Real, Real]:
         """Speed in rad/s and amplitude in m at every turning point of a coordinate."""
         h = self.history
@@ -102,10 +108,13 @@ def ramp(
     InputError
         For speeds or a rate that make no sense.
     """
-    first, last = (float(one) for one in omega)
-    low, high = check_interval((min(first, last), max(first, last)))
-    if not (math.isfinite(rate) and rate > 0.0):
-        raise InputError("rate", rate, "give a finite rate above 0 rad/s^2")
+    speeds = checked_speeds(omega)
+    if speeds.size != 2 or speeds[0] == speeds[1]:
+        raise InputError(
+            "omega", omega, "give two different speeds in rad/s, the first and the last"
+        )
+    (first, last), (low, high) = speeds.tolist(), np.sort(speeds).tolist()
+    rate = checked_positive("rate", rate, "rad/s^2")
     branch = frequency_response(machine, ((1.0 - WIDER) * low, (1.0 + WIDER) * high))
     orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable]
     if not orbits:

@@ -1,123 +1,212 @@
-"""Branches and basins from their documents: nothing is computed again but what is asked for."""
+"""Results from their documents: nothing is computed again but what is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from flipflow.analyses.frequency_response import solver_for, word_of
-from flipflow.errors import StoreError
+from flipflow.analyses.frequency_response import solver_for
 from flipflow.kernels import arclength
 from flipflow.methods.exact import ExactSolver
+from flipflow.methods.field_path import FieldPoint
+from flipflow.methods.options import Method
+from flipflow.methods.settle import Settled
 from flipflow.methods.solver import Point, Solver, Traced
-from flipflow.model.system import Machine
-from flipflow.results.basins import Basins, GridAxis
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.model.vary import Distribution
 from flipflow.results.branch import Branch, SpecialPoint
-from flipflow.results.document import BASINS, BRANCH, machine_from, method_from
+from flipflow.results.codec import Codec, Form, array
+from flipflow.results.document import (
+    branch_document,
+    field_branch_document,
+    machine_document,
+    machine_from,
+    method_document,
+    method_from,
+    orbit_document,
+    screen_from,
+    sweep_document,
+    system_from,
+)
+from flipflow.results.field_branch import FieldBranch, FieldSpecialPoint
 from flipflow.results.orbit import Orbit
+from flipflow.results.sensitivity import (
+    Sensitivity,
+    distribution_document,
+    distribution_from,
+    sensitivity_document,
+    sensitivity_from,
+)
 from flipflow.results.status import BranchStatus
+from flipflow.results.sweep import Jump, Sweep
+
+Document = Mapping[str, Any]
+SolverOf = Callable[[bool, int], Solver]
 
 
-def branch_from(document: Mapping[str, Any]) -> Branch:
-    """The branch that :func:`flipflow.results.document.branch_document` wrote.
-
-    Raises
-    ------
-    StoreError
-        When the document is of another kind, or does not fit its machine.
-    """
-    if document.get("schema") != BRANCH:
-        raise StoreError(f"schema {document.get('schema')!r} is not a branch of this version")
+def branch_from(document: Document) -> Branch:
+    """The branch that :func:`flipflow.results.document.branch_document` wrote."""
     machine, method = machine_from(document["machine"]), method_from(document["method"])
-    system = machine.system()
-
-    @cache
-    def solver_of(half_turn: bool, turns: int) -> Solver:
-        return solver_for(system, method, half_turn=half_turn, turns=turns)
-
-    own = document["half_turn"], document.get("turns", 1)
-    solver = solver_of(*own)
+    solver_of = _solvers(machine, method)
+    solver = solver_of(document["half_turn"], document["turns"])
     traced = _traced_from(document, solver)
     points, n = traced.omega.size, solver.system.size
-    special = tuple(
-        # Where a branch meets another, the point is one of the other's motions.
-        _special_from(
-            one, machine, solver_of(one.get("half_turn", own[0]), one.get("turns", own[1]))
-        )
-        for one in document["special_points"]
-    )
-    multipliers = np.asarray(document["multipliers"], dtype=float).reshape(points, 2 * n, 2)
     return Branch(
         machine=machine,
         method=method,
         solver=solver,
         traced=traced,
-        return_maps=np.asarray(document["return_maps"], dtype=float).reshape(points, 2 * n, 2 * n),
-        saddle_side_at_start=bool(document["saddle_side_at_start"]),
-        multipliers=multipliers[..., 0] + 1j * multipliers[..., 1],
+        return_maps=_return_maps(document, solver),
+        saddle_side_at_start=document["saddle_side_at_start"],
+        multipliers=array(document["multipliers"], complex).reshape(points, 2 * n),
         stability=np.asarray(document["stability"], dtype="<U12"),
-        special_points=special,
+        # Where a branch meets another, the point is one of the other's motions.
+        special_points=tuple(
+            SpecialPoint(
+                orbit=Orbit(machine, _point_from(one, solver_of), one["stability"]), **_place(one)
+            )
+            for one in document["special_points"]
+        ),
         status=BranchStatus[document["status"]],
         notes=tuple(document["notes"]),
         version=document["version"],
     )
 
 
-def _traced_from(document: Mapping[str, Any], solver: Solver) -> Traced:
+def _solvers(machine: Machine, method: Method) -> SolverOf:
+    """Solvers by whether they look for half a turn, and by turns, each made once."""
+    system = machine.system()
+
+    @cache
+    def solver_of(half_turn: bool, turns: int) -> Solver:
+        return solver_for(system, method, half_turn=half_turn, turns=turns)
+
+    return solver_of
+
+
+def _return_maps(document: Document, solver: Solver) -> np.ndarray[Any, np.dtype[np.float64]]:
+    size = 2 * solver.system.size
+    return array(document["return_maps"]).reshape(-1, size, size)
+
+
+def _traced_from(document: Document, solver: Solver) -> Traced:
     """The points of a branch as they were followed, but for the depths: those are not kept."""
-    u = np.asarray(document["unknowns"], dtype=float).reshape(-1, solver.unknowns)
+    u = array(document["unknowns"]).reshape(-1, solver.unknowns)
     points = u.shape[0]
     # One more than the points: the step at which the branch ended.
     record = solver.new_branch(points + 1)
     record.depth[:] = np.nan
     record.u[:points] = u
     record.omega[:points] = document["omega"]
-    record.tangent[:points] = np.reshape(document["tangent"], (points, -1))
+    record.tangent[:points] = array(document["tangent"]).reshape(points, solver.unknowns + 1)
+    record.side[:points] = document["side"]
     record.signature[:points] = document["signature"]
     record.iterations[:points] = document["iterations"]
+    if solver.reads_jacobian:
+        record.jacobian[:points] = _return_maps(document, solver) - np.eye(solver.unknowns)
     tried = len(document["rejected"])
     record.rejected[:tried], record.reason[:tried] = document["rejected"], document["reason"]
     course = arclength.Course(*document["course"])
-    return Traced.recorded(record, points, int(document["code"]), course)
+    return Traced.recorded(record, points, document["code"], course)
 
 
-def _special_from(one: Mapping[str, Any], machine: Machine, solver: Solver) -> SpecialPoint:
-    unknowns, known = np.asarray(one["unknowns"]), np.asarray(one["return_map"])
-    point = Point(solver, unknowns, one["omega"], known_map=known)
-    orbit = Orbit(machine, point, word_of(one["kind"]))
-    return SpecialPoint(one["kind"], orbit, one["position"], one["spring"], one["side"])
+def _point_from(document: Document, solver_of: SolverOf) -> Point:
+    """A motion as its solver left it."""
+    solver = solver_of(document["half_turn"], document["turns"])
+    known = array(document["return_map"])
+    return Point(solver, array(document["unknowns"]), document["omega"], known_map=known)
 
 
-def basins_from(document: Mapping[str, Any]) -> Basins:
-    """The basins that :func:`flipflow.results.document.basins_document` wrote.
+def _place(document: Document) -> dict[str, Any]:
+    """What a special point is, and where it stands along its branch."""
+    return {name: document[name] for name in ("kind", "position", "spring", "side")}
 
-    Raises
-    ------
-    StoreError
-        When the document is of another kind.
-    """
-    if document.get("schema") != BASINS:
-        raise StoreError(f"schema {document.get('schema')!r} is not basins of this version")
-    machine, omega = machine_from(document["machine"]), float(document["omega"])
-    orbits = []
-    for one in document["orbits"]:
-        solver = ExactSolver(machine.system(), half_turn=False, turns=one["periods"])
-        unknowns, known = np.asarray(one["unknowns"]), np.asarray(one["return_map"])
-        orbits.append(Orbit(machine, Point(solver, unknowns, omega, known_map=known)))
-    return Basins(
-        machine=machine,
-        omega=omega,
-        axes=tuple(
-            GridAxis(axis["kind"], axis["which"], np.asarray(axis["values"], float))
-            for axis in document["axes"]
+
+def orbit_from(document: Document) -> Orbit:
+    """The motion that :func:`flipflow.results.document.orbit_document` wrote."""
+    machine, method = machine_from(document["machine"]), method_from(document["method"])
+    point = _point_from(document, _solvers(machine, method))
+    return Orbit(machine, point, document["stability"])
+
+
+def field_branch_from(document: Document) -> FieldBranch:
+    """The branch that :func:`flipflow.results.document.field_branch_document` wrote."""
+    screen, field = screen_from(document["machine"]), document["field"]
+
+    def orbit_at(value: float, one: Document, word: str) -> Orbit:
+        machine = screen.replace(**{field: value})
+        solver = ExactSolver(machine.system(), half_turn=one["half_turn"], turns=one["turns"])
+        point = FieldPoint(
+            solver, array(one["unknowns"]), one["omega"],
+            known_map=array(one["return_map"]), value=value,
+        )  # fmt: skip
+        return Orbit(machine, point, word)
+
+    points = zip(document["values"], document["points"], document["stability"], strict=True)
+    return FieldBranch(
+        machine=screen,
+        field=field,
+        orbits=tuple(orbit_at(*point) for point in points),
+        values=array(document["values"]),
+        special_points=tuple(
+            FieldSpecialPoint(
+                orbit=orbit_at(one["value"], one, one["stability"]),
+                value=one["value"],
+                **_place(one),
+            )
+            for one in document["special_points"]
         ),
-        labels=np.asarray(document["labels"], np.int64),
-        turns=np.asarray(document["turns"], np.int64),
-        orbits=tuple(orbits),
-        most_turns=document["most_turns"],
+        status=BranchStatus[document["status"]],
         notes=tuple(document["notes"]),
         version=document["version"],
     )
+
+
+def sweep_from(document: Document) -> Sweep:
+    """The sweep that :func:`flipflow.results.document.sweep_document` wrote."""
+    machine = machine_from(document["machine"])
+    solver = ExactSolver(system_of(machine), half_turn=False)
+
+    @cache
+    def solver_of(_half_turn: bool, turns: int) -> Solver:
+        return solver if turns == 1 else solver.with_turns(turns)
+
+    rows = []
+    for k, (states, one) in enumerate(zip(document["states"], document["points"], strict=True)):
+        recent = array(states)
+        point = None if one is None else _point_from(one, solver_of)
+        distance = np.inf if point is None else document["distance"][k]
+        turns, settled = document["turns"][k], document["settled"][k]
+        rows.append(Settled(recent[-1].copy(), turns, point, distance, settled, recent))
+    return Sweep(
+        machine=machine,
+        omega=array(document["omega"]),
+        rows=tuple(rows),
+        jumps=tuple(Jump(**jump) for jump in document["jumps"]),
+        max_periods=document["max_periods"],
+        most_turns=document["most_turns"],
+        solver=solver,
+        version=document["version"],
+        complete=document.get("complete", True),
+    )
+
+
+# Every other result is made of these, of numbers and of words.
+CODEC = Codec(
+    {
+        Machine: Form(machine_document, machine_from),
+        FlipFlowScreen: Form(machine_document, screen_from),
+        MechanicalSystem: Form(machine_document, system_from),
+        Method: Form(method_document, method_from),
+        Distribution: Form(distribution_document, distribution_from),
+        Orbit: Form(orbit_document, orbit_from),
+        Branch: Form(branch_document, branch_from),
+        FieldBranch: Form(field_branch_document, field_branch_from),
+        Sweep: Form(sweep_document, sweep_from),
+        Sensitivity: Form(sensitivity_document, sensitivity_from),
+    }
+)

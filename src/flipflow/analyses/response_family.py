@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.analyses.frequency_response import check_interval, frequency_response
+from flipflow.analyses.loading import relative_from_below
 from flipflow.analyses.operating_region import Landmarks, analysed_range, landmarks
 from flipflow.errors import IncompleteError, InputError
 from flipflow.methods.options import Method
@@ -63,9 +64,16 @@ class Member:
         feet = [t for t in self.branch.troughs("main") if first < t.position < last]
         return min(feet, key=lambda t: t.amplitude("main"), default=None)
 
+    def relative_amplitude(self, omega: float) -> float:
+        """Relative amplitude in m as the speed rises slowly; NaN where no motion is known."""
+        return math.nan if self.failure else relative_from_below(self.branch, omega)
+
     @property
     def zone(self) -> float:
-        """Width in rad/s of the zone of several solutions, w_ub - w_lb; 0 without folds."""
+        """Width in rad/s of the zone of several solutions, w_ub - w_lb.
+
+        0 without folds; NaN for a failed row.
+        """
         if self.marks is None:
             return math.nan
         if self.marks.omega_lb is None or self.marks.omega_ub is None:
@@ -91,6 +99,10 @@ class ResponseFamily:
     field: str
     members: tuple[Member, ...]
 
+    def __repr__(self) -> str:
+        values = ", ".join(f"{member.value:.6g}" for member in self.members)
+        return f"ResponseFamily({self.field}: {values})"
+
     @property
     def values(self) -> Real:
         """The field's values, SI, (n,)."""
@@ -98,7 +110,7 @@ class ResponseFamily:
 
     @cached_property
     def common_region(self) -> tuple[float, float] | None:
-        """Speeds in rad/s that lie in the operating region of every member; None without any."""
+        """Speeds in rad/s in the operating region of every member that did not fail, or None."""
         marks = [member.marks for member in self.members if member.marks is not None]
         if not marks:
             return None
@@ -114,10 +126,10 @@ class ResponseFamily:
 
     @cached_property
     def relative_amplitude(self) -> Real:
-        """Relative amplitude in m at the common frequencies, (n, n_omega); NaN for failed rows."""
+        """Relative amplitude in m at the common frequencies, (n, n_omega); NaN where not known."""
         return np.array(
             [
-                [_from_below(member, float(w)) for w in self.common_frequencies]
+                [member.relative_amplitude(float(w)) for w in self.common_frequencies]
                 for member in self.members
             ]
         )
@@ -202,12 +214,16 @@ def response_family(
 
 
 def _one_field(vary: Mapping[str, ArrayLike]) -> tuple[str, Real]:
-    if len(vary) != 1:
-        raise InputError("vary", ", ".join(vary) or "{}", "name one field and its values")
+    if not isinstance(vary, Mapping) or len(vary) != 1:
+        remedy = 'name one field and its values, as {"clearance": [5e-3, 6e-3]}'
+        raise InputError("vary", vary, remedy)
     ((field, values),) = vary.items()
     if field not in FIELD:
         raise InputError("vary", field, f"choose one of {', '.join(FIELD)}")
-    array = np.atleast_1d(np.asarray(values, dtype=float))
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"vary[{field!r}]", values, "give numbers in SI") from None
     if array.ndim != 1 or array.size == 0:
         raise InputError(f"vary[{field!r}]", values, "give a list of values")
     return field, array
@@ -220,8 +236,3 @@ def _member(value: float, screen: FlipFlowScreen, branch: Branch) -> Member:
         return Member(value, screen, branch, landmarks(screen, branch))
     except IncompleteError as error:
         return Member(value, screen, branch, None, str(error))
-
-
-def _from_below(member: Member, omega: float) -> float:
-    orbit = None if member.failure else member.branch.orbit_from_below(omega)
-    return math.nan if orbit is None else orbit.amplitude("relative")

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from flipflow.analyses.frequency_response import frequency_response
 from flipflow.analyses.linear import antiresonance_frequency, equal_amplitude_frequency
 from flipflow.analyses.operating_region import Landmarks, landmarks
-from flipflow.analyses.quantities import QUANTITIES, Quantity
+from flipflow.analyses.quantities import QUANTITIES, Quantity, Working
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.results.branch import Branch, SpecialPoint
@@ -56,28 +56,8 @@ class Response:
 
 
 @dataclass(frozen=True)
-class ResponseQuantity:
-    """One number of a whole response over speed.
-
-    Parameters
-    ----------
-    name, label, symbol
-        Key, words for people, symbol.
-    unit, shown_unit
-        SI unit and the unit it is shown in.
-    sentence
-        What it is.
-    evaluate
-        Its value in SI for a :class:`Response`, None where there is none.
-    """
-
-    name: str
-    label: str
-    symbol: str
-    unit: str
-    shown_unit: str
-    sentence: str
-    evaluate: Callable[[Response], float | None]
+class ResponseQuantity(Quantity[Response]):
+    """One number of a whole response over speed, read off a :class:`Response`."""
 
 
 _ALL = (
@@ -118,13 +98,13 @@ _ALL = (
     ),
 )  # fmt: skip
 
-REGISTRY: Mapping[str, Quantity | ResponseQuantity] = {
+REGISTRY: Mapping[str, Quantity[Working] | ResponseQuantity] = {
     **QUANTITIES,
     **{quantity.name: quantity for quantity in _ALL},
 }
 
 
-def quantity_named(name: object) -> Quantity | ResponseQuantity:
+def quantity_named(name: object) -> Quantity[Working] | ResponseQuantity:
     """A quantity of a motion or of a whole response.
 
     Raises

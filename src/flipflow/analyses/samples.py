@@ -54,7 +54,7 @@ class Question:
     """
 
     screen: FlipFlowScreen
-    quantity: Quantity | ResponseQuantity
+    quantity: Quantity[Working] | ResponseQuantity
     omega: Real
     span: tuple[float, float]
     branch: BranchWord

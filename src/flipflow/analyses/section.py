@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flipflow.analyses.sweep import check_count, checked_speeds, initial_state
+from flipflow.analyses.arguments import checked_count, checked_speed, initial_state
 from flipflow.errors import InputError
 from flipflow.methods.exact import ExactSolver
 from flipflow.model.system import Coordinate, Machine, system_of
@@ -52,9 +52,9 @@ def poincare_section(
     IncompleteError
         Where a turn has too many contacts to be recorded.
     """
-    speed = float(checked_speeds(omega)[0])
-    check_count("turns", turns, MOST_TURNS)
-    check_count("skip", skip + 1, MOST_TURNS)
+    speed = checked_speed(omega)
+    checked_count("turns", turns, MOST_TURNS)
+    checked_count("skip", skip, MOST_TURNS, least=0)
     solver = ExactSolver(system_of(machine), half_turn=False)
     z = initial_state(solver.system.size, initial)
     if skip:
@@ -97,7 +97,7 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
     turn = 2.0 * math.pi / omega / float(step.mean())
     whole = int((motion.t.size - 1) / turn)
     wanted = max(whole // 2, 1) if periods is None else periods
-    check_count("periods", wanted, max(whole, 1))
+    checked_count("periods", wanted, max(whole, 1))
     count = round(wanted * turn)
     x = motion.displacement(which)[-count - 1 : -1]
     window = np.hanning(count + 1)[:-1]

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.analyses.arguments import checked_count, checked_generator
 from flipflow.analyses.feasible import missing_words
 from flipflow.analyses.frequency_response import check_interval
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.operating_region import analysed_range
-from flipflow.analyses.quantities import Quantity
+from flipflow.analyses.quantities import Quantity, Working
 from flipflow.analyses.response_quantities import ResponseQuantity, quantity_named
 from flipflow.analyses.samples import (
     BranchWord,
@@ -105,9 +106,9 @@ def sensitivity(
     """
     question = _question(machine, quantity, omega, branch)
     varied = variations(vary, machine)
-    workers = _whole("threads", 1 if threads is None else threads, 1, 256)
-    groups = _whole("n", n, LEAST_GROUPS, N_MOST)
-    generator = _generator(rng)
+    workers = checked_count("threads", 1 if threads is None else threads, 256)
+    groups = checked_count("n", n, N_MOST, least=LEAST_GROUPS)
+    generator = checked_generator(rng)
     nominal = _nominal(question)
     points = saltelli_sample(len(varied), groups, generator)
     u = points.reshape(-1, len(varied))
@@ -188,7 +189,7 @@ def _nominal(question: Question) -> Real:
     return np.array(values, dtype=float)
 
 
-def _require_data(machine: FlipFlowScreen, quantity: Quantity) -> None:
+def _require_data(machine: FlipFlowScreen, quantity: Quantity[Working]) -> None:
     absent = tuple(need for need in quantity.needs if getattr(machine, need) is None)
     if absent:
         raise InputError("quantity", quantity.name, missing_words(absent))
@@ -204,21 +205,6 @@ def _frequencies(omega: object, name: str) -> Real:
     if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found) & (found > 0.0)):
         raise InputError("omega", omega, remedy)
     return found
-
-
-def _whole(name: str, value: object, least: int, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise InputError(name, value, "give a whole number")
-    if not least <= value <= most:
-        raise InputError(name, value, f"give a whole number from {least} to {most}")
-    return int(value)
-
-
-def _generator(rng: object) -> np.random.Generator:
-    try:
-        return np.random.default_rng(rng)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError("rng", rng, "give a whole number of at least 0, or a Generator") from None
 
 
 def _values(

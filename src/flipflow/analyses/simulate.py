@@ -9,11 +9,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.analyses.arguments import checked_count, checked_speed, initial_state
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
-from flipflow.analyses.sweep import MAX_PERIODS, check_count, checked_speeds, initial_state
+from flipflow.analyses.sweep import MAX_PERIODS
 from flipflow.errors import InputError
-from flipflow.methods.course import Course
+from flipflow.methods.recording import Recording
 from flipflow.methods.settle import Settling
 from flipflow.model.disturbance import Disturbance, Impulse, LoadStep
 from flipflow.model.elements import Unbalance
@@ -77,8 +78,8 @@ def simulate(
     IncompleteError
         Where a turn has too many contacts to be recorded.
     """
-    speed = float(checked_speeds(omega)[0])
-    check_count("periods", periods, MOST_PERIODS)
+    speed = checked_speed(omega)
+    checked_count("periods", periods, MOST_PERIODS)
     turn = 2.0 * math.pi / speed
     end = periods * turn
     system = system_of(machine)
@@ -88,15 +89,15 @@ def simulate(
         raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
     z = initial_state(system.size, initial)
     run = _Run(machine, system_of, speed, end, monitor)
-    run.carry(Course(times, system.size, len(run.kept)), z, blows)
+    run.carry(Recording(times, system.size, len(run.kept)), z, blows)
     settling = Settling(system_of(run.machine), MAX_PERIODS)
     distance = settling.distance_ahead(run.z, speed)
     return History(
         system=system,
         t=times,
-        x=run.course.table.x,
-        v=run.course.table.v,
-        a=run.course.table.a,
+        x=run.recording.table.x,
+        v=run.recording.table.v,
+        a=run.recording.table.a,
         force=run.forces(),
         omega=np.full(times.size, speed),
         angle=speed * times,
@@ -107,7 +108,7 @@ def simulate(
         events=run.events(),
         status="The motion was carried to its end.",
         method="exact flow",
-        counters={"events": len(run.course.changes)},
+        counters={"events": len(run.recording.changes)},
     )
 
 
@@ -143,14 +144,14 @@ class _Run:
         self.kept = [k for k, one in enumerate(self.springs) if one.acts and not one.bonded]
         self.blown = {"impulses": 0.0, "loads": 0.0}
 
-    def carry(self, course: Course, z: Real, blows: Sequence[Disturbance]) -> None:
-        """Fill ``course`` from the state z to the end."""
-        self.course, self.z = course, z
+    def carry(self, recording: Recording, z: Real, blows: Sequence[Disturbance]) -> None:
+        """Fill ``recording`` from the state z to the end."""
+        self.recording, self.z = recording, z
         self.begin = self.stored(), self.held()
         at = 0.0
         for blow in (*blows, None):
             until = self.end if blow is None else blow.t
-            self.z = course.carry(
+            self.z = recording.carry(
                 self.build(self.machine), self.z, self.omega, at, until, self._tell
             )
             at = until
@@ -180,14 +181,14 @@ class _Run:
 
     def energy(self) -> dict[str, float]:
         """The balance over the whole time, J."""
-        work = self.course.work
+        work = self.recording.work
         stored, held = self.stored() - self.begin[0], self.held() - self.begin[1]
         dissipated = work["dampers"] + work["stops"] - held
         return {"input": work["input"], **self.blown, "dissipated": dissipated, "stored": stored}
 
     def forces(self) -> Real:
         """Force of every spring of the machine as it was given, (K, m)."""
-        table = self.course.table
+        table = self.recording.table
         forces = np.zeros((table.t.size, len(self.springs)))
         forces[:, self.kept] = table.force
         for k, spring in enumerate(self.springs):
@@ -200,7 +201,7 @@ class _Run:
         """Every change of contact."""
         return tuple(
             ContactChange(t, self.kept[spring], state if abs(state) == 1 else 0)
-            for t, spring, state in self.course.changes
+            for t, spring, state in self.recording.changes
         )
 
     def _strike(self, blow: Disturbance) -> None:
@@ -244,8 +245,8 @@ def _normal(
         z = np.array([float(steady.displacement(0.0)), float(steady.velocity(0.0))])
     run = _Run(machine, _normal_system, omega, end, None)
     along = [blow for blow in blows if not isinstance(blow, Impulse)]
-    run.carry(Course(times, 1, 0), z, along)
-    table = run.course.table
+    run.carry(Recording(times, 1, 0), z, along)
+    table = run.recording.table
     return np.column_stack([table.x, table.v, table.a])
 
 

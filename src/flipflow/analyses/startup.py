@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.analyses.arguments import checked_positive
 from flipflow.analyses.linear import linear_response
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.transient import (
     STATUS,
     at_rest,
-    check_positive,
     movable,
     normal_direction,
     run_history,
@@ -26,12 +27,13 @@ from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.kernels.unsteady import SHAFT_STATES
 from flipflow.methods.time_stepping import RungeKutta, Stretch
+from flipflow.model.constants import GRAVITY
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
 from flipflow.model.elements import Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.results.history import History
-from flipflow.results.run_up import AT_SPEED, Outcome, Peak, RunUp
+from flipflow.results.run_up import AT_SPEED, NaturalFrequency, Outcome, Peak, RunUp
 
 Real = NDArray[np.float64]
 POWER_FACTOR = 4.0
@@ -43,7 +45,6 @@ AT_REST, STOPPED = 0.02, 0.02
 NEAR = (0.8, 1.1)
 PASSING = (0.8, 1.25)
 FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
-GRAVITY = 9.80665
 
 
 def start_up(
@@ -89,18 +90,15 @@ def start_up(
         Without damping, for a bad speed or duration, and for a drive that cannot be.
     """
     movable(machine)
-    given = None if speed is None else check_positive("speed", speed, "rad/s")
-    if drive is None:
-        drive = default_drive(machine, given, method)
-    wanted = given or _working_speed(drive)
-    profile = isinstance(drive, SpeedProfile)
-    longest = drive.duration if isinstance(drive, SpeedProfile) else START_SECONDS
-    longest = longest if duration is None else _seconds(duration)
+    given = None if speed is None else checked_positive("speed", speed, "rad/s")
+    shaft = _shaft(machine, drive, given, method)
+    wanted = given or _working_speed(shaft)
     history = run_history(
-        machine, drive, at_rest(machine), longest, fastest=_fastest(drive, wanted), method=method,
-        monitor=monitor, enough=None if profile else _steady,
+        machine, shaft, at_rest(machine), _longest(shaft, duration, START_SECONDS),
+        fastest=_fastest(shaft, wanted), method=method, monitor=monitor,
+        enough=None if isinstance(shaft, SpeedProfile) else _steady,
     )  # fmt: skip
-    return _judged(machine, drive, wanted, history)
+    return _judged(machine, shaft, wanted, history)
 
 
 def coast_down(
@@ -139,20 +137,15 @@ def coast_down(
         Without damping, for a bad speed or duration, and for a drive that cannot be.
     """
     movable(machine)
-    omega = check_positive("speed", speed, "rad/s")
-    if drive is None:
-        drive = default_drive(machine, omega, method)
-    if isinstance(drive, SpeedProfile):
-        if drive.speeds[0] != omega:
-            raise InputError("speeds", drive.speeds[0], f"begin the profile at {omega:.6g} rad/s")
-        shaft: Drive | SpeedProfile = drive
-        longest = drive.duration
-    else:
-        shaft, longest = drive.switched_off(), COAST_SECONDS
-    longest = longest if duration is None else _seconds(duration)
-    slowest = -math.inf if isinstance(shaft, SpeedProfile) else STOPPED * omega
+    omega = checked_positive("speed", speed, "rad/s")
+    shaft, slowest = _shaft(machine, drive, omega, method), -math.inf
+    if isinstance(shaft, Drive):
+        shaft, slowest = shaft.switched_off(), STOPPED * omega
+    elif shaft.speeds[0] != omega:
+        raise InputError("speeds", shaft.speeds[0], f"begin the profile at {omega:.6g} rad/s")
     history = run_history(
-        machine, shaft, settled_start(machine, omega, method), longest,
+        machine, shaft, settled_start(machine, omega, method),
+        _longest(shaft, duration, COAST_SECONDS),
         fastest=_fastest(shaft, omega), slowest=slowest, method=method, monitor=monitor,
     )  # fmt: skip
     return _judged(machine, shaft, omega, history)
@@ -172,13 +165,33 @@ def default_drive(machine: Machine, speed: float | None, method: RungeKutta | No
     drive = assumed_drive(machine.eccentric_moment, speed, power)
     rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
     word = f"rated power {rated}, four times what the dampers take at working speed"
-    return Drive(**{**vars(drive), "assumed": (word, *drive.assumed)})
+    return replace(drive, assumed=(word, *drive.assumed))
 
 
-def _seconds(duration: float) -> float:
-    if check_positive("duration", duration, "s") > MOST_SECONDS:
+def _shaft(
+    machine: Machine,
+    drive: Drive | SpeedProfile | None,
+    speed: float | None,
+    method: RungeKutta | None,
+) -> Drive | SpeedProfile:
+    """What turns the shaft, as given or assumed."""
+    if method is not None and not isinstance(method, RungeKutta):
+        raise InputError("method", method, "leave it out, or give a RungeKutta")
+    if drive is None:
+        return default_drive(machine, speed, method)
+    if not isinstance(drive, (Drive, SpeedProfile)):
+        raise InputError("drive", drive, "give an ff.Drive or an ff.SpeedProfile")
+    return drive
+
+
+def _longest(shaft: Drive | SpeedProfile, duration: float | None, usual: float) -> float:
+    """Longest time in s: as asked for, else that of the profile, else the usual one."""
+    if duration is None:
+        return shaft.duration if isinstance(shaft, SpeedProfile) else usual
+    seconds = checked_positive("duration", duration, "s")
+    if seconds > MOST_SECONDS:
         raise InputError("duration", duration, f"give at most {MOST_SECONDS:g} s")
-    return float(duration)
+    return seconds
 
 
 def _working_speed(drive: Drive | SpeedProfile) -> float:
@@ -236,14 +249,14 @@ def _outcome(
     final: float,
     history: History,
     frequencies: Mapping[str, float],
-) -> tuple[Outcome, tuple[str, float] | None]:
+) -> tuple[Outcome, NaturalFrequency | None]:
     """What became of the run, and the natural frequency that holds it."""
     if isinstance(drive, SpeedProfile):
         return "followed", None
     if drive.motor is None:
         down = history.omega[-1] <= 1.001 * STOPPED * speed
         return ("stopped" if down else "unfinished"), None
-    if final < AT_REST * speed:
+    if final < AT_REST * speed and float(drive.torque(0.0)) <= drive.friction:
         return "not started", None
     if not _is_steady(history):
         return "unfinished", None
@@ -252,14 +265,14 @@ def _outcome(
 
 def _steady_outcome(
     speed: float, final: float, frequencies: Mapping[str, float]
-) -> tuple[Outcome, tuple[str, float] | None]:
+) -> tuple[Outcome, NaturalFrequency | None]:
     if final >= AT_SPEED * speed:
         return "reached", None
     if not frequencies:
         return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
-        return "captured", (name, frequencies[name])
+        return "captured", NaturalFrequency(name, frequencies[name])
     return "short", None
 
 

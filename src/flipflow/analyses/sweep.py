@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.analyses.frequency_response import OMEGA_MOST
+from flipflow.analyses.arguments import checked_count, checked_speeds, initial_state
 from flipflow.analyses.monitor import Monitor
-from flipflow.errors import Cancelled, InputError
+from flipflow.errors import Cancelled
 from flipflow.methods.settle import MOST_TURNS, Settled, Settling
 from flipflow.model.system import Machine, system_of
 from flipflow.results.orbit import Orbit
@@ -64,8 +66,8 @@ def sweep(
         or a machine without damping, which never settles.
     """
     speeds = checked_speeds(omega)
-    check_count("max_periods", max_periods, 12)
-    check_count("most_turns", most_turns, 10_000_000)
+    checked_count("max_periods", max_periods, 12)
+    checked_count("most_turns", most_turns, 10_000_000)
     settling = Settling(system_of(machine), max_periods)
     z = initial_state(settling.solver.system.size, initial)
     rows: list[Settled] = []
@@ -74,7 +76,7 @@ def sweep(
         row = settling.settle(z, float(speed), most=most_turns)
         if rows and _jumped(settling, rows[-1], row, float(speed)):
             jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
-        rows.append(row)
+        rows.append(_kept(row))
         z = row.state
         if monitor is not None:
             try:
@@ -88,43 +90,11 @@ def sweep(
     )  # fmt: skip
 
 
-def checked_speeds(omega: ArrayLike) -> Real:
-    """Frequencies as an array, or a sentence that says what is wrong with them."""
-    try:
-        speeds = np.atleast_1d(np.asarray(omega, float))
-    except (TypeError, ValueError):
-        raise InputError("omega", omega, "give an array of frequencies in rad/s") from None
-    if speeds.ndim != 1 or speeds.size == 0:
-        raise InputError("omega", omega, "give at least one frequency in rad/s, in one row")
-    if not (np.isfinite(speeds).all() and (speeds > 0.0).all()):
-        raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
-    if speeds.max() > OMEGA_MOST:
-        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
-    return speeds
-
-
-def check_count(name: str, value: object, most: int) -> None:
-    """Raise InputError unless ``value`` is a whole number from 1 to ``most``."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise InputError(name, value, f"give a whole number from 1 to {most}")
-    if not 1 <= value <= most:
-        raise InputError(name, value, f"give a whole number from 1 to {most}")
-
-
-def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
-    """State (x, x') from "rest", an orbit or numbers, (2 N,)."""
-    if isinstance(initial, Orbit):
-        if initial.state.size != 2 * size:
-            raise InputError("initial", initial, "give an orbit of this machine")
-        return initial.state
-    if isinstance(initial, str):
-        if initial != "rest":
-            raise InputError("initial", initial, 'give "rest", an orbit, or a state (x, x\')')
-        return np.zeros(2 * size)
-    state = np.asarray(initial, float)
-    if state.shape != (2 * size,) or not np.isfinite(state).all():
-        raise InputError("initial", initial, f"give {2 * size} finite numbers, (x, x')")
-    return state
+def _kept(row: Settled) -> Settled:
+    """A row with the states of one period only where the motion repeats."""
+    if row.point is None or not row.settled:
+        return row
+    return replace(row, recent=row.recent[-row.point.solver.turns :])
 
 
 def _jumped(settling: Settling, before: Settled, after: Settled, omega: float) -> bool:

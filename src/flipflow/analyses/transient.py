@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.analyses.monitor import Monitor
-from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.methods.time_stepping import NormalDirection, RungeKutta, Stepper, Stretch
 from flipflow.model.drive import Drive, SpeedProfile
@@ -158,13 +157,6 @@ def turn_means(history: History, values: Real, turns: int) -> float:
         for y in (history.t, values)
     )
     return float((values[-1] - total) / (history.t[-1] - t))
-
-
-def check_positive(name: str, value: float, unit: str) -> float:
-    """Return a finite number above 0 or refuse it."""
-    if not (np.isfinite(value) and value > 0.0):
-        raise InputError(name, value, f"give a finite number above 0 {unit}")
-    return float(value)
 
 
 def _history(

@@ -45,7 +45,8 @@ def analyze(
 def _write(assessment: Assessment, target: Destination) -> None:
     """The report, the numbers behind it, the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.results import assessment_document, write_response  # noqa: PLC0415
+    from flipflow.io.assessment import assessment_document  # noqa: PLC0415
+    from flipflow.io.response import write_response  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
 

@@ -96,10 +96,10 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
 
 
 def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
-    from flipflow.io.jump_risk import risk_document  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.jump_risk import risk_summary  # noqa: PLC0415  keeps --help quick
     from flipflow.io.results import document_of  # noqa: PLC0415
 
-    return document_of(found) | {"jump_risk": None if risk is None else risk_document(risk)}
+    return document_of(found) | {"jump_risk": None if risk is None else risk_summary(risk)}
 
 
 def _show(found: Basins, risk: JumpRisk | None, reason: str, out: Console) -> None:

@@ -43,7 +43,7 @@ class Destination:
 
     def __init__(self, folder: Path | None, json: str | None) -> None:
         if folder is not None:
-            from flipflow.io.results import prepare_folder  # noqa: PLC0415  keeps --help quick
+            from flipflow.io.files import prepare_folder  # noqa: PLC0415  keeps --help quick
 
             prepare_folder(folder)
         if json is not None:

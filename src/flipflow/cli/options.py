@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.model import constants
+
 if TYPE_CHECKING:
     from flipflow.model.project import Project
 
-RPM = 30.0 / math.pi
+RPM = constants.RPM
 # Slower, a turn takes minutes of calculation; faster, no screen runs.
 SLOWEST, FASTEST = 1.0, 100_000.0
 

@@ -34,7 +34,6 @@ def orbits(
     from flipflow.analyses.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.results.time_document import orbits_document  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -46,7 +45,10 @@ def orbits(
 
             for k, orbit in enumerate(found, 1):
                 target.picture(f"motion-{k}.html", orbit_figure(orbit))
-        target.document(orbits_document(found))
+        if json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+            target.document(document_of(found))
         if target.spoken:
             _show(project, omega, found, console())
         target.tell()

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar
 
+from flipflow.analyses.monitor import Monitor
 from flipflow.errors import Cancelled
 
 Result = TypeVar("Result")
-Tell = Callable[[str, float], None]
 
 
 @contextmanager
-def progress(begin: str) -> Iterator[Tell]:
+def progress(begin: str) -> Iterator[Monitor]:
     """A bar while the block runs; what it yields takes a sentence and the share done.
 
     Nothing is written where stderr is not a terminal.
@@ -33,7 +33,7 @@ def progress(begin: str) -> Iterator[Tell]:
         yield lambda sentence, share: bar.update(task, description=sentence, completed=share)
 
 
-def with_progress(run: Callable[[Tell], Result]) -> Result:
+def with_progress(run: Callable[[Monitor], Result]) -> Result:
     """Run with a bar, the kernels compiled ahead."""
     from flipflow.methods.warm import compile_ahead  # noqa: PLC0415  keeps --help quick
 
@@ -43,7 +43,7 @@ def with_progress(run: Callable[[Tell], Result]) -> Result:
 
 
 @contextmanager
-def stoppable(tell: Tell, stage: str) -> Iterator[Tell]:
+def stoppable(tell: Monitor, stage: str) -> Iterator[Monitor]:
     """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
 
     The stage is known by the first words of what it tells. In other stages, and at the second

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.options import Json, Output
 from flipflow.cli.output import console
 
 if TYPE_CHECKING:
@@ -14,16 +15,11 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from flipflow.cli.progress import Tell
+    from flipflow.analyses.monitor import Monitor
     from flipflow.model.screen import FlipFlowScreen
     from flipflow.paper.reproduce import ReproducedFigure, Reproduction
 
-STYLES = {
-    "holds": "green",
-    "holds in part": "bold yellow",
-    "does not hold": "bold red",
-    "cannot be decided": "dim",
-}
+FOLDER = Path("reproduction")
 
 
 def reproduce(
@@ -31,13 +27,8 @@ def reproduce(
         list[str] | None,
         typer.Argument(metavar="FIGURE", help="figure-08, or 8; all where none is named."),
     ] = None,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for page and figures.")
-    ] = Path("reproduction"),
-    json: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="Claims as JSON, - for the terminal."),
-    ] = None,
+    output: Output = None,
+    json: Json = None,
     machine: Annotated[
         str, typer.Option("--machine", metavar="FILE", help="Another machine file.")
     ] = "ffs0827",
@@ -50,16 +41,17 @@ def reproduce(
     names = tuple(figures or ())
     wanted = chosen(names)
     screen = load(machine)
-    with Destination(output, json) as target:
+    folder = output or FOLDER
+    with Destination(folder, json) as target:
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.paper.page import write_reproduction  # noqa: PLC0415
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
 
-        def run(monitor: Tell) -> tuple[Reproduction, tuple[str, ...]]:
+        def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
             found = _finished(screen, [one.name for one in wanted], monitor)
-            return found, write_reproduction(found, output, monitor)
+            return found, write_reproduction(found, folder, monitor)
 
         found, written = with_progress(run)
         target.document(found.document())
@@ -73,7 +65,7 @@ def reproduce(
             raise target.stopped(kept=True)
 
 
-def _finished(screen: FlipFlowScreen, names: Sequence[str], monitor: Tell) -> Reproduction:
+def _finished(screen: FlipFlowScreen, names: Sequence[str], monitor: Monitor) -> Reproduction:
     """One figure after the other; Ctrl-C ends it and keeps those that are finished."""
     from flipflow.paper.reproduce import Reproduction  # noqa: PLC0415  quick --help
     from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
@@ -94,12 +86,16 @@ def _show(found: Reproduction, out: Console) -> None:
     from rich.table import Table  # noqa: PLC0415  slow to import
     from rich.text import Text  # noqa: PLC0415
 
+    from flipflow.paper.page import STATES  # noqa: PLC0415  keeps --help quick
+    from flipflow.report.terminal import STYLES  # noqa: PLC0415
+
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     for title in ("Claim", "Verdict", "Statement"):
         table.add_column(title, no_wrap=title != "Statement")
     for one in found.claims:
-        verdict = str(one.evaluation.verdict)
-        table.add_row(one.claim.id, Text(verdict, STYLES[verdict]), one.claim.statement)
+        verdict = one.evaluation.verdict
+        shown = Text(str(verdict), STYLES[STATES[verdict]])
+        table.add_row(one.claim.id, shown, one.claim.statement)
     out.print(table)
     out.print()
     out.print(", ".join(f"{n} {verdict}" for verdict, n in found.counts.items() if n) + ".")

@@ -107,11 +107,12 @@ def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity
 
 
 def _write(result: Sensitivity, target: Destination) -> None:
-    from flipflow.results.sensitivity import sensitivity_document  # noqa: PLC0415  quick --help
-
     if target.folder is not None:
         _write_folder(result, target)
-    target.document(sensitivity_document(result))
+    if target.json is not None:
+        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+        target.document(document_of(result))
     if target.spoken:
         from flipflow.report import summary  # noqa: PLC0415
 

@@ -45,7 +45,6 @@ def simulate(
     from flipflow.analyses.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.results.time_document import history_document  # noqa: PLC0415
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -57,7 +56,10 @@ def simulate(
             from flipflow.figures.history import history_figure  # noqa: PLC0415  loads plotly
 
             target.picture("motion.html", history_figure(history))
-        target.document(history_document(history))
+        if json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+            target.document(document_of(history))
         if target.spoken:
             _show(project, history, console())
         target.tell()

@@ -9,11 +9,12 @@ import typer
 
 from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
 from flipflow.cli.output import console, print_list, printable
-from flipflow.cli.progress import Tell, progress
+from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from flipflow.analyses.monitor import Monitor
     from flipflow.cli.destination import Destination
     from flipflow.model.drive import Drive, SpeedProfile
     from flipflow.model.project import Project
@@ -71,14 +72,14 @@ def startup(
     seconds = None if duration is None else _seconds(duration)
     with Destination(output, json) as target:
         start, coast = _calculated(project, drive, seconds)
-
-        from flipflow.io.run_up import run_up_document  # noqa: PLC0415
-
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
         if output is not None:
             _figures(runs, target)
-        parts = {name: run_up_document(run) for name, run in runs.items()}
-        target.document({"schema": "flipflow/startup/1", "name": project.name, **parts})
+        if json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+            parts = {name: document_of(run) for name, run in runs.items()}
+            target.document({"schema": "flipflow/startup/1", "name": project.name, **parts})
         if target.spoken:
             _show(project, start, coast, console())
         target.tell()
@@ -149,7 +150,7 @@ def _calculated(
 
     with progress("start; the first run of a version compiles") as tell:
 
-        def during(stage: str) -> Tell:
+        def during(stage: str) -> Monitor:
             return lambda sentence, share: tell(f"{stage}, {sentence}", share)
 
         start = start_up(

@@ -71,7 +71,8 @@ def sweep(
     gliding = None if rate is None else _rate(rate, ends)
     with Destination(output, json) as target:
         found = _passed(project, ends, steps, gliding)
-        target.document(_document(project, found))
+        if json is not None:
+            target.document(_document(project, found))
         if output is not None:
             target.picture("sweep.html", _figure(project, found.sweeps, ends))
         if target.spoken:
@@ -141,13 +142,13 @@ def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[R
 
 
 def _document(project: Project, found: Passed) -> dict[str, Any]:
-    from flipflow.results.time_document import sweep_document  # noqa: PLC0415  quick --help
+    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
     return {
         "schema": "flipflow/sweeps/1",
         "name": project.name,
-        "up": sweep_document(found.up),
-        "down": None if found.down is None else sweep_document(found.down),
+        "up": document_of(found.up),
+        "down": None if found.down is None else document_of(found.down),
         "late": [vars(jump) for glide in found.glides for jump in glide.jumps],
         "glides": [
             {"rate": glide.rate, "to": glide.history.omega[-1], "complete": found.whole(glide)}

@@ -143,7 +143,7 @@ def orbits_figure(assessment: Assessment) -> Figure | None:
 def contact_bands(orbit: Orbit) -> Iterator[Band]:
     """Strips over the shaft angle in degrees in which a stop is touched, on either side."""
     turn = 360.0 / orbit.period * orbit.periods
-    along = [sign for sign, _ in _stops(orbit)]
+    along = {number: sign for number, (sign, _) in _stops(orbit).items()}
     for touch in orbit.contact_intervals:
         plus = touch.side * (along[touch.spring] or 1) > 0
         role = "contact" if plus else "contact minus"
@@ -163,7 +163,7 @@ def gap_lines(
     free = {1: _free(moving.argmin() / moving.size), -1: _free(moving.argmax() / moving.size)}
     places = dict.fromkeys(
         (sign * side * gap, _gap_word(stop, side), sign * side)
-        for sign, stop in _stops(orbit)
+        for sign, stop in _stops(orbit).values()
         for side, gap in zip((1, -1), stop.gaps, strict=True)
         if sign and math.isfinite(gap)
     )
@@ -199,14 +199,14 @@ def _free(share: float) -> float:
     return share / TURNS if share > 0.15 else (1.0 + share) / TURNS
 
 
-def _stops(orbit: Orbit) -> list[tuple[int, ClearanceSpring]]:
-    """Every stop with a gap, and the sign by which it lies along the coordinate drawn, or 0."""
+def _stops(orbit: Orbit) -> dict[int, tuple[int, ClearanceSpring]]:
+    """Every stop with a gap by number, and its sign along the coordinate drawn, or 0."""
     drawn = orbit.system.coordinate(_across(orbit))
-    return [
-        (next((s for s in (1, -1) if np.allclose(s * drawn, stop.direction)), 0), stop)
-        for stop in orbit.system.springs
+    return {
+        number: (next((s for s in (1, -1) if np.allclose(s * drawn, stop.direction)), 0), stop)
+        for number, stop in enumerate(orbit.machine.system().springs)
         if stop.acts and not stop.bonded
-    ]
+    }
 
 
 def _across(orbit: Orbit) -> Coordinate:

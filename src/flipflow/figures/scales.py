@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-RPM = 30.0 / math.pi
+from flipflow.model import constants
+
+RPM = constants.RPM
 HZ = 0.5 / math.pi
 MM = 1e3
 KN = 1e-3

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.quantities import GRAVITY
 from flipflow.analyses.response_quantities import REGISTRY
 from flipflow.errors import InputError
 from flipflow.figures.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.figures.parts import Axis, Bar, Figure, Line, Panel, Trace
 from flipflow.figures.scales import DEGREES, HZ, KN, MM, RPM
+from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import FIELD
 from flipflow.results.sensitivity import OneAtATime, Sensitivity
 

@@ -15,7 +15,7 @@ class Derived:
     Parameters
     ----------
     natural_frequencies
-        w01 and w02 in rad/s: undamped, without contact.
+        w01 and w02 in rad/s: undamped, without contact; a stop without gap counts as a spring.
     omega_ea
         w_ea in rad/s, where both frames swing alike; None where damping rules it out.
     omega_ar
@@ -38,6 +38,7 @@ def derive(screen: FlipFlowScreen) -> Derived:
     from flipflow.analyses.linear import (  # noqa: PLC0415  slow to import
         antiresonance_frequency,
         equal_amplitude_frequency,
+        natural_frequencies,
     )
 
     m1, m2 = screen.main_mass, screen.floating_mass
@@ -49,8 +50,9 @@ def derive(screen: FlipFlowScreen) -> Derived:
     }
     if screen.has_stop and screen.stop_stiffness > 0.0:
         ratios["stops"] = _ratio(screen.stop_stiffness, screen.stop_damping, reduced)
+    low, high = natural_frequencies(screen).tolist()
     return Derived(
-        natural_frequencies=_natural_frequencies(screen),
+        natural_frequencies=(low, high),
         omega_ea=equal_amplitude_frequency(screen),
         omega_ar=float(antiresonance_frequency(screen) or math.nan),
         static_amplitude=screen.eccentric_moment / (m1 + m2),
@@ -60,13 +62,3 @@ def derive(screen: FlipFlowScreen) -> Derived:
 
 def _ratio(k: float, c: float, m: float) -> float:
     return c / (2.0 * math.sqrt(k * m))
-
-
-def _natural_frequencies(screen: FlipFlowScreen) -> tuple[float, float]:
-    """Solve K v = w^2 M v."""
-    import scipy.linalg  # noqa: PLC0415  slow to import, and not every reader of a file needs it
-
-    system = screen.system()
-    squares = scipy.linalg.eigh(system.K, system.M, eigvals_only=True)
-    low, high = (math.sqrt(max(float(square), 0.0)) for square in squares)
-    return low, high

@@ -20,7 +20,7 @@ def read_drive(
     Raises
     ------
     InputError
-        Without the rated power, or where neither the ratio nor the working speed is given.
+        Without the rated power or the working speed.
     """
     if table is None:
         return None

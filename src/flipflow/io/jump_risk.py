@@ -1,28 +1,28 @@
-"""The data document of a jump risk."""
+"""The jump risk of a screen in numbers."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 from flipflow.analyses.jump_risk import JumpRisk, Throw
+from flipflow.results.codec import exact
 
 
-def risk_document(risk: JumpRisk) -> dict[str, Any]:
+def risk_summary(risk: JumpRisk) -> dict[str, Any]:
     """Least impulse and lump, SI and rad; null where nothing throws the motion."""
     return {
         "working_relative_amplitude": risk.orbit.amplitude("relative"),
         "other_motions": len(risk.others),
-        "impulse": _throw_document(risk.worst_impulse),
-        "lump": _throw_document(risk.worst_lump),
+        "impulse": _throw_summary(risk.worst_impulse),
+        "lump": _throw_summary(risk.worst_lump),
         "largest_impulse": {str(frame): size for frame, size in risk.largest_impulse.items()},
         "notes": list(risk.notes),
     }
 
 
-def _throw_document(throw: Throw | None) -> dict[str, Any] | None:
+def _throw_summary(throw: Throw | None) -> dict[str, Any] | None:
     if throw is None:
         return None
-    fields = {f.name: getattr(throw, f.name) for f in dataclasses.fields(throw)}
+    fields = dict(vars(throw))
     lands = fields.pop("lands")
-    return fields | {"lands_on_relative_amplitude": lands.amplitude("relative")}
+    return {**exact(fields), "lands_on_relative_amplitude": lands.amplitude("relative")}

@@ -16,8 +16,8 @@ from decimal import Decimal
 from typing import Any
 
 from flipflow.errors import InputError
+from flipflow.model.constants import GRAVITY
 
-STANDARD_GRAVITY = 9.80665
 _TURN = 2.0 * math.pi
 
 # SI unit -> (what it measures, an example, {unit: factor to SI}).
@@ -52,7 +52,7 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
     "m/s^2": (
         "an acceleration",
         "3 g",
-        {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": STANDARD_GRAVITY, "g_n": STANDARD_GRAVITY},
+        {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": GRAVITY, "g_n": GRAVITY},
     ),
     "kg m^2": ("a moment of inertia", "0.8 kg m^2", {"kg m^2": 1.0, "kg cm^2": 1e-4}),
     "N m": ("a torque", "40 N m", {"N m": 1.0, "kN m": 1e3}),

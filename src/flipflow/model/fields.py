@@ -239,3 +239,9 @@ FIELDS: tuple[Field, ...] = (
 # fmt: on
 
 FIELD: Mapping[str, Field] = {field.name: field for field in FIELDS}
+# Fields in the equations of motion along the surface.
+MOTION_FIELDS = (
+    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
+    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
+    "clearance_minus",
+)  # fmt: skip

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flipflow.errors import InputError
+from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import Field
 
 Interval = tuple[float, float]
@@ -28,7 +29,6 @@ class LimitField(Field):
     needs: tuple[str, ...] = ()
 
 
-_G = 9.80665
 _NORMAL = ("normal_stiffness", "normal_damping")
 
 # A table reads as a table: one line for the names, one for the sentence, one for the numbers.
@@ -42,13 +42,13 @@ LIMIT_FIELDS: tuple[LimitField, ...] = (
     LimitField(
         "main_frame_acceleration", "a1", "m/s^2", "g", "limits.main_frame_acceleration",
         "Greatest acceleration of the main frame, peak, in any direction.",
-        lower_open=True, default=None, plausible=(0.5 * _G, 100.0 * _G), example="4 g",
+        lower_open=True, default=None, plausible=(0.5 * GRAVITY, 100.0 * GRAVITY), example="4 g",
         needs=_NORMAL,
     ),
     LimitField(
         "floating_frame_acceleration", "af", "m/s^2", "g", "limits.floating_frame_acceleration",
         "Greatest acceleration of the floating frame, peak, in any direction.",
-        lower_open=True, default=None, plausible=(0.5 * _G, 100.0 * _G), example="10 g",
+        lower_open=True, default=None, plausible=(0.5 * GRAVITY, 100.0 * GRAVITY), example="10 g",
         needs=_NORMAL,
     ),
     LimitField(

@@ -142,23 +142,27 @@ def _where(parts: Sequence[Part], verdict: Verdict) -> str:
 
 def runs(labels: Sequence[str], answers: Sequence[bool | None]) -> Iterator[Part]:
     """Steps between labelled values, one fewer than labels; equal neighbours become one part."""
-    start = 0
-    for k, answer in enumerate(answers):
-        if k + 1 == len(answers) or answers[k + 1] is not answer:
-            yield Part(f"{labels[start]} to {labels[k + 1]}", answer)
-            start = k + 1
+    for first, last in _stretches(answers):
+        yield Part(f"{labels[first]} to {labels[last + 1]}", answers[first])
 
 
-def bands(omega: NDArray[np.float64], answers: Sequence[bool]) -> Iterator[Part]:
+def bands(omega: NDArray[np.float64], answers: Sequence[bool | None]) -> Iterator[Part]:
     """Frequencies in rad/s with their answers; equal neighbours become one part.
 
     A part reaches from the first to the last frequency that has its answer.
     """
+    for first, last in _stretches(answers):
+        low, high = f"{omega[first]:.4g}", f"{omega[last]:.4g}"
+        words = f"at {low} rad/s" if first == last else f"{low} to {high} rad/s"
+        yield Part(words, answers[first])
+
+
+def _stretches(answers: Sequence[bool | None]) -> Iterator[tuple[int, int]]:
+    """First and last index of equal neighbours."""
     start = 0
     for k, answer in enumerate(answers):
         if k + 1 == len(answers) or answers[k + 1] is not answer:
-            ends = f"{omega[start]:.4g}" + (f" to {omega[k]:.4g}" if k > start else "")
-            yield Part(f"{ends} rad/s", answer)
+            yield start, k
             start = k + 1
 
 

@@ -78,7 +78,8 @@ def compute(screen: FlipFlowScreen) -> Indices:
     linear = linear_response(bare, 1.0)
     w01, w02 = (float(w) for w in linear.natural_frequencies)
     ends = ((1.0 - SPREAD), (1.0 + SPREAD))
-    vary = {name: tuple(end * getattr(bare, name) for end in ends) for name in PARAMETERS}
+    present = [name for name in PARAMETERS if getattr(bare, name) > 0.0]
+    vary = {name: tuple(end * getattr(bare, name) for end in ends) for name in present}
     omega = np.linspace(w01, w02, FREQUENCIES)
     result = sensitivity(bare, vary, "relative_amplitude", omega, n=GROUPS)
     return Indices(result, w01, w02, linear.omega_ea, linear.omega_ar)
@@ -158,7 +159,9 @@ def steepest_past_antiresonance(data: Indices) -> Evaluation:
     ]
     numbers = {}
     for band, mean in (*means.items(), ("w_ar to w02", last)):
-        numbers[f"mean slope, sum of all, {band}"] = Number(1e3 * mean.sum(), "per 1000 rad/s")
+        numbers[f"mean slope, sum of all, {band}"] = Number(
+            1e3 * float(mean.sum()), "per 1000 rad/s"
+        )
     return decide(parts, numbers)
 
 

@@ -7,7 +7,14 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from flipflow.analyses.loading import Change, LoadedMachine, Loading, RegionChange, loading
+from flipflow.analyses.loading import (
+    Change,
+    LoadedMachine,
+    Loading,
+    RegionChange,
+    loading,
+    relative_from_below,
+)
 from flipflow.analyses.response_family import ResponseFamily, response_family
 from flipflow.figures.loading import loading_figure
 from flipflow.figures.parts import Figure
@@ -278,9 +285,9 @@ def heat(data: Loads) -> Evaluation:
 
 def _at(machine: LoadedMachine, omega: float) -> Change:
     """Both amplitudes at one speed as it rises; NaN where a branch does not reach."""
-    found = [branch.orbit_from_below(omega) for branch in (machine.unloaded, machine.loaded)]
-    both = [math.nan if orbit is None else orbit.amplitude("relative") for orbit in found]
-    return Change(omega, *both)
+    return Change(
+        omega, *(relative_from_below(b, omega) for b in (machine.unloaded, machine.loaded))
+    )
 
 
 def _is(change: Change, millimetres: float, percent: float) -> bool:

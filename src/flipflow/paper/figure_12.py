@@ -126,11 +126,11 @@ def _difference(member: Member, widest: Member) -> float | None:
     if member.marks is None or member.marks.omega_cs is None or widest.failure:
         return None
     low = float(widest.branch.omega.min())
-    pairs = []
-    for omega in np.linspace(low, member.marks.omega_cs, 40, endpoint=False):
-        both = [m.branch.orbit_from_below(float(omega)) for m in (member, widest)]
-        pairs += [[o.amplitude("relative") for o in both if o is not None]]
-    return max(abs(a - b) / b for a, b in pairs)
+    speeds = np.linspace(low, member.marks.omega_cs, 40, endpoint=False).tolist()
+    found = [[m.relative_amplitude(omega) for omega in speeds] for m in (member, widest)]
+    own, other = np.array(found)
+    worst = float(np.max(np.abs(own - other) / other))
+    return worst if np.isfinite(worst) else None
 
 
 def _of_family(id_: str, statement: str, rule: Rule) -> Claim[Clearances]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from flipflow import __version__
+from flipflow.analyses.monitor import Monitor, silent
 from flipflow.figures.drawing import Drawing
 from flipflow.paper.claims import DecidedClaim, Number, Verdict
 from flipflow.paper.reproduce import PAPER, ReproducedFigure, Reproduction
@@ -13,6 +14,7 @@ from flipflow.report.blocks import (
     Block,
     Cell,
     Column,
+    DrawingBlock,
     FigureBlock,
     Heading,
     Note,
@@ -20,7 +22,6 @@ from flipflow.report.blocks import (
     Text,
     TitleBlock,
 )
-from flipflow.report.blocks import Drawing as DrawingBlock
 from flipflow.report.html import page, write_page
 from flipflow.report.numbers import NOTHING, number
 
@@ -42,7 +43,7 @@ INTRODUCTION = (
 
 
 def write_reproduction(
-    found: Reproduction, folder: Path, monitor: Callable[[str, float], None] | None = None
+    found: Reproduction, folder: Path, monitor: Monitor | None = None
 ) -> tuple[str, ...]:
     """Write the page, and each figure as HTML, SVG and PDF, into an existing folder.
 
@@ -67,7 +68,7 @@ def write_reproduction(
     StoreError
         When a file cannot be written.
     """
-    say = monitor or (lambda _sentence, _share: None)
+    say = monitor or silent
     drawn = [one for one in found.figures if one.figure is not None]
     names = []
     for k, one in enumerate(drawn):
@@ -116,7 +117,7 @@ def _figure_blocks(one: ReproducedFigure) -> Iterator[Block]:
         yield Note(one.failure)
         return
     if isinstance(one.figure, Drawing):
-        yield DrawingBlock(one.figure.title, one.figure.svg, one.figure.caption)
+        yield DrawingBlock(one.figure)
     else:
         yield FigureBlock(one.figure)
     yield from one.tables

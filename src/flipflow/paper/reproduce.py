@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from flipflow import __version__
-from flipflow.errors import IncompleteError, InputError, MissingExtra
+from flipflow.analyses.monitor import Monitor, silent
+from flipflow.analyses.reopen import CODEC
+from flipflow.errors import IncompleteError, InputError, MissingExtra, StoreError
 from flipflow.figures.drawing import Drawing
 from flipflow.figures.parts import Figure
 from flipflow.io.project import load
+from flipflow.io.results import SUMMARY, document_of
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import DecidedClaim, Evaluation, Verdict, undecided
+from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict
 from flipflow.paper.figure import PaperFigure
-from flipflow.paper.registry import chosen
+from flipflow.paper.registry import FIGURES, chosen
 from flipflow.report.blocks import Table
-from flipflow.results.document import machine_document, plain
+from flipflow.results.codec import Codec, Form
+from flipflow.results.document import machine_document
 
-Monitor = Callable[[str, float], None]
 SCHEMA = "flipflow/claims/1"
 PAPER = "Lin, Wang, Xu, Zuo, Liang, Minerals 2024, 14, 406"
 MACHINE = "ffs0827"
@@ -34,7 +37,11 @@ class ReproducedFigure:
     name, title
         "figure-08", and what it shows.
     figure
-        None where it could not be computed; ``failure`` says why.
+        None where it could not be computed.
+    tables, claims
+        Tables of its page, and what the paper says of it, decided.
+    failure
+        Why it could not be computed, a sentence; empty where it was.
     """
 
     name: str
@@ -51,6 +58,10 @@ class Reproduction:
 
     screen: FlipFlowScreen
     figures: tuple[ReproducedFigure, ...]
+
+    def __repr__(self) -> str:
+        counted = ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items() if count)
+        return f"Reproduction({len(self.figures)} figures; claims: {counted or 'none'})"
 
     @property
     def claims(self) -> tuple[DecidedClaim, ...]:
@@ -69,7 +80,7 @@ class Reproduction:
             "schema": SCHEMA,
             "version": __version__,
             "paper": PAPER,
-            "machine": plain(machine_document(self.screen)),
+            "machine": machine_document(self.screen),
             "claims": [claim.document() for claim in self.claims],
             "counts": self.counts,
         }
@@ -100,7 +111,7 @@ def reproduce(
     machine = load(MACHINE) if screen is None else screen
     if not isinstance(machine, FlipFlowScreen):
         raise InputError("screen", type(machine).__name__, "give a FlipFlowScreen")
-    say = monitor or (lambda _sentence, _share: None)
+    say = monitor or silent
     wanted = chosen(tuple(figures))
     made = []
     for k, one in enumerate(wanted):
@@ -112,19 +123,52 @@ def reproduce(
 
 def _reproduced(one: PaperFigure[Any], screen: FlipFlowScreen) -> ReproducedFigure:
     if one.needs_stop and not screen.has_stop:
-        return _without(one, "a machine with stop")
+        return _without(one, "It needs a machine with stop.")
     try:
         data = one.compute(screen)
         picture, tables = one.draw(data), one.tables(data)
         claims = tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims)
-    except IncompleteError as error:
-        return _without(one, f"a branch to its end ({error})")
-    except MissingExtra as error:
-        return _without(one, f"an optional package ({error})")
+    except (IncompleteError, MissingExtra) as error:
+        return _without(one, str(error))
     return ReproducedFigure(one.name, one.title, picture, tables, claims)
 
 
-def _without(one: PaperFigure[Any], missing: str) -> ReproducedFigure:
-    evaluation: Evaluation = undecided(missing)
+def _without(one: PaperFigure[Any], why: str) -> ReproducedFigure:
+    """The figure that could not be computed, and its claims that cannot be decided."""
+    evaluation = Evaluation(Verdict.UNDECIDED, {}, why)
     claims = tuple(DecidedClaim(claim, one.name, evaluation) for claim in one.claims)
-    return ReproducedFigure(one.name, one.title, None, (), claims, f"It needs {missing}.")
+    return ReproducedFigure(one.name, one.title, None, (), claims, why)
+
+
+@document_of.register
+def _(reproduction: Reproduction) -> dict[str, Any]:
+    whole = PAPER_CODEC.form(Reproduction).write(reproduction)
+    return {**reproduction.document(), "whole": whole}
+
+
+def reproduction_from(document: Mapping[str, Any]) -> Reproduction:
+    """The reproduction that :func:`flipflow.save` wrote.
+
+    Raises
+    ------
+    StoreError
+        For a document that holds the claims alone, or one that this version does not know.
+    """
+    if "whole" not in document:
+        raise StoreError(SUMMARY)
+    reproduction: Reproduction = PAPER_CODEC.form(Reproduction).read(document["whole"])
+    return reproduction
+
+
+def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
+    """The claim that :meth:`~flipflow.paper.claims.DecidedClaim.document` wrote."""
+    name, figure = document["id"], document["figure"]
+    known = {claim.id: claim for claim in FIGURES[figure].claims} if figure in FIGURES else {}
+    if name not in known:
+        raise StoreError(f"the claim {name!r} of {figure!r} is not known; update flipflow")
+    numbers = {key: Number(**one) for key, one in document["numbers"].items()}
+    evaluation = Evaluation(Verdict(document["verdict"]), numbers, document["holds_where"])
+    return DecidedClaim(known[name], figure, evaluation)
+
+
+PAPER_CODEC = Codec({**CODEC.own, DecidedClaim: Form(DecidedClaim.document, _claim_from)})

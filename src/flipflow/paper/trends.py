@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flipflow.analyses.response_family import Member, ResponseFamily
 from flipflow.figures.scales import MM
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, Verdict, decide, runs
+from flipflow.paper.claims import Claim, Evaluation, Number, Part, Verdict, bands, decide, runs
 from flipflow.results.branch import SpecialPoint
 
 Real = NDArray[np.float64]
@@ -155,11 +155,13 @@ class AmplitudeTrend:
         answers = [self._follows(column) for column in table.T]
         middle = omega.size // 2
         numbers = {
-            f"relative amplitude at {omega[k]:.4g} rad/s, {label}": Number(MM * table[j, k], "mm")
+            f"relative amplitude at {omega[k]:.4g} rad/s, {label}": Number(
+                MM * float(table[j, k]), "mm"
+            )
             for k in sorted({0, middle, omega.size - 1})
             for j, label in enumerate(labels)
         }
-        return decide(list(_speeds(omega, answers)), numbers)
+        return decide(list(bands(omega, answers)), numbers)
 
     def _table(self, family: ResponseFamily) -> tuple[Real, Real]:
         if not self.near_antiresonance:
@@ -169,7 +171,9 @@ class AmplitudeTrend:
         if not feet:
             return np.zeros(0), np.zeros((len(family.members), 0))
         omega = np.array([min(feet), max(feet)])
-        return omega, np.array([[_at(m, float(w)) for w in omega] for m in family.members])
+        return omega, np.array(
+            [[m.relative_amplitude(float(w)) for w in omega] for m in family.members]
+        )
 
     def _follows(self, column: Real) -> bool | None:
         steps = [_moves(a, b, self.direction) for a, b in _steps(column)]
@@ -238,18 +242,3 @@ def _numbers(quantity: Quantity, labels: Sequence[str], values: Real) -> dict[st
         f"{quantity.name}, {label}": Number(float(value), quantity.unit)
         for label, value in zip(labels, values, strict=True)
     }
-
-
-def _speeds(omega: Real, answers: Sequence[bool | None]) -> Iterator[Part]:
-    """Speeds with the same answer, as bands."""
-    start = 0
-    for k, answer in enumerate(answers):
-        if k + 1 == len(answers) or answers[k + 1] is not answer:
-            low, high = f"{omega[start]:.4g}", f"{omega[k]:.4g}"
-            yield Part(f"at {low} rad/s" if k == start else f"{low} to {high} rad/s", answer)
-            start = k + 1
-
-
-def _at(member: Member, omega: float) -> float:
-    orbit = None if member.failure else member.branch.orbit_from_below(omega)
-    return float("nan") if orbit is None else orbit.amplitude("relative")

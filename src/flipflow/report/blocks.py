@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flipflow.figures.drawing import Drawing
 from flipflow.figures.parts import Figure
 
 
@@ -101,12 +102,10 @@ class FigureBlock(Block):
 
 
 @dataclass(frozen=True)
-class Drawing(Block):
-    """A drawing as SVG, with a title and a caption."""
+class DrawingBlock(Block):
+    """A drawing with its caption."""
 
-    title: str
-    svg: str
-    caption: str = ""
+    drawing: Drawing
 
 
 def cells(*texts: str) -> tuple[Cell, ...]:

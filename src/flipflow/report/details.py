@@ -7,19 +7,20 @@ from collections.abc import Iterator, Sequence
 from flipflow.analyses.assessment import Assessment, CaseAssessment
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.bars import energy_figure, region_figure
+from flipflow.figures.drawing import Drawing
 from flipflow.figures.motion import orbits_figure, portrait_figure
 from flipflow.figures.response import branch_figure
 from flipflow.figures.schematic import schematic
 from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.report.blocks import (
     Block,
     Cell,
     Column,
-    Drawing,
+    DrawingBlock,
     FigureBlock,
     Heading,
     Note,
@@ -30,11 +31,11 @@ from flipflow.report.first_page import overleaf
 from flipflow.report.numbers import four_digits, named, rpm
 from flipflow.report.registry import Part, section
 
-DRAWN = (
-    "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
-    "shear_stiffness", "shear_damping", "stop_stiffness", "stop_damping", "clearance",
-    "clearance_minus",
-)  # fmt: skip
+SCHEMATIC = (
+    "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "
+    "relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds the gap per "
+    "side (e), that on the other side when x2 falls below -e."
+)
 CASES_ABREAST = 6  # load cases for which a table has columns on an A4 page
 SYMBOLS = {
     "clearance": "gap per side e",
@@ -48,13 +49,7 @@ def machine(assessment: Assessment) -> Iterator[Block]:
     """The machine as a drawing."""
     screen = assessment.project.screen
     yield Heading("The machine", 1, new_page=not list(overleaf(assessment)))
-    yield Drawing(
-        "Schematic",
-        schematic(screen, drawn_values(screen)),
-        "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and "
-        "the relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds "
-        "the gap per side (e), that on the other side when x2 falls below -e.",
-    )
+    yield DrawingBlock(Drawing("Schematic", SCHEMATIC, schematic(screen, drawn_values(screen))))
 
 
 @section(Assessment, Part.DETAILS, 20)
@@ -109,7 +104,7 @@ def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
     return {
         name: f"{SYMBOLS.get(name, FIELD[name].symbol)} = "
         f"{shown(value, FIELD[name].file_unit, FIELD[name].unit)}"
-        for name in DRAWN
+        for name in MOTION_FIELDS
         if (value := getattr(screen, name)) is not None
     }
 

@@ -84,6 +84,8 @@ class Branch:
         Options of the method used.
     solver, traced
         The solver and the points it left.
+    return_maps
+        Linearised return maps over a turn, or over half a turn with sign, (n, 2 N, 2 N).
     saddle_side_at_start
         Whether an odd number of real multipliers lies beyond +1 where the branch rises.
     multipliers
@@ -192,8 +194,12 @@ class Branch:
         ------
         InputError
             For a frequency outside the branch.
+        IncompleteError
+            When the branch has no points.
         """
         ends = self.omega
+        if ends.size == 0:
+            raise IncompleteError(f"The branch has no points. {self.status.value}")
         if not isinstance(omega, (int, float)) or not ends.min() <= omega <= ends.max():
             remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
             raise InputError("omega", omega, remedy)
@@ -266,7 +272,7 @@ class Branch:
     def peak(self, which: Coordinate) -> SpecialPoint:
         """The motion of largest amplitude on the branch, refined between its points."""
         if self.omega.size == 0:
-            raise IncompleteError(f"the branch has no points: {self.status.value}")
+            raise IncompleteError(f"The branch has no points. {self.status.value}")
         return self._refined(which, int(self.amplitude(which).argmax()), "peak")
 
     def peaks(self, which: Coordinate) -> tuple[SpecialPoint, ...]:

@@ -1,32 +1,32 @@
-"""One data document per result: behind ``--json``, ``save`` and ``open_result``.
+"""What a file holds of machines, methods, motions and branches: all it takes to open them again.
 
-Documents are plain dictionaries of JSON types with ``"schema": "flipflow/<kind>/<version>"``;
-complex numbers are pairs [re, im], what is not finite is null.
+Documents are plain dictionaries of JSON types; complex numbers are pairs [re, im], what is not
+finite is null. :mod:`flipflow.results.codec` writes what needs no words of its own.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from flipflow.errors import StoreError
+from flipflow.methods.balance import BalanceSolver, SampledSolver
 from flipflow.methods.options import (
     HarmonicBalance,
     Method,
     PiecewiseExact,
     SampledHarmonicBalance,
 )
+from flipflow.methods.solver import Point, Solver
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import Machine, MechanicalSystem
-from flipflow.results.basins import Basins
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.results.codec import Codec, array, exact, plain
 from flipflow.results.field_branch import FieldBranch
 from flipflow.results.orbit import Orbit
+from flipflow.results.sweep import Sweep
 
 Document = dict[str, Any]
 METHODS: Mapping[str, type[Method]] = {
@@ -34,45 +34,16 @@ METHODS: Mapping[str, type[Method]] = {
     "HarmonicBalance": HarmonicBalance,
     "SampledHarmonicBalance": SampledHarmonicBalance,
 }
-BRANCH, ORBIT, BASINS = "flipflow/branch/1", "flipflow/orbit/1", "flipflow/basins/1"
-FIELD_BRANCH = "flipflow/field-branch/1"
-
-
-def plain(value: object) -> Any:
-    """JSON types only: arrays become lists, complex numbers [re, im], inf and NaN null."""
-    if isinstance(value, (np.ndarray, np.generic)):
-        return plain(value.tolist())
-    if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, complex):
-        return [plain(value.real), plain(value.imag)]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+SCREEN = Codec({}).form(FlipFlowScreen)
 
 
 def branch_document(branch: Branch) -> Document:
-    """A branch with what it takes to open it again, and the amplitudes of named coordinates."""
-    system = branch.system
+    """A branch over frequency."""
     traced = branch.traced
     return {
-        "schema": BRANCH,
-        "version": branch.version,
-        "machine": machine_document(branch.machine),
+        **_followed_document(branch, branch.system.named),
         "method": method_document(branch.method),
-        "status": branch.status.name,
-        "status_sentence": branch.status.value,
-        "complete": branch.complete,
-        "notes": list(branch.notes),
         "shortened_steps": [dataclasses.asdict(step) for step in branch.shortened_steps],
-        "omega": plain(branch.omega),
-        "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
-        "phase": {str(which): plain(branch.phase(which)) for which in system.named},
-        "stability": branch.stability.tolist(),
-        "multipliers": plain(branch.multipliers),
-        "error": plain(branch.error),
         "special_points": [special_point_document(point) for point in branch.special_points],
         "half_turn": branch.solver.half_turn,
         "turns": branch.solver.turns,
@@ -81,6 +52,7 @@ def branch_document(branch: Branch) -> Document:
         "tangent": plain(traced.tangent),
         "return_maps": plain(branch.return_maps),
         "course": plain(tuple(traced.course)),
+        "side": plain(traced.record.side[: traced.omega.size]),
         "signature": plain(traced.signature),
         "iterations": plain(traced.iterations),
         "rejected": plain(traced.rejected),
@@ -90,26 +62,12 @@ def branch_document(branch: Branch) -> Document:
 
 
 def field_branch_document(branch: FieldBranch) -> Document:
-    """A branch over a field: amplitudes, stability, and the state of every motion."""
-    system = branch.machine.system()
+    """A branch over a field of the machine."""
     return {
-        "schema": FIELD_BRANCH,
-        "version": branch.version,
-        "machine": machine_document(branch.machine),
+        **_followed_document(branch, branch.machine.system().named),
         "field": branch.field,
-        "status": branch.status.name,
-        "status_sentence": branch.status.value,
-        "complete": branch.complete,
-        "notes": list(branch.notes),
         "values": plain(branch.values),
-        "omega": plain(branch.omega),
-        "amplitude": {str(which): plain(branch.amplitude(which)) for which in system.named},
-        "phase": {str(which): plain(branch.phase(which)) for which in system.named},
-        "stability": branch.stability.tolist(),
-        "multipliers": plain(branch.multipliers),
-        "error": plain(branch.error),
-        "periods": [orbit.periods for orbit in branch.orbits],
-        "states": [plain(orbit.state) for orbit in branch.orbits],
+        "points": [_point_document(orbit.point) for orbit in branch.orbits],
         "special_points": [
             {"value": point.value, **special_point_document(point)}
             for point in branch.special_points
@@ -117,8 +75,26 @@ def field_branch_document(branch: FieldBranch) -> Document:
     }
 
 
+def _followed_document(branch: Branch | FieldBranch, named: tuple[Coordinate, ...]) -> Document:
+    """What every branch holds, and the amplitudes and phases of named coordinates."""
+    return {
+        "version": branch.version,
+        "machine": machine_document(branch.machine),
+        "status": branch.status.name,
+        "status_sentence": branch.status.value,
+        "complete": branch.complete,
+        "notes": list(branch.notes),
+        "omega": plain(branch.omega),
+        "amplitude": {str(which): plain(branch.amplitude(which)) for which in named},
+        "phase": {str(which): plain(branch.phase(which)) for which in named},
+        "stability": branch.stability.tolist(),
+        "multipliers": plain(branch.multipliers),
+        "error": plain(branch.error),
+    }
+
+
 def special_point_document(point: SpecialPoint) -> Document:
-    """A special point: kind, frequency, amplitudes, the motion's unknowns."""
+    """A special point: kind, frequency, amplitudes, its motion."""
     system = point.orbit.system
     return {
         "kind": point.kind,
@@ -126,70 +102,61 @@ def special_point_document(point: SpecialPoint) -> Document:
         "position": point.position,
         "spring": point.spring,
         "side": point.side,
+        "stability": point.orbit.stability,
         "amplitude": {str(which): point.amplitude(which) for which in system.named},
-        "half_turn": point.orbit.point.solver.half_turn,
-        "turns": point.orbit.periods,
-        "unknowns": plain(point.orbit.unknowns),
-        "return_map": plain(point.orbit.return_map),
+        **_point_document(point.orbit.point),
     }
 
 
 def orbit_document(orbit: Orbit) -> Document:
-    """One motion: over time, its contacts, multipliers and error."""
+    """One motion of a machine, and the amplitudes of named coordinates."""
     system = orbit.system
     return {
-        "schema": ORBIT,
+        "machine": machine_document(orbit.machine),
+        "method": method_document(method_of(orbit.point.solver)),
         "omega": orbit.omega,
         "periods": orbit.periods,
         "stability": orbit.stability,
-        "multipliers": plain(orbit.multipliers),
-        "error": plain(orbit.error),
-        "t": plain(orbit.t),
-        "displacement": {str(which): plain(orbit.displacement(which)) for which in system.named},
-        "velocity": {str(which): plain(orbit.velocity(which)) for which in system.named},
-        "amplitude": {str(which): orbit.amplitude(which) for which in system.named},
-        "stop_force": [plain(orbit.stop_force(j)) for j in range(len(system.springs))],
-        "contacts": [plain(dataclasses.asdict(touch)) for touch in orbit.contact_intervals],
+        "amplitude": {str(which): plain(orbit.amplitude(which)) for which in system.named},
+        **_point_document(orbit.point),
     }
 
 
-def basins_document(basins: Basins) -> Document:
-    """Labels, shares and motions of a grid of initial states; what it takes to open it again."""
-    system = basins.machine.system()
+def sweep_document(sweep: Sweep) -> Document:
+    """What a machine settles to, speed by speed."""
     return {
-        "schema": BASINS,
-        "version": basins.version,
-        "machine": machine_document(basins.machine),
-        "omega": basins.omega,
-        "axes": [
-            {"kind": axis.kind, "which": axis.which, "values": plain(axis.values)}
-            for axis in basins.axes
-        ],
-        "labels": plain(basins.labels),
-        "turns": plain(basins.turns),
-        "most_turns": basins.most_turns,
-        "complete": basins.complete,
-        "shares": plain(basins.shares),
-        "share_intervals": plain(basins.share_intervals),
-        "unsettled": basins.unsettled,
-        "orbits": [
-            {
-                "periods": orbit.periods,
-                "amplitude": {str(which): orbit.amplitude(which) for which in system.named},
-                "unknowns": plain(orbit.unknowns),
-                "return_map": plain(orbit.return_map),
-            }
-            for orbit in basins.orbits
-        ],
-        "notes": list(basins.notes),
+        "version": sweep.version,
+        "machine": machine_document(sweep.machine),
+        "omega": plain(sweep.omega),
+        "amplitude": {str(which): plain(sweep.amplitude(which)) for which in sweep.system.named},
+        "periods": plain(sweep.periods),
+        "settled": plain(sweep.settled),
+        "turns": plain(sweep.turns),
+        "distance": plain(sweep.distance),
+        "jumps": [dataclasses.asdict(jump) for jump in sweep.jumps],
+        "max_periods": sweep.max_periods,
+        "most_turns": sweep.most_turns,
+        "complete": sweep.complete,
+        "states": [plain(row.recent) for row in sweep.rows],
+        "points": [None if row.point is None else _point_document(row.point) for row in sweep.rows],
+    }
+
+
+def _point_document(point: Point) -> Document:
+    """A motion as its solver left it."""
+    return {
+        "omega": point.omega,
+        "half_turn": point.solver.half_turn,
+        "turns": point.solver.turns,
+        "unknowns": plain(point.u),
+        "return_map": plain(point.return_map),
     }
 
 
 def machine_document(machine: Machine) -> Document:
     """A screen by its fields, any other machine by its matrices; infinite gaps are "inf"."""
     if isinstance(machine, FlipFlowScreen):
-        fields = dataclasses.asdict(machine)
-        return {"kind": "screen", **{key: _with_inf(value) for key, value in fields.items()}}
+        return {"kind": "screen", **SCREEN.write(machine)}
     system = machine.system()
     return {
         "kind": "system",
@@ -199,7 +166,7 @@ def machine_document(machine: Machine) -> Document:
                 "direction": plain(spring.direction),
                 "stiffness": spring.stiffness,
                 "damping": spring.damping,
-                "gaps": [_with_inf(gap) for gap in spring.gaps],
+                "gaps": exact(spring.gaps),
                 "law": spring.law,
             }
             for spring in system.springs
@@ -214,11 +181,25 @@ def machine_document(machine: Machine) -> Document:
 
 def machine_from(document: Mapping[str, Any]) -> Machine:
     """The machine of a document."""
-    values = {key: value for key, value in document.items() if key != "kind"}
-    if document["kind"] == "screen":
-        table = tuple(tuple(row) for row in values.pop("temperature_factor", ()))
-        numbers = {key: math.inf if value == "inf" else value for key, value in values.items()}
-        return FlipFlowScreen(temperature_factor=table, **numbers)  # type: ignore[arg-type]
+    return screen_from(document) if document["kind"] == "screen" else system_from(document)
+
+
+def screen_from(document: Mapping[str, Any]) -> FlipFlowScreen:
+    """The screen of a document.
+
+    Raises
+    ------
+    StoreError
+        When the document holds a machine of another kind.
+    """
+    if document["kind"] != "screen":
+        raise StoreError("the machine of this result is no screen, as it should be")
+    screen: FlipFlowScreen = SCREEN.read(document)
+    return screen
+
+
+def system_from(document: Mapping[str, Any]) -> MechanicalSystem:
+    """The system of a document."""
     springs = [
         ClearanceSpring(
             one["direction"],
@@ -228,17 +209,25 @@ def machine_from(document: Mapping[str, Any]) -> Machine:
             float(one["gaps"][1]),
             law=one["law"],
         )
-        for one in values["springs"]
+        for one in document["springs"]
     ]
     kinds: Mapping[str, type[Unbalance | HarmonicForce]] = {
         "Unbalance": Unbalance,
         "HarmonicForce": HarmonicForce,
     }
-    vector = _complex(values["excitation"]["vector"])
-    return MechanicalSystem(
-        values["M"], values["C"], values["K"], springs,
-        kinds[values["excitation"]["kind"]](vector), values["coordinates"],
-    )  # fmt: skip
+    excitation = document["excitation"]
+    force = kinds[excitation["kind"]](array(excitation["vector"], complex))
+    M, C, K = (document[name] for name in "MCK")
+    return MechanicalSystem(M, C, K, springs, force, document["coordinates"])
+
+
+def method_of(solver: Solver) -> Method:
+    """The method that a solver belongs to, with the usual number of points."""
+    if isinstance(solver, SampledSolver):
+        return SampledHarmonicBalance(solver.order, solver.samples, solver.sharpness)
+    if isinstance(solver, BalanceSolver):
+        return HarmonicBalance(solver.order)
+    return PiecewiseExact()
 
 
 def method_document(method: Method) -> Document:
@@ -247,17 +236,14 @@ def method_document(method: Method) -> Document:
 
 
 def method_from(document: Mapping[str, Any]) -> Method:
-    """The method of a document."""
+    """The method of a document.
+
+    Raises
+    ------
+    StoreError
+        For a method that this version does not know.
+    """
     options = {key: value for key, value in document.items() if key != "name"}
     if document["name"] not in METHODS:
-        raise StoreError(f"method {document['name']!r} is not known; update flipflow")
+        raise StoreError(f"the method {document['name']!r} is not known; update flipflow")
     return METHODS[document["name"]](**options)
-
-
-def _with_inf(value: object) -> object:
-    return "inf" if value == math.inf else value
-
-
-def _complex(pairs: object) -> np.ndarray[Any, np.dtype[np.complex128]]:
-    array = np.asarray(pairs, dtype=float)
-    return np.asarray(array[..., 0] + 1j * array[..., 1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from flipflow.errors import InputError
 from flipflow.methods.motion import ContactInterval, Motion
 from flipflow.methods.solver import Point
 from flipflow.methods.stability import STABLE, full_turn, stability_words
+from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 
 Real = NDArray[np.float64]
@@ -152,11 +153,16 @@ class Orbit:
 
     @property
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
-        """Every touch of every stop within the period."""
-        return self.motion.contact_intervals()
+        """Every touch of every stop with a gap within the period."""
+        kept = self._kept
+        return tuple(
+            replace(touch, spring=kept[touch.spring]) for touch in self.motion.contact_intervals()
+        )
 
     def contact_share(self, spring: int = 0) -> float:
-        """Share of the period during which a stop is touched, 0 to 1."""
+        """Share of the period during which a stop is touched, 0 to 1; 1 for one without gap."""
+        if self._spring(spring).bonded:
+            return 1.0
         touches = (c for c in self.contact_intervals if c.spring == spring)
         return sum(c.end - c.start for c in touches) / self.period
 
@@ -185,9 +191,8 @@ class Orbit:
 
         def square(t: Real, piece: NDArray[np.intp]) -> Real:
             rate = self.motion.piece_derivative(t, piece, 1) @ vector
-            if spring is None:
-                return np.asarray(rate**2)
-            return np.asarray(rate**2 * (np.abs(self.motion.pieces.states[piece, spring]) == 1))
+            engaged = 1.0 if spring is None else np.abs(self._side(spring, piece))
+            return np.asarray(rate**2 * engaged)
 
         return self._mean(square)
 
@@ -227,28 +232,42 @@ class Orbit:
     @property
     def touches(self) -> bool:
         """Whether any stop carries a force during the period; one without gap always does."""
-        always = any(
-            spring.bonded and spring.acts for spring in self.point.solver.builder.original.springs
-        )
+        always = any(spring.bonded and spring.acts for spring in self._springs)
         return always or bool(self.contact_intervals)
 
+    @cached_property
+    def _springs(self) -> tuple[ClearanceSpring, ...]:
+        """The springs of the machine as it was given."""
+        return self.machine.system().springs
+
+    @property
+    def _kept(self) -> list[int]:
+        """Numbers of the springs that can open and close: the motion knows no others."""
+        return [j for j, one in enumerate(self._springs) if one.acts and not one.bonded]
+
+    def _spring(self, number: int) -> ClearanceSpring:
+        count = len(self._springs)
+        if not 0 <= number < count:
+            raise InputError("spring", number, f"the machine has {count} springs, from 0 on")
+        return self._springs[number]
+
+    def _side(self, spring: int, piece: NDArray[np.intp]) -> NDArray[np.int64]:
+        """Side (+1, -1) on which a spring is engaged in each piece, 0 where it carries no force."""
+        if self._spring(spring).bonded:
+            return np.ones(piece.shape, np.int64)
+        if spring not in self._kept:
+            return np.zeros(piece.shape, np.int64)
+        state = self.motion.pieces.states[piece, self._kept.index(spring)]
+        return np.where(np.abs(state) == 1, state, 0)
+
     def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
-        """Force of a spring of the machine as it was given; springs that never act carry none."""
-        springs = self.point.solver.builder.original.springs
-        if not 0 <= spring < len(springs):
-            raise InputError("spring", spring, f"the machine has {len(springs)} springs, from 0 on")
-        stop = springs[spring]
+        """Force of a spring of the machine as it was given."""
+        stop, side = self._spring(spring), self._side(spring, piece)
         y = self.motion.piece_derivative(t, piece, 0) @ stop.direction
         v = self.motion.piece_derivative(t, piece, 1) @ stop.direction
-        if stop.bonded:
-            return np.asarray(stop.stiffness * y + stop.damping * v)
-        if not stop.acts:
-            return np.zeros(y.shape)
-        kept = sum(one.acts and not one.bonded for one in springs[:spring])
         plus, minus = stop.gaps
-        state = self.motion.pieces.states[piece, kept]
-        gap = np.where(state == 1, plus, np.where(state == -1, -minus, 0.0))
-        return np.where(np.abs(state) == 1, stop.stiffness * (y - gap) + stop.damping * v, 0.0)
+        gap = np.select([side == 1, side == -1], [plus, -minus])
+        return np.where(side == 0, 0.0, stop.stiffness * (y - gap) + stop.damping * v)
 
     def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
         vector = self.system.coordinate(which)[None]

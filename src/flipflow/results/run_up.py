@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.system import Machine
 from flipflow.results.history import History
@@ -16,7 +16,6 @@ from flipflow.results.history import History
 Outcome = Literal[
     "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
 ]
-RPM = 30.0 / math.pi
 AT_SPEED = 0.95  # of the working speed: a motor's slip differs with its load
 
 
@@ -27,6 +26,13 @@ class Peak:
     value: float
     omega: float
     t: float
+
+
+class NaturalFrequency(NamedTuple):
+    """A natural frequency: its name, as w01, and its value in rad/s."""
+
+    name: str
+    omega: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +54,7 @@ class RunUp:
     final_speed
         Speed at the end in rad/s; with a motor the mean over the last turns.
     near
-        Name and value in rad/s of the natural frequency at which it is captured, else None.
+        The natural frequency at which it is captured, else None.
     first_frequency
         w01 in rad/s; 0 for a machine that nothing holds.
     passing
@@ -70,12 +76,15 @@ class RunUp:
     history: History
     outcome: Outcome
     final_speed: float
-    near: tuple[str, float] | None
+    near: NaturalFrequency | None
     first_frequency: float
     passing: float | None
     peaks: Mapping[str, Peak]
     power: Mapping[str, float]
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"RunUp({self.outcome}, {self.final_speed:.6g} rad/s after {self.duration:.4g} s)"
 
     @property
     def duration(self) -> float:
@@ -96,8 +105,8 @@ class RunUp:
         now, wanted = f"{self.final_speed * RPM:.0f} rpm", f"{self.speed * RPM:.0f} rpm"
         seconds = f"{self.duration:.3g} s"
         if self.outcome == "captured" and self.near is not None:
-            name, omega = self.near
-            return f"captured at {now}, near the natural frequency {name} = {omega * RPM:.0f} rpm"
+            held = f"{self.near.name} = {self.near.omega * RPM:.0f} rpm"
+            return f"captured at {now}, near the natural frequency {held}"
         sentences = {
             "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
             "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",

@@ -30,6 +30,9 @@ class Section:
     omega: float
     states: Real
 
+    def __repr__(self) -> str:
+        return f"Section({self.states.shape[0]} turns at {self.omega:.6g} rad/s)"
+
     def displacement(self, which: Coordinate) -> Real:
         """Displacement of a coordinate in m, (T,)."""
         return np.asarray(self.states[:, : self.system.size] @ self.system.coordinate(which))
@@ -59,3 +62,7 @@ class Spectrum:
     frequencies: Real
     amplitudes: Real
     which: Coordinate
+
+    def __repr__(self) -> str:
+        highest = f"{self.frequencies[-1]:.6g} rad/s"
+        return f"Spectrum({self.which!r}, {self.frequencies.size} lines up to {highest})"

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from flipflow.errors import StoreError
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
-from flipflow.results.document import Document, machine_document, machine_from, plain
+from flipflow.results.codec import array, plain
+from flipflow.results.document import Document, machine_document, screen_from
 
 Real = NDArray[np.float64]
-SENSITIVITY = "flipflow/sensitivity/1"
 KINDS: Mapping[str, type[Interval | Normal | Choice]] = {
     "Interval": Interval,
     "Normal": Normal,
@@ -138,18 +138,13 @@ ARRAYS = (
 
 def sensitivity_document(result: Sensitivity) -> Document:
     """A sensitivity with all it takes to open it again."""
-    distributions = [
-        {"kind": type(one).__name__, **plain(dataclasses.asdict(one))}  # type: ignore[call-overload]
-        for one in result.distributions
-    ]
     return {
-        "schema": SENSITIVITY,
         "version": result.version,
         "machine": machine_document(result.screen),
         "quantity": result.quantity,
         "branch": result.branch,
         "names": list(result.names),
-        "vary": distributions,
+        "vary": [distribution_document(one) for one in result.distributions],
         "omega": plain(result.omega),
         "interval": isinstance(result.omega, tuple),
         "n": result.n,
@@ -166,18 +161,15 @@ def sensitivity_from(document: Mapping[str, Any]) -> Sensitivity:
     StoreError
         When the document holds something this version does not know.
     """
-    screen = machine_from(document["machine"])
-    if not isinstance(screen, FlipFlowScreen):
-        raise StoreError("a sensitivity belongs to a screen, and this document holds another")
-    arrays = {name: _array(document[name]) for name in ARRAYS}
+    arrays = {name: _numbers(document[name]) for name in ARRAYS}
     omega = document["omega"]
     return Sensitivity(
-        screen=screen,
+        screen=screen_from(document["machine"]),
         quantity=document["quantity"],
         branch=document["branch"],
         names=tuple(document["names"]),
-        distributions=tuple(_distribution_from(one) for one in document["vary"]),
-        omega=(float(omega[0]), float(omega[1])) if document["interval"] else _array(omega),
+        distributions=tuple(distribution_from(one) for one in document["vary"]),
+        omega=(float(omega[0]), float(omega[1])) if document["interval"] else _numbers(omega),
         n=int(document["n"]),
         notes=tuple(document["notes"]),
         version=document["version"],
@@ -185,15 +177,29 @@ def sensitivity_from(document: Mapping[str, Any]) -> Sensitivity:
     )
 
 
-def _array(values: object) -> Any:
-    array = np.asarray(values, dtype=float)
-    return float(array) if array.ndim == 0 else array
+def distribution_document(distribution: Distribution) -> Document:
+    """How a field varies, by name and numbers."""
+    fields = dataclasses.asdict(distribution)  # type: ignore[call-overload]
+    return {"kind": type(distribution).__name__, **plain(fields)}
 
 
-def _distribution_from(document: Mapping[str, Any]) -> Distribution:
+def distribution_from(document: Mapping[str, Any]) -> Distribution:
+    """The distribution of a document.
+
+    Raises
+    ------
+    StoreError
+        For a distribution that this version does not know.
+    """
     if document["kind"] not in KINDS:
         raise StoreError(f"the distribution {document['kind']!r} is not known; update flipflow")
     values = {key: value for key, value in document.items() if key != "kind"}
     if "values" in values:
         values["values"] = tuple(values["values"])
     return KINDS[document["kind"]](**values)
+
+
+def _numbers(values: object) -> Any:
+    """An array, or the number where it is one."""
+    found = array(values)
+    return float(found) if found.ndim == 0 else found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Self
 
 from flipflow.kernels import status
 from flipflow.kernels.arclength import (
@@ -46,24 +45,24 @@ class BranchStatus(Enum):
         """Whether the branch was followed to both its ends, or all round."""
         return self in (BranchStatus.COMPLETE, BranchStatus.FOLLOWED, BranchStatus.CLOSED)
 
-    @classmethod
-    def from_code(cls, code: int) -> Self:
+    @staticmethod
+    def from_code(code: int) -> BranchStatus:
         """The status of a kernel's code."""
-        return cls(_SENTENCE[code])
+        return _OF_CODE[code]
 
 
-_SENTENCE = {
-    status.REACHED_UPPER: BranchStatus.COMPLETE.value,
-    status.FOLLOWED: BranchStatus.FOLLOWED.value,
-    status.REACHED_LOWER: BranchStatus.TURNED_BACK.value,
-    status.CLOSED: BranchStatus.CLOSED.value,
-    status.STEP_TOO_SMALL: BranchStatus.STEP_TOO_SMALL.value,
-    status.POINT_LIMIT: BranchStatus.POINT_LIMIT.value,
-    status.TOO_MANY_EVENTS: BranchStatus.TOO_MANY_CONTACTS.value,
-    status.NO_CONVERGENCE: BranchStatus.NO_START.value,
-    status.SINGULAR: BranchStatus.NO_START.value,
-    status.NOT_FINITE: BranchStatus.NOT_FINITE.value,
-    status.SEARCH_NOT_ENDED: BranchStatus.TOO_MANY_CONTACTS.value,
+_OF_CODE = {
+    status.REACHED_UPPER: BranchStatus.COMPLETE,
+    status.FOLLOWED: BranchStatus.FOLLOWED,
+    status.REACHED_LOWER: BranchStatus.TURNED_BACK,
+    status.CLOSED: BranchStatus.CLOSED,
+    status.STEP_TOO_SMALL: BranchStatus.STEP_TOO_SMALL,
+    status.POINT_LIMIT: BranchStatus.POINT_LIMIT,
+    status.TOO_MANY_EVENTS: BranchStatus.TOO_MANY_CONTACTS,
+    status.NO_CONVERGENCE: BranchStatus.NO_START,
+    status.SINGULAR: BranchStatus.NO_START,
+    status.NOT_FINITE: BranchStatus.NOT_FINITE,
+    status.SEARCH_NOT_ENDED: BranchStatus.TOO_MANY_CONTACTS,
 }
 
 STEP_REASON = {

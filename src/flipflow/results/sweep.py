@@ -44,7 +44,8 @@ class Sweep:
     omega
         Frequencies in rad/s, in the order in which they were passed.
     rows
-        Where the machine was at the end of each step.
+        Where the machine was at the end of each step; ``recent`` holds one period of a motion that
+        repeats, else the last turns recorded (up to 64).
     jumps
         Where the motion jumped.
     max_periods, most_turns
@@ -118,16 +119,15 @@ class Sweep:
         """Least and greatest value of a coordinate in m at the end of each step."""
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
-            low, high = np.empty(self.omega.size), np.empty(self.omega.size)
-            periods = self.periods
-            for count in np.unique(periods):
-                for k in np.flatnonzero(periods == count):
-                    # A motion of n periods repeats after n turns; else all recorded turns are seen.
-                    states = self.rows[k].recent[-max(int(count), 1) if count else None :]
-                    speeds = np.full(states.shape[0], self.omega[k])
-                    least, most, _ = self.solver.extremes(states, speeds, np.array([key]))
-                    low[k], high[k] = least.min(), most.max()
-            self._seen[key] = (low, high)
+            turns = [row.recent.shape[0] for row in self.rows]
+            states = np.concatenate([row.recent for row in self.rows])
+            low, high, _ = self.solver.extremes(
+                states, np.repeat(self.omega, turns), np.array([key])
+            )
+            starts = np.cumsum([0, *turns[:-1]])
+            self._seen[key] = (
+                np.minimum.reduceat(low[:, 0], starts), np.maximum.reduceat(high[:, 0], starts),
+            )  # fmt: skip
         return self._seen[key]
 
     @cached_property

@@ -19,7 +19,7 @@ GAUSS_NODES = 16
 TURNS_A_CALL = 32
 
 
-class Course:
+class Recording:
     """Samples, changes of contact and energies of a motion; the machine may change on the way.
 
     Parameters
