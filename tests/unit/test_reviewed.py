@@ -67,6 +67,26 @@ def test_region_that_starts_in_contact_says_so(screen):
     assert any("below the speeds analysed" in note for note in region.notes)
 
 
+@pytest.mark.parametrize("minus", [6e-3, math.inf])
+def test_region_ends_at_the_main_resonance_not_at_a_small_one(screen, minus):
+    """Without gap on one side two folds stand at 50.5 and 50.7 rad/s, far below the main peak."""
+    region = ff.operating_region(screen.replace(clearance=0.0, clearance_minus=minus))
+    assert [fold.omega for fold in region.branch.folds] == pytest.approx([50.707295, 50.533177])
+    assert (region.omega_lb, region.omega_ub) == (None, None)
+    assert region.upper == region.branch.peak("relative").omega
+    assert region.lower < region.upper
+
+
+def test_stop_that_is_met_at_the_first_resonance_alone(screen):
+    """Isolation almost undamped, shear springs heavily: the stop is not part of the region."""
+    quiet = screen.replace(isolation_damping=100.0, shear_damping=25e3, clearance=8e-3)
+    region = ff.operating_region(quiet)
+    assert region.branch.points_of("contact begin")
+    assert region.omega_cs is None
+    assert (region.lower, region.upper) == (region.omega_ea, region.omega_ar)
+    assert any("not reached at the main resonance" in note for note in region.notes)
+
+
 def test_five_stops_prepare_configurations_as_they_are_met():
     """3^5 configurations are not prepared at once; the branch still completes."""
     n = 5

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from flipflow.methods.options import Method
 from flipflow.methods.special import CONTACT_BEGIN
 from flipflow.model.limits import Limits
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.results.branch import Branch
+from flipflow.results.branch import Branch, SpecialPoint
 
 LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
@@ -227,21 +229,36 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
     """
     effective = _bonded(screen)
     ea, ar = equal_amplitude_frequency(effective), antiresonance_frequency(effective)
-    peak = branch.peak("relative")
-    begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.omega < peak.omega]
-    cs = begins[-1] if begins else None
-    lb, ub = _main_folds(branch)
+    peak = _main_peak(branch, ar)
+    touched = peak.orbit.touches and effective is screen
+    begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.position < peak.position]
+    cs = begins[-1] if begins and touched else None
+    lb, ub = _main_folds(branch, peak)
     span = (float(branch.omega.min()), float(branch.omega.max()))
-    touched = bool(np.any(branch.traced.signature != 0))
     upper = peak.omega if lb is None else lb
     if cs is not None:
         return Landmarks(ea, ar, cs, lb, ub, cs, upper)
     if touched:
         note = "Contact begins below the speeds analysed: the region starts with them."
         return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
-    reaches = screen.has_stop and effective is screen
-    notes = ("The stop is not reached at any speed analysed.",) if reaches else ()
-    return Landmarks(ea, ar, cs, lb, ub, ea or span[0], ar or span[1], notes)
+    notes = tuple(_untouched_notes(screen, branch)) if effective is screen else ()
+    lower, upper = ea or span[0], ar or span[1]
+    if lower >= upper:
+        notes += ("Equal amplitudes come above the antiresonance: the region is empty.",)
+    return Landmarks(ea, ar, cs, lb, ub, lower, upper, notes)
+
+
+def _untouched_notes(screen: FlipFlowScreen, branch: Branch) -> Iterator[str]:
+    """What to say of a stop that is not reached where it shall work."""
+    if not screen.has_stop:
+        return
+    if np.any(branch.traced.signature != 0):
+        yield (
+            "The stop is not reached at the main resonance, only elsewhere: the region is that of "
+            "a screen without stop."
+        )
+    else:
+        yield "The stop is not reached at any speed analysed."
 
 
 def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
@@ -254,11 +271,27 @@ def _bonded(screen: FlipFlowScreen) -> FlipFlowScreen:
     )
 
 
-def _main_folds(branch: Branch) -> tuple[float | None, float | None]:
-    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next."""
-    folds = branch.folds
-    if len(folds) < 2:
-        return None, None
-    first = max(range(len(folds) - 1), key=lambda k: folds[k].amplitude("relative"))
-    pair = (folds[first].omega, folds[first + 1].omega)
-    return min(pair), max(pair)
+def _main_peak(branch: Branch, antiresonance: float | None) -> SpecialPoint:
+    """The largest relative motion above the antiresonance, which parts the two resonances."""
+    peak = branch.peak("relative")
+    if antiresonance is None or peak.omega >= antiresonance:
+        return peak
+    higher = [one for one in branch.peaks("relative") if one.omega >= antiresonance]
+    return max(higher, key=lambda one: one.amplitude("relative"), default=peak)
+
+
+def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
+    """(w_lb, w_ub): the first two folds on the way down from the main peak.
+
+    A fold beyond a trough belongs to another resonance, as do those before the peak.
+    """
+    size = branch.amplitude("relative")
+    for first, second in pairwise(branch.folds):
+        # A peak and the fold beside it may stand in one step of the branch.
+        if first.position <= peak.position - 1.0:
+            continue
+        way = size[math.ceil(peak.position) : math.floor(first.position) + 1]
+        if np.any(way < first.amplitude("relative")):
+            break
+        return min(first.omega, second.omega), max(first.omega, second.omega)
+    return None, None
