@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.analyses.assessment import assess_case, verdict
 from flipflow.errors import InputError
 
 
@@ -85,6 +86,19 @@ def test_stop_that_is_met_at_the_first_resonance_alone(screen):
     assert region.omega_cs is None
     assert (region.lower, region.upper) == (region.omega_ea, region.omega_ar)
     assert any("not reached at the main resonance" in note for note in region.notes)
+
+
+def test_speed_without_a_stable_motion_is_not_called_out_of_range(screen):
+    """Past a fold onto unstable motions only, the speed lies well within those analysed."""
+    restless = screen.replace(
+        main_mass=1273.7243, floating_mass=224.77805, isolation_damping=2926.2439,
+        shear_damping=2719.1742, stop_stiffness=29106997.0, stop_damping=1085.9144,
+        clearance=0.0, clearance_minus=8.930106862626047e-3,
+    )  # fmt: skip
+    region = ff.operating_region(restless)
+    for omega, why in ((420.0, "meets no stable motion in empty"), (900.0, "do not hold it")):
+        case = assess_case(restless, ff.Load(), region.branch, omega)
+        assert why in verdict(omega, (), (case,), region)
 
 
 def test_five_stops_prepare_configurations_as_they_are_met():

@@ -304,11 +304,9 @@ def verdict(
     if omega is None:
         return "No operating speed is given: the allowed speed range stands below."
     speed = f"{omega * 30.0 / math.pi:.4g} rpm"
-    unknown = [case.name for case in cases if case.orbit is None]
+    unknown = [case for case in cases if case.orbit is None]
     if unknown:
-        return (
-            f"{speed}: not judged, for the speeds analysed do not hold it in {', '.join(unknown)}."
-        )
+        return f"{speed}: not judged, for {_why_unknown(omega, unknown)}."
     lost = [case.name for case in cases if case.orbit is not None and not case.orbit.stable]
     if lost:
         return (
@@ -328,6 +326,15 @@ def verdict(
         head = f"all limits that could be checked are met {where}; tightest"
     outside = "" if broken else _outside(omega, region)
     return f"{speed}: {head}: {_against(tightest)}{outside}."
+
+
+def _why_unknown(omega: float, cases: list[CaseAssessment]) -> str:
+    """Why no motion is known in these cases at working speed, in words."""
+    names = ", ".join(case.name for case in cases)
+    speeds = [case.branch.omega for case in cases]
+    if all(one.min() <= omega <= one.max() for one in speeds):
+        return f"raised from below it meets no stable motion in {names}"
+    return f"the speeds analysed do not hold it in {names}"
 
 
 def _outside(omega: float, region: OperatingRegion) -> str:

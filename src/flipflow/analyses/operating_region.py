@@ -158,11 +158,14 @@ def operating_region(
     marks = landmarks(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
     notes = _unchecked_notes(cases)
-    named = zip(("empty", *(case.name for case in cases)), (branch, *branches), strict=True)
+    named = zip(
+        ("empty", *(case.name for case in cases)), (branch, *branches),
+        ((), *(case.notes for case in cases)), strict=True,
+    )  # fmt: skip
     unfinished = dict.fromkeys(
         f"Case {name}: {text}"
-        for name, one in named
-        for text in (*one.notes, *([] if one.complete else [one.status.value]))
+        for name, one, own_notes in named
+        for text in (*one.notes, *own_notes, *([] if one.complete else [one.status.value]))
     )
     return OperatingRegion(
         screen, branch, marks.omega_ea, marks.omega_ar, marks.omega_cs, marks.omega_lb,

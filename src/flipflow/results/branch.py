@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -289,7 +290,10 @@ class Branch:
                 continue
 
             def rise(share: float, p: int = p) -> float:
-                point = self.solver.between(self.traced, p, share)
+                try:
+                    point = self.solver.between(self.traced, p, share)
+                except IncompleteError:
+                    return math.inf  # not every motion between two sharp bends can be had
                 low, high, _ = self.solver.extremes(point.u[None], np.array([point.omega]), vector)
                 return sign * float(high[0, 0] - low[0, 0])
 
@@ -298,6 +302,8 @@ class Branch:
                     rise, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
                 ).x
             )
+            if not math.isfinite(rise(share)):
+                continue
             point = self.solver.between(self.traced, p, share)
             orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
             if sign * orbit.amplitude(which) < sign * best.amplitude(which):
