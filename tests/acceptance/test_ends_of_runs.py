@@ -24,6 +24,16 @@ def test_last_sample_is_reached_whatever_the_number_of_turns(screen):
     assert run.a[-1] == pytest.approx(longer.a[192 * 128], rel=1e-9)
 
 
+def test_times_that_end_a_rounding_late_are_taken(screen):
+    """10 turns of 2 pi / omega and 10 * 2 * pi / omega are not the same number at every speed."""
+    omega = 86.7
+    late = 10 * 2 * math.pi / omega
+    run = ff.simulate(screen, omega, 10, t=np.linspace(0.0, math.nextafter(late, 1.0), 5))
+    assert run.t[-1] == pytest.approx(late, rel=1e-15)
+    with pytest.raises(InputError, match="rising times"):
+        ff.simulate(screen, omega, 10, t=[0.0, late * (1.0 + 1e-9)])
+
+
 def test_last_sample_after_a_blow_just_before_the_end(screen):
     end = 3 * 2.0 * math.pi / OMEGA
     blow = ff.Impulse(math.nextafter(end, 0.0), "main", 100.0)

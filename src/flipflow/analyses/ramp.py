@@ -19,10 +19,12 @@ from flipflow.model.system import Coordinate, Machine
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.status import BranchStatus
 
 Real = NDArray[np.float64]
 BEYOND = 1e-4
 WIDER = 0.15
+LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)
 
 
 @dataclass(frozen=True)
@@ -106,8 +108,10 @@ def ramp(
     low, high = check_interval((min(first, last), max(first, last)))
     if not (math.isfinite(rate) and rate > 0.0):
         raise InputError("rate", rate, "give a finite rate above 0 rad/s^2")
-    branch = frequency_response(machine, ((1.0 - WIDER) * low, (1.0 + WIDER) * high))
-    orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable]
+    branch = _branch_over(machine, low, high)
+    ends = branch.omega
+    held = ends.size > 0 and ends.min() <= first <= ends.max()
+    orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable] if held else []
     if not orbits:
         raise InputError("omega", omega, "no stable motion is known at the first speed")
     orbit = orbits[0] if last > first else orbits[-1]
@@ -120,6 +124,15 @@ def ramp(
     which = orbit.system.named[-1]
     jumps = _jumps(branch, history, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
+
+
+def _branch_over(machine: Machine, low: float, high: float) -> Branch:
+    """The motions from below over the speeds, begun low enough to come back from every fold."""
+    for share in LOWER_SHARES:
+        branch = frequency_response(machine, (share * low, (1.0 + WIDER) * high))
+        if branch.status is not BranchStatus.TURNED_BACK:
+            break
+    return branch
 
 
 def _with_normal(machine: Machine, omega: float, state: Real) -> Real:

@@ -27,6 +27,7 @@ SAMPLES_A_TURN = 128
 MOST_PERIODS = 1_000_000
 MOST_SAMPLES = 20_000_000
 SETTLED = 1e-6
+ROUNDING = 1e-12
 
 
 def simulate(
@@ -120,9 +121,10 @@ def _times(t: ArrayLike | None, periods: int, turn: float) -> Real:
     times = np.atleast_1d(np.asarray(t, float)).copy()
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
         raise InputError("t", t, "give finite times in one row")
-    if times[0] < 0.0 or times[-1] > periods * turn or (np.diff(times) < 0.0).any():
-        raise InputError("t", t, f"give rising times from 0 to {periods * turn:.6g} s")
-    return times
+    end = periods * turn
+    if times[0] < 0.0 or times[-1] > end * (1.0 + ROUNDING) or (np.diff(times) < 0.0).any():
+        raise InputError("t", t, f"give rising times from 0 to {end:.6g} s")
+    return np.asarray(np.minimum(times, end))
 
 
 class _Run:
