@@ -125,6 +125,16 @@ def test_a_ramp_that_begins_not_far_above_the_folds(screen):
     assert glide.jumps == ()
 
 
+def test_a_ramp_begins_with_a_motion_that_leans_where_the_symmetric_one_is_unstable(screen):
+    """Row 25: e = 2 mm at 57.7 rad/s."""
+    narrow = screen.replace(clearance=2e-3)
+    glide = ff.ramp(narrow, (57.7, 57.8), 0.1)
+    leaning = [orbit for orbit in ff.periodic_orbits(narrow, 57.7) if orbit.stable]
+    assert len(leaning) == 2
+    away = [np.abs(glide.history.x[0] - orbit.state[:2]).max() for orbit in leaning]
+    assert min(away) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("omega", "rate", "field"),
     [((100.0, 200.0), 0.0, "rate"), ((100.0, 200.0), math.nan, "rate"), ((0.0, 9.0), 1.0, "omega")],

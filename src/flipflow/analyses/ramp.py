@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flipflow.analyses.frequency_response import check_interval, frequency_response
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
+from flipflow.analyses.periodic_orbits import attracting_orbits
 from flipflow.analyses.transient import Start, normal_direction, run_history, swings
 from flipflow.errors import InputError
 from flipflow.model.drive import SpeedProfile
@@ -112,6 +113,7 @@ def ramp(
     ends = branch.omega
     held = ends.size > 0 and ends.min() <= first <= ends.max()
     orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable] if held else []
+    orbits = orbits or list(attracting_orbits(machine, first))
     if not orbits:
         raise InputError("omega", omega, "no stable motion is known at the first speed")
     orbit = orbits[0] if last > first else orbits[-1]

@@ -157,16 +157,21 @@ class _Run:
             )
             at = until
             if blow is not None:
-                before = self.stored()
+                before = self.moving()
                 kind = "impulses" if isinstance(blow, Impulse) else "loads"
                 self._strike(blow)
-                self.blown[kind] += self.stored() - before
+                # A blow that makes a clipped stop take hold, or let go, gives it no energy.
+                self.blown[kind] += self.moving() - before
 
-    def stored(self) -> float:
-        """What masses and springs hold, J."""
+    def moving(self) -> float:
+        """What masses hold and springs that always act, J."""
         system = self.build(self.machine).with_bonded()
         x, v = np.split(self.z, 2)
-        return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x) + self.held()
+        return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x)
+
+    def stored(self) -> float:
+        """What masses and all springs hold, J."""
+        return self.moving() + self.held()
 
     def held(self) -> float:
         """What the touched stops hold, J."""
