@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess_case, verdict
+from flipflow.analyses.assessment import assess_case, energy_balance, verdict
+from flipflow.analyses.quantities import Working
 from flipflow.errors import InputError
 
 
@@ -99,6 +100,18 @@ def test_speed_without_a_stable_motion_is_not_called_out_of_range(screen):
     for omega, why in ((420.0, "meets no stable motion in empty"), (900.0, "do not hold it")):
         case = assess_case(restless, ff.Load(), region.branch, omega)
         assert why in verdict(omega, (), (case,), region)
+
+
+@pytest.mark.parametrize("minus", [6e-3, 3e-3, math.inf])
+def test_a_clipped_stop_takes_what_it_still_holds_when_it_lets_go(screen, minus):
+    """Input = isolation + shear springs + stop, for the compression-only law, too."""
+    clipped = screen.replace(
+        stop_law="compression-only", stop_damping=2e4, clearance_minus=minus
+    )  # fmt: skip
+    orbit = ff.periodic_orbits(clipped, 140.568)[0]
+    powers = energy_balance(Working(clipped, orbit))
+    taken = powers["isolation"] + powers["shear"] + powers["stop"]
+    assert taken == pytest.approx(powers["input"], rel=1e-9)
 
 
 def test_five_stops_prepare_configurations_as_they_are_met():

@@ -244,7 +244,10 @@ def assess_case(
 
 
 def energy_balance(working: Working) -> dict[str, float]:
-    """Mean powers in W; "input" along the surface equals isolation + shear + stop."""
+    """Mean powers in W; "input" along the surface equals isolation + shear + stop.
+
+    The stop's is what its damping takes and what it still holds when a clipped one lets go.
+    """
     screen, orbit = working.screen, working.orbit
     powers = {
         "input": orbit.input_power(),
@@ -255,9 +258,24 @@ def energy_balance(working: Working) -> dict[str, float]:
     if screen.has_stop:
         contact = None if screen.stop().bonded else 0
         powers["stop"] = screen.stop_damping * orbit.mean_square_velocity("relative", contact)
+        powers["stop"] += _let_go_power(screen, orbit)
     if working.normal is not None:
         powers["normal"] = working.normal.power
     return powers
+
+
+def _let_go_power(screen: FlipFlowScreen, orbit: Orbit) -> float:
+    """Mean power in W of the energy that clipped stops still hold when they let go.
+
+    The paper's law lets go at the gap, where the spring holds none.
+    """
+    gaps = screen.stop().gaps
+    lost = 0.0
+    for touch in orbit.contact_intervals:
+        ends = touch.side * orbit.displacement("relative", [touch.start, touch.end])
+        taken, left = (ends - gaps[0 if touch.side > 0 else 1]) ** 2
+        lost += 0.5 * screen.stop_stiffness * float(left - taken)
+    return lost / orbit.period
 
 
 def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) -> LimitRow:
