@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.periodic_orbits import MOST_PERIODS, attracting_orbits
+from flipflow.analyses.periodic_orbits import MOST_PERIODS, attracting_orbits, generator_of
 from flipflow.kernels import status
 from flipflow.kernels.lanes import NOT_SETTLED
 from flipflow.methods.capture import capture_of
@@ -45,7 +45,7 @@ class Attractors:
     ) -> None:
         self.machine = machine
         self.system = system_of(machine)
-        self._rng = np.random.default_rng(rng)
+        self._rng = generator_of(rng)
         found = attracting_orbits(machine, omega, self._rng)
         self.lanes = Lanes(self.system, omega, threads)
         self.capture = Capture.nothing(2 * self.system.size)

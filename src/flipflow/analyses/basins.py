@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from flipflow.analyses.attractors import Attractors
 from flipflow.analyses.monitor import Monitor
+from flipflow.analyses.sweep import check_count
 from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.kernels.lanes import NOT_SETTLED
@@ -83,7 +84,7 @@ def basins(
     if not axes:
         remedy = 'give values of at least one coordinate, as {"relative": [-0.04, 0.0, 0.04]}'
         raise InputError("displacement", displacement, remedy)
-    _check_turns(most_turns)
+    check_count("most_turns", most_turns, MOST_TURNS)
     shape = tuple(axis.values.size for axis in axes)
     if math.prod(shape) > MOST_CELLS:
         raise InputError("cells", math.prod(shape), f"give a grid of at most {MOST_CELLS:,} cells")
@@ -123,12 +124,6 @@ def _axes(system: MechanicalSystem, kind: Kind, window: Window | None) -> list[G
 
 def _any(system: MechanicalSystem) -> Coordinate:
     return system.named[-1]
-
-
-def _check_turns(most: object) -> None:
-    whole = isinstance(most, int) and not isinstance(most, bool)
-    if not (whole and 1 <= most <= MOST_TURNS):  # type: ignore[operator]
-        raise InputError("most_turns", most, f"give a whole number from 1 to {MOST_TURNS:,}")
 
 
 def _states(system: MechanicalSystem, axes: tuple[GridAxis, ...], shape: tuple[int, ...]) -> Real:

@@ -157,7 +157,9 @@ def operating_region(
         cases.append(case_window(loaded, load, own, wanted, within))
     marks = landmarks(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
-    notes = _unchecked_notes(cases)
+    notes = [*_unchecked_notes(cases)]
+    if within[0] >= within[1]:
+        notes.append("The limit on speed lies outside the speeds analysed.")
     named = zip(
         ("empty", *(case.name for case in cases)), (branch, *branches),
         ((), *(case.notes for case in cases)), strict=True,

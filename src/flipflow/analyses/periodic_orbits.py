@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import numbers
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,13 +70,13 @@ def periodic_orbits(
     Raises
     ------
     InputError
-        For a frequency that is not finite or not above 0, or periods outside 1 to 6.
+        For a frequency that is not finite or not above 0, periods outside 1 to 6, or no seed.
     IncompleteError
         When no start at all could be followed.
     """
     check_count("max_periods", max_periods, MOST_PERIODS)
     search = _Search(machine, _checked(omega), max_periods)
-    starts = search.starts(np.random.default_rng(rng))
+    starts = search.starts(generator_of(rng))
     if TwoEventProblem.applies(search.settling.solver.builder):
         starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
     for k, start in enumerate(starts):
@@ -93,17 +94,27 @@ def attracting_orbits(
     Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
     """
     search = _Search(machine, _checked(omega), 1)
-    for start in search.starts(np.random.default_rng(rng)):
+    for start in search.starts(generator_of(rng)):
         search.try_settled(start)
     return tuple(orbit for orbit in search.orbits() if orbit.stable)
 
 
+def generator_of(rng: object) -> np.random.Generator:
+    """The generator of a seed, or a sentence that says what a seed is."""
+    try:
+        return np.random.default_rng(rng)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError("rng", rng, "give a whole number of at least 0, or a Generator") from None
+
+
 def _checked(omega: object) -> float:
-    if isinstance(omega, bool) or not isinstance(omega, (int, float)) or not math.isfinite(omega):
+    number = isinstance(omega, numbers.Real) and not isinstance(omega, bool)
+    speed = float(omega) if number else math.nan  # type: ignore[arg-type]
+    if not math.isfinite(speed):
         raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    if not 0.0 < omega <= OMEGA_MOST:
+    if not 0.0 < speed <= OMEGA_MOST:
         raise InputError("omega", omega, f"give a frequency above 0 and up to {OMEGA_MOST:g} rad/s")
-    return float(omega)
+    return speed
 
 
 class _Search:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +106,7 @@ def ramp(
     InputError
         For speeds or a rate that make no sense.
     """
-    first, last = (float(one) for one in omega)
+    first, last = _ends(omega)
     low, high = check_interval((min(first, last), max(first, last)))
     if not (math.isfinite(rate) and rate > 0.0):
         raise InputError("rate", rate, "give a finite rate above 0 rad/s^2")
@@ -126,6 +127,17 @@ def ramp(
     which = orbit.system.named[-1]
     jumps = _jumps(branch, history, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
+
+
+def _ends(omega: object) -> tuple[float, float]:
+    """First and last speed; they may fall, but not be one."""
+    try:
+        first, last = map(float, cast("tuple[float, float]", omega))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give the first and the last speed in rad/s") from None
+    if first == last:
+        raise InputError("omega", omega, "give two different speeds; ff.simulate stays at one")
+    return first, last
 
 
 def _branch_over(machine: Machine, low: float, high: float) -> Branch:

@@ -54,7 +54,8 @@ def poincare_section(
     """
     speed = float(checked_speeds(omega)[0])
     check_count("turns", turns, MOST_TURNS)
-    check_count("skip", skip + 1, MOST_TURNS)
+    if skip != 0:
+        check_count("skip", skip, MOST_TURNS)
     solver = ExactSolver(system_of(machine), half_turn=False)
     z = initial_state(solver.system.size, initial)
     if skip:

@@ -13,6 +13,7 @@ from flipflow.analyses.feasible import missing_words
 from flipflow.analyses.frequency_response import check_interval
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.operating_region import analysed_range
+from flipflow.analyses.periodic_orbits import generator_of
 from flipflow.analyses.quantities import Quantity
 from flipflow.analyses.response_quantities import ResponseQuantity, quantity_named
 from flipflow.analyses.samples import (
@@ -107,7 +108,7 @@ def sensitivity(
     varied = variations(vary, machine)
     workers = _whole("threads", 1 if threads is None else threads, 1, 256)
     groups = _whole("n", n, LEAST_GROUPS, N_MOST)
-    generator = _generator(rng)
+    generator = generator_of(rng)
     nominal = _nominal(question)
     points = saltelli_sample(len(varied), groups, generator)
     u = points.reshape(-1, len(varied))
@@ -212,13 +213,6 @@ def _whole(name: str, value: object, least: int, most: int) -> int:
     if not least <= value <= most:
         raise InputError(name, value, f"give a whole number from {least} to {most}")
     return int(value)
-
-
-def _generator(rng: object) -> np.random.Generator:
-    try:
-        return np.random.default_rng(rng)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError("rng", rng, "give a whole number of at least 0, or a Generator") from None
 
 
 def _values(

@@ -84,6 +84,9 @@ def simulate(
     end = periods * turn
     system = system_of(machine)
     times = _times(t, periods, turn)
+    for one in disturbances:
+        if not isinstance(one, Disturbance):
+            raise InputError("disturbances", one, "give ff.Impulse, ff.LoadStep or ff.Lump")
     blows = sorted(disturbances, key=lambda one: one.t)
     if blows and blows[-1].t >= end:
         raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
@@ -92,6 +95,7 @@ def simulate(
     run.carry(Course(times, system.size, len(run.kept)), z, blows)
     settling = Settling(system_of(run.machine), MAX_PERIODS)
     distance = settling.distance_ahead(run.z, speed)
+    near = distance is not None and distance <= SETTLED * settling.size(run.z[None], speed)
     return History(
         system=system,
         t=times,
@@ -103,7 +107,7 @@ def simulate(
         angle=speed * times,
         normal=_normal(machine, speed, times, initial, blows, end),
         energy=run.energy(),
-        settled=distance is not None and distance < SETTLED * settling.size(run.z[None], speed),
+        settled=near,
         distance=distance,
         events=run.events(),
         status="The motion was carried to its end.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -195,7 +196,7 @@ class Branch:
             For a frequency outside the branch.
         """
         ends = self.omega
-        if not isinstance(omega, (int, float)) or not ends.min() <= omega <= ends.max():
+        if not isinstance(omega, numbers.Real) or not ends.min() <= omega <= ends.max():
             remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
             raise InputError("omega", omega, remedy)
         hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
