@@ -71,6 +71,19 @@ def test_mirrored_motions_are_distinct():
         assert settled_on(solver, z, 57.7, here.orbits, 4000) == label
 
 
+def test_slow_motions_are_caught_from_afar(screen):
+    """Multipliers of modulus 0.9969: one turn takes 0.3 % of the distance away."""
+    hard = screen.replace(stop_stiffness=8e8, stop_damping=5e4)
+    omega, x = 89.0118, np.linspace(-0.03, 0.03, 24)
+    here = ff.basins(hard, omega, {"relative": x}, most_turns=2000)
+    assert len(here.orbits) == 2
+    assert np.all(here.labels >= 0), here.notes
+    solver = ExactSolver(hard.system(), half_turn=False)
+    for i, label in enumerate(here.labels):
+        z = np.array([0.0, -x[i], 0.0, 0.0])
+        assert settled_on(solver, z, omega, here.orbits, 6000) == label
+
+
 def oscillator():
     """A bilinear oscillator with a motion of two periods."""
     stop = ff.ClearanceSpring([1.0], 36.0, 0.0, 0.0, np.inf)

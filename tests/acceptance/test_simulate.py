@@ -64,6 +64,19 @@ def test_energy_balances(screen, law, blows) -> None:
     assert (e["impulses"] != 0.0) == bool(blows)
 
 
+def test_energy_balances_where_a_blow_makes_a_clipped_stop_take_hold() -> None:
+    """Compressed by 0.1 m, but moving out too fast to be pushed; the blow turns it round."""
+    stop = ff.ClearanceSpring([1.0], 100.0, 50.0, 0.1, math.inf, "compression-only")
+    system = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], (stop,), ff.HarmonicForce([0.1]))
+    blow = ff.Impulse(1e-3, 0, 2.0)
+    run = ff.simulate(system, 1.0, 1, (0.2, -1.0), (blow,), t=[0.0, 0.5e-3, 2e-3, 6.0])
+    assert run.stop_force()[:2] == pytest.approx([0.0, 0.0])
+    assert run.stop_force()[2] > 50.0
+    energy = run.energy
+    given = energy["input"] + energy["impulses"] + energy["loads"]
+    assert given == pytest.approx(energy["dissipated"] + energy["stored"], abs=1e-9)
+
+
 def test_settles_on_the_exact_orbit(screen) -> None:
     history = ff.simulate(screen, 120.0, 200)
     exact = ff.frequency_response(screen, (100.0, 130.0)).orbits_at(120.0)[0]

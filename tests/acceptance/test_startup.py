@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -107,6 +108,50 @@ def test_coast_down_begins_with_the_settled_motion(screen):
     orbit = ff.periodic_orbits(screen, 120.0)[0]
     for k in (0, 1):
         assert run.history.x[0, k] == pytest.approx(float(orbit.displacement(k, 0.0)), abs=1e-8)
+
+
+def test_gravity_is_left_out_and_said(screen):
+    """m0r g = 40.9 N m; with J = 0.9 kg m^2 the shaft swings below 2 sqrt(40.9 / 0.9) = 13.5."""
+    drive = replace(drive_of(screen, 5500.0), inertia=0.9)
+    up = ff.start_up(screen, drive, speed=WORKING)
+    down = ff.coast_down(screen, WORKING, drive)
+    weak = ff.start_up(screen, drive_of(screen, 500.0), speed=WORKING)
+    given = ff.start_up(screen, ff.SpeedProfile((0.0, 1.0), (0.0, 20.0)))
+    said = [[note for note in run.notes if "Gravity" in note] for run in (up, down, weak, given)]
+    assert "40.9 N m" in said[0][0]
+    assert "below about 129 rpm the shaft would swing" in said[1][0]
+    assert "may not lift it" in said[2][0]
+    assert said[3] == []
+
+
+@pytest.fixture(scope="module")
+def restless(screen):
+    """No gap on one side, 8.93 mm on the other: at 420 rad/s every motion found is unstable."""
+    return screen.replace(
+        main_mass=1273.7243, floating_mass=224.77805, isolation_damping=2926.2439,
+        shear_damping=2719.1742, stop_stiffness=29106997.0, stop_damping=1085.9144,
+        clearance=0.0, clearance_minus=8.930106862626047e-3,
+    )  # fmt: skip
+
+
+def test_a_motion_that_never_settles_is_said(screen, restless):
+    run = ff.coast_down(restless, 420.0, drive_of(screen, 50e3))
+    assert any("had not settled after 2000 turns" in note for note in run.notes)
+    assumed = ff.start_up(restless, speed=420.0, duration=1.0)
+    assert any("had not settled after 2000 turns" in note for note in assumed.notes)
+
+
+def test_a_motion_of_two_turns_has_settled(screen):
+    """One side without gap, 6 mm on the other: period doubled between 104.5 and 120.8 rad/s."""
+    doubled = screen.replace(clearance=0.0, clearance_minus=6e-3)
+    run = ff.coast_down(doubled, 110.849, drive_of(screen, 5500.0))
+    (orbit,) = (o for o in ff.periodic_orbits(doubled, 110.849, 2) if o.stable)
+    assert orbit.periods == 2
+    assert not any("settled" in note for note in run.notes)
+    period = 2.0 * np.pi / 110.849
+    phases = [orbit.displacement("relative", k * period) for k in (0, 1)]
+    begin = run.history.displacement("relative")[0]
+    assert min(abs(begin - phase) for phase in phases) < 1e-7
 
 
 def test_slow_profile_follows_the_branch(screen):

@@ -117,6 +117,25 @@ def test_a_falling_speed_jumps_late_beyond_the_other_fold(screen) -> None:
     assert glide.jumps[0].omega < FOLD_DOWN
 
 
+def test_a_ramp_that_begins_not_far_above_the_folds(screen):
+    """Row 17: folds at 200.1 and 214.1 rad/s; 240 is reached from below only past both."""
+    light = screen.replace(isolation_damping=3000.0, shear_damping=600.0, stop_damping=600.0)
+    glide = ff.ramp(light, (240.0, 245.0), 5.0)
+    (orbit,) = ff.periodic_orbits(light, 240.0)
+    assert glide.history.x[0] == pytest.approx(orbit.state[:2], abs=1e-9)
+    assert glide.jumps == ()
+
+
+def test_a_ramp_begins_with_a_motion_that_leans_where_the_symmetric_one_is_unstable(screen):
+    """Row 25: e = 2 mm at 57.7 rad/s."""
+    narrow = screen.replace(clearance=2e-3)
+    glide = ff.ramp(narrow, (57.7, 57.8), 0.1)
+    leaning = [orbit for orbit in ff.periodic_orbits(narrow, 57.7) if orbit.stable]
+    assert len(leaning) == 2
+    away = [np.abs(glide.history.x[0] - orbit.state[:2]).max() for orbit in leaning]
+    assert min(away) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("omega", "rate", "field"),
     [((100.0, 200.0), 0.0, "rate"), ((100.0, 200.0), math.nan, "rate"), ((0.0, 9.0), 1.0, "omega")],

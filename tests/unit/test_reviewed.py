@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.assessment import input_hash
+from flipflow.analyses.assessment import assess_case, energy_balance, input_hash, verdict
+from flipflow.analyses.quantities import Working
 from flipflow.errors import IncompleteError, InputError
 from flipflow.io.derived import derive
 
@@ -95,6 +96,51 @@ def test_region_that_starts_in_contact_says_so(screen):
     region = ff.operating_region(screen, omega=(100.0, 180.0))
     assert region.lower == 100.0
     assert any("below the speeds analysed" in note for note in region.notes)
+
+
+@pytest.mark.parametrize("minus", [6e-3, math.inf])
+def test_region_ends_at_the_main_resonance_not_at_a_small_one(screen, minus):
+    """Without gap on one side two folds stand at 50.5 and 50.7 rad/s, far below the main peak."""
+    region = ff.operating_region(screen.replace(clearance=0.0, clearance_minus=minus))
+    assert [fold.omega for fold in region.branch.folds] == pytest.approx([50.707295, 50.533177])
+    assert (region.omega_lb, region.omega_ub) == (None, None)
+    assert region.upper == region.branch.peak("relative").omega
+    assert region.lower < region.upper
+
+
+def test_stop_that_is_met_at_the_first_resonance_alone(screen):
+    """Isolation almost undamped, shear springs heavily: the stop is not part of the region."""
+    quiet = screen.replace(isolation_damping=100.0, shear_damping=25e3, clearance=8e-3)
+    region = ff.operating_region(quiet)
+    assert region.branch.points_of("contact begin")
+    assert region.omega_cs is None
+    assert (region.lower, region.upper) == (region.omega_ea, region.omega_ar)
+    assert any("not reached at the main resonance" in note for note in region.notes)
+
+
+def test_speed_without_a_stable_motion_is_not_called_out_of_range(screen):
+    """Past a fold onto unstable motions only, the speed lies well within those analysed."""
+    restless = screen.replace(
+        main_mass=1273.7243, floating_mass=224.77805, isolation_damping=2926.2439,
+        shear_damping=2719.1742, stop_stiffness=29106997.0, stop_damping=1085.9144,
+        clearance=0.0, clearance_minus=8.930106862626047e-3,
+    )  # fmt: skip
+    region = ff.operating_region(restless)
+    for omega, why in ((420.0, "meets no stable motion in empty"), (900.0, "do not hold it")):
+        case = assess_case(restless, ff.Load(), region.branch, omega)
+        assert why in verdict(omega, (), (case,), region)
+
+
+@pytest.mark.parametrize("minus", [6e-3, 3e-3, math.inf])
+def test_a_clipped_stop_takes_what_it_still_holds_when_it_lets_go(screen, minus):
+    """Input = isolation + shear springs + stop, for the compression-only law, too."""
+    clipped = screen.replace(
+        stop_law="compression-only", stop_damping=2e4, clearance_minus=minus
+    )  # fmt: skip
+    orbit = ff.periodic_orbits(clipped, 140.568)[0]
+    powers = energy_balance(Working(clipped, orbit))
+    taken = powers["isolation"] + powers["shear"] + powers["stop"]
+    assert taken == pytest.approx(powers["input"], rel=1e-9)
 
 
 def test_five_stops_prepare_configurations_as_they_are_met():

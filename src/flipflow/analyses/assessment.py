@@ -251,7 +251,10 @@ def assess_case(
 
 
 def energy_balance(working: Working) -> dict[str, float]:
-    """Mean powers in W; "input" along the surface equals isolation + shear + stop."""
+    """Mean powers in W; "input" along the surface equals isolation + shear + stop.
+
+    The stop's is what its damping takes and what it still holds when a clipped one lets go.
+    """
     screen, orbit = working.screen, working.orbit
     powers = {
         "input": orbit.input_power(),
@@ -262,9 +265,24 @@ def energy_balance(working: Working) -> dict[str, float]:
     if screen.has_stop:
         contact = None if screen.stop().bonded else 0
         powers["stop"] = screen.stop_damping * orbit.mean_square_velocity("relative", contact)
+        powers["stop"] += _let_go_power(screen, orbit)
     if working.normal is not None:
         powers["normal"] = working.normal.power
     return powers
+
+
+def _let_go_power(screen: FlipFlowScreen, orbit: Orbit) -> float:
+    """Mean power in W of the energy that clipped stops still hold when they let go.
+
+    The paper's law lets go at the gap, where the spring holds none.
+    """
+    gaps = screen.stop().gaps
+    lost = 0.0
+    for touch in orbit.contact_intervals:
+        ends = touch.side * orbit.displacement("relative", [touch.start, touch.end])
+        taken, left = (ends - gaps[0 if touch.side > 0 else 1]) ** 2
+        lost += 0.5 * screen.stop_stiffness * float(left - taken)
+    return lost / orbit.period
 
 
 def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) -> LimitRow:
@@ -311,10 +329,9 @@ def verdict(
     if omega is None:
         return "No operating speed is given: the allowed speed range stands below."
     speed = f"{omega * RPM:.4g} rpm"
-    unknown = [case.name for case in cases if case.orbit is None]
+    unknown = [case for case in cases if case.orbit is None]
     if unknown:
-        where = "; ".join(unknown) if len(unknown) < len(cases) else "any load case"
-        return f"{speed}: not judged, for the speeds analysed do not hold it in {where}."
+        return f"{speed}: not judged, for {_why_unknown(omega, unknown)}."
     lost = [case.name for case in cases if case.orbit is not None and not case.orbit.stable]
     if lost:
         where = "; ".join(lost) if len(lost) < len(cases) else "every load case"
@@ -333,6 +350,15 @@ def verdict(
         head = f"all limits that could be checked are met {where}; tightest"
     outside = "" if broken else _outside(omega, region)
     return f"{speed}: {head}: {_against(tightest)}{outside}."
+
+
+def _why_unknown(omega: float, cases: list[CaseAssessment]) -> str:
+    """Why no motion is known in these cases at working speed, in words."""
+    names = ", ".join(case.name for case in cases)
+    speeds = [case.branch.omega for case in cases]
+    if all(one.min() <= omega <= one.max() for one in speeds):
+        return f"raised from below it meets no stable motion in {names}"
+    return f"the speeds analysed do not hold it in {names}"
 
 
 def _outside(omega: float, region: OperatingRegion) -> str:

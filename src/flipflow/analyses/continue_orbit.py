@@ -71,6 +71,8 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
     SampledContactWarning
         When the orbit's own method samples the contact force.
     """
+    if not isinstance(orbit, Orbit):
+        raise InputError("orbit", orbit, "give a motion, for example one of ff.periodic_orbits")
     if field != "omega":
         return field_branch(orbit, field, interval, solver_like(orbit, ExactSolver))
     low, high = check_interval(interval)

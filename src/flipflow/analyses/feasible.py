@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 from scipy.optimize import brentq
 
@@ -15,7 +15,7 @@ from flipflow.methods.special import STABILITY_CHANGES
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import LIMIT_FIELD, Limits
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.results.branch import Branch
+from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.orbit import Orbit
 
 Interval = tuple[float, float]
@@ -37,11 +37,14 @@ class CaseWindow:
         By limit; "stability" says where the motion returns after a small disturbance.
     unchecked
         Limits that cannot be checked, and why.
+    notes
+        Where an interval is narrower than it may be, because motions are not known.
     """
 
     name: str
     intervals: Mapping[str, Intervals]
     unchecked: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,7 @@ def case_window(
     intervals: dict[str, Intervals] = {
         STABILITY: _joined([_stable_parts(run) for run in runs], span)
     }
+    notes = list(_unknown_speeds(branch, runs, span))
     for name in limits.given:
         if name in unchecked:
             continue
@@ -94,9 +98,34 @@ def case_window(
             intervals[name] = intersect(((low, high),), (span,))
             continue
         evaluate = QUANTITIES[name].evaluate
-        parts = [_met(run, evaluate, low, high) for run in runs]
-        intervals[name] = _joined(parts, span)
-    return CaseWindow(load.name or "empty", intervals, unchecked)
+        met = [_met(run, evaluate, low, high) for run in runs]
+        intervals[name] = _joined([parts for parts, _ in met], span)
+        notes += [
+            f"{QUANTITIES[name].label} is not known between {_rpm(a)} and {_rpm(b)} rpm, and its "
+            "limit counts as broken there"
+            for _, gaps in met
+            for a, b in gaps
+        ]
+    return CaseWindow(load.name or "empty", intervals, unchecked, tuple(notes))
+
+
+def _unknown_speeds(branch: Branch, runs: list[_Run], span: Interval) -> Iterator[str]:
+    """A sentence on speeds at which no motion is known; an unfinished branch has its own."""
+    reached, gaps = span[0], []
+    ends = [(run.nodes[0].omega, run.nodes[-1].omega) for run in runs]
+    for low, high in (*ends, *([(span[1], span[1])] if branch.complete else [])):
+        if low > reached * (1.0 + 1e-9):
+            gaps.append(f"{_rpm(reached)} to {_rpm(low)}")
+        reached = max(reached, high)
+    if gaps:
+        yield (
+            f"raised from below the speed meets no stable motion at {', '.join(gaps)} rpm, and no "
+            "limit counts as met there"
+        )
+
+
+def _rpm(omega: float) -> str:
+    return f"{omega * 30.0 / math.pi:.5g}"
 
 
 def intersect(first: Intervals, second: Intervals) -> Intervals:
@@ -137,7 +166,7 @@ class _Run:
     def at(self, omega: float) -> Working:
         orbit = self.branch.solve_in(self.run, omega)
         if orbit is None:
-            raise IncompleteError(f"no motion found at {omega:.6g} rad/s on a finished branch")
+            raise IncompleteError(f"no motion found at {omega:.6g} rad/s between two of the branch")
         return Working(self.screen, orbit, self.jumps)
 
 
@@ -147,35 +176,49 @@ def _runs(branch: Branch, screen: FlipFlowScreen, span: Interval) -> list[_Run]:
     runs = []
     last = -math.inf
     for k, run in enumerate(branch.rising_path):
-        omega = branch.omega[run]
-        low, high = max(span[0], last if k else omega[0]), min(span[1], float(omega[-1]))
-        last = float(omega[-1])
+        fold = _fold_at_end(branch, run)
+        # Points behind the fold are motions of its other side.
+        stop = run.stop if fold is None else min(run.stop, math.ceil(fold.position))
+        end = float(branch.omega[stop - 1]) if fold is None else fold.omega
+        low, high = max(span[0], last if k else branch.omega[run.start]), min(span[1], end)
+        last = end
         if low >= high:
             continue
-        orbits = _orbits(branch, run, (low, high))
+        rising = slice(run.start, stop)
+        orbits = _orbits(branch, rising, (low, high), fold)
         nodes = tuple(Working(screen, orbit, jumps) for orbit in orbits)
-        runs.append(_Run(branch, screen, run, jumps, nodes))
+        if nodes:
+            runs.append(_Run(branch, screen, rising, jumps, nodes))
     return runs
 
 
-def _orbits(branch: Branch, run: slice, span: Interval) -> Iterator[Orbit]:
+def _fold_at_end(branch: Branch, run: slice) -> SpecialPoint | None:
+    """The fold at which a rising run ends; None at the end of the branch."""
+    near = (fold for fold in branch.folds if run.stop - 2 <= fold.position <= run.stop)
+    return max(near, key=lambda fold: fold.omega, default=None)
+
+
+def _orbits(
+    branch: Branch, run: slice, span: Interval, fold: SpecialPoint | None
+) -> Iterator[Orbit]:
     """Motions of a run over ``span``, rising: both ends, the branch's own, its special points.
 
     Between two special points one more motion stands, so that it is known what holds there.
     """
+    last = run.stop - 1.0 if fold is None else fold.position
     inside = [i for i in range(run.start, run.stop) if span[0] < branch.omega[i] < span[1]]
     own = [branch.orbit(i) for i in inside]
     special = [
         point.orbit
         for point in branch.special_points
         if point.kind in STABILITY_CHANGES
-        and run.start <= point.position <= run.stop - 1
-        and span[0] < point.omega < span[1]
+        and run.start <= point.position <= last
+        and span[0] < point.omega <= span[1]
     ]
-    middles = [
-        (one.omega + two.omega) / 2.0 for one, two in pairwise(sorted(special, key=_speed_of))
-    ]
-    solved = [branch.solve_in(run, omega) for omega in (*span, *middles)]
+    special.sort(key=_speed_of)
+    middles = [(one.omega + two.omega) / 2.0 for one, two in itertools.pairwise(special)]
+    ends = span[:1] if special and special[-1].omega == span[1] else span
+    solved = [branch.solve_in(run, omega) for omega in (*ends, *middles)]
     found = [orbit for orbit in solved if orbit is not None]
     yield from sorted([*own, *special, *found], key=_speed_of)
 
@@ -186,8 +229,11 @@ def _speed_of(orbit: Orbit) -> float:
 
 def _met(
     run: _Run, evaluate: Callable[[Working], float | None], low: float, high: float
-) -> list[Interval]:
-    """Parts of a run in which low <= quantity <= high, their ends solved for."""
+) -> tuple[list[Interval], list[Interval]]:
+    """Parts of a run in which low <= quantity <= high, their ends solved for.
+
+    Besides, the gaps in which an end lies and no motion is found; they are left out.
+    """
 
     def clearance(value: float | None) -> float:
         number = math.nan if value is None else min(value, 1e30)
@@ -195,6 +241,7 @@ def _met(
 
     values = [clearance(evaluate(node)) for node in run.nodes]
     parts: list[Interval] = []
+    gaps: list[Interval] = []
     begin = run.nodes[0].omega if values[0] >= 0.0 else None
     for k in range(1, len(values)):
         if (values[k] >= 0.0) == (values[k - 1] >= 0.0):
@@ -205,7 +252,11 @@ def _met(
         def height(omega: float, ends: dict[float, float] = ends) -> float:
             return ends[omega] if omega in ends else clearance(evaluate(run.at(omega)))
 
-        root = float(brentq(height, a, b, xtol=1e-9 * b, rtol=1e-12))
+        try:
+            root = float(brentq(height, a, b, xtol=1e-9 * b, rtol=1e-12))
+        except IncompleteError:
+            gaps.append((a, b))
+            root = b if begin is None else a
         if begin is None:
             begin = root
         else:
@@ -213,13 +264,13 @@ def _met(
             begin = None
     if begin is not None:
         parts.append((begin, run.nodes[-1].omega))
-    return parts
+    return parts, gaps
 
 
 def _stable_parts(run: _Run) -> list[Interval]:
     """Parts of a run in which the motion is not unstable; they end at special points."""
     parts: list[Interval] = []
-    for one, two in pairwise(run.nodes):
+    for one, two in itertools.pairwise(run.nodes):
         if "unstable" in (one.orbit.stability, two.orbit.stability):
             continue
         if parts and parts[-1][1] == one.omega:

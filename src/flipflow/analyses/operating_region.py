@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -166,12 +168,17 @@ def operating_region(
         cases.append(case_window(loaded, load, own, wanted, within))
     marks = landmarks(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
-    notes = _unchecked_notes(cases)
-    named = zip(("empty", *(case.name for case in cases)), (branch, *branches), strict=True)
+    notes = [*_unchecked_notes(cases)]
+    if within[0] >= within[1]:
+        notes.append("The limit on speed lies outside the speeds analysed.")
+    named = zip(
+        ("empty", *(case.name for case in cases)), (branch, *branches),
+        ((), *(case.notes for case in cases)), strict=True,
+    )  # fmt: skip
     unfinished = dict.fromkeys(
         f"Case {name}: {text}"
-        for name, one in named
-        for text in (*one.notes, *([] if one.complete else [one.status.value]))
+        for name, one, own_notes in named
+        for text in (*one.notes, *own_notes, *([] if one.complete else [one.status.value]))
     )
     return OperatingRegion(
         screen, branch, marks.omega_ea, marks.omega_ar, marks.omega_cs, marks.omega_lb,
@@ -237,34 +244,58 @@ def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
         When the branch has no points.
     """
     ea, ar = equal_amplitude_frequency(screen), antiresonance_frequency(screen)
-    peak = branch.peak("relative")
-    begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.omega < peak.omega]
-    cs = begins[-1] if begins else None
+    works = screen.has_stop and not screen.stop().bonded
+    peak = _main_peak(branch, ar)
+    touched = peak.orbit.touches and works
+    begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.position < peak.position]
+    cs = begins[-1] if begins and touched else None
     lb, ub = _main_folds(branch, peak)
     span = (float(branch.omega.min()), float(branch.omega.max()))
-    touched = bool(np.any(branch.traced.signature != 0))
     upper = peak.omega if lb is None else lb
     if cs is not None:
         return Landmarks(ea, ar, cs, lb, ub, cs, upper)
     if touched:
         note = "Contact begins below the speeds analysed: the region starts with them."
         return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
-    unused = screen.has_stop and not screen.stop().bonded
-    notes = ("The stop is not reached at any speed analysed.",) if unused else ()
-    return Landmarks(ea, ar, cs, lb, ub, ea or span[0], ar or span[1], notes)
+    notes = tuple(_untouched_notes(branch)) if works else ()
+    lower, upper = ea or span[0], ar or span[1]
+    if lower >= upper:
+        notes += ("Equal amplitudes come above the antiresonance: the region is empty.",)
+    return Landmarks(ea, ar, cs, lb, ub, lower, upper, notes)
+
+
+def _untouched_notes(branch: Branch) -> Iterator[str]:
+    """What to say of a stop that is not reached where it shall work."""
+    if np.any(branch.traced.signature != 0):
+        yield (
+            "The stop is not reached at the main resonance, only elsewhere: the region is that of "
+            "a screen without stop."
+        )
+    else:
+        yield "The stop is not reached at any speed analysed."
+
+
+def _main_peak(branch: Branch, antiresonance: float | None) -> SpecialPoint:
+    """The largest relative motion above the antiresonance, which parts the two resonances."""
+    peak = branch.peak("relative")
+    if antiresonance is None or peak.omega >= antiresonance:
+        return peak
+    higher = [one for one in branch.peaks("relative") if one.omega >= antiresonance]
+    return max(higher, key=lambda one: one.amplitude("relative"), default=peak)
 
 
 def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
-    """(w_lb, w_ub): the fold of largest motion, and the one the branch turns at next.
+    """(w_lb, w_ub): the first two folds on the way down from the main peak.
 
-    None where the motion turns back only far below the peak, as it may where contact begins.
+    A fold beyond a trough belongs to another resonance, as do those before the peak.
     """
-    folds = branch.folds
-    if len(folds) < 2:
-        return None, None
-    sizes = [fold.amplitude("relative") for fold in folds]
-    first = max(range(len(folds) - 1), key=lambda k: sizes[k])
-    if max(sizes[first], sizes[first + 1]) < MAIN_SHARE * peak.amplitude("relative"):
-        return None, None
-    pair = (folds[first].omega, folds[first + 1].omega)
-    return min(pair), max(pair)
+    size = branch.amplitude("relative")
+    for first, second in pairwise(branch.folds):
+        # A peak and the fold beside it may stand in one step of the branch.
+        if first.position <= peak.position - 1.0:
+            continue
+        way = size[math.ceil(peak.position) : math.floor(first.position) + 1]
+        if np.any(way < first.amplitude("relative")):
+            break
+        return min(first.omega, second.omega), max(first.omega, second.omega)
+    return None, None

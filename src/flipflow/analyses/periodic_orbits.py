@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 
 import numpy as np
@@ -11,8 +12,10 @@ from flipflow.analyses.arguments import checked_count, checked_generator, checke
 from flipflow.analyses.frequency_response import first_unknowns
 from flipflow.analyses.monitor import Monitor
 from flipflow.errors import IncompleteError
+from flipflow.kernels import arclength
+from flipflow.methods.exact import ExactSolver
 from flipflow.methods.settle import Settling
-from flipflow.methods.solver import Point, Real
+from flipflow.methods.solver import STEP_SHARE, Point, Real
 from flipflow.methods.two_event import TwoEventProblem
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.results.orbit import Orbit
@@ -21,6 +24,9 @@ STARTS = 64
 SETTLING_TURNS = 60
 MOST_PERIODS = 6
 SWEEP_RATIO, SWEEP_STEPS = 1.3, 12
+BRANCH_RATIO, BRANCH_STEPS = 1.5, 60
+
+logger = logging.getLogger("flipflow")
 
 
 def periodic_orbits(
@@ -32,12 +38,13 @@ def periodic_orbits(
 ) -> tuple[Orbit, ...]:
     """Periodic motions at ``omega`` that repeat after up to ``max_periods`` forcing periods.
 
-    Starts: the motion reached from below; for one symmetric stop, every zero of the scalar problem
-    of two-touch motions; rest; what is reached by stepping the speed up and down to ``omega``; and
-    a low-discrepancy cloud of states as large as the linear motion or the gaps. Each is tried as it
-    is (unstable motions are found so) and after some turns of settling. Newton on the exact flow
-    over 1, 2, ... turns, so that motions need not be symmetric; for a machine that is its own
-    mirror image every motion's mirror image is one too.
+    Starts: the motions of the branch reached from below, between its folds too; for one symmetric
+    stop, every zero of the scalar problem of two-touch motions; rest; what is reached by stepping
+    the speed up and down to ``omega``; and a low-discrepancy cloud of states as large as the linear
+    motion or the gaps. Each is tried as it is (unstable motions are found so) and after some turns
+    of settling. Newton on the exact flow over 1, 2, ... turns, so that motions need not be
+    symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
+    A start whose flow does not end is left out; the monitor and the log hear how many were.
 
     Parameters
     ----------
@@ -62,17 +69,19 @@ def periodic_orbits(
     Raises
     ------
     InputError
-        For a frequency that is not finite or not above 0, or periods outside 1 to 6.
+        For a frequency that is not finite or not above 0, periods outside 1 to 6, or no seed.
+    IncompleteError
+        When no start at all could be followed.
     """
     checked_count("max_periods", max_periods, MOST_PERIODS)
     search = _Search(machine, checked_speed(omega), max_periods)
-    starts = _starts(search.settling, search.omega, checked_generator(rng))
+    starts = search.starts(checked_generator(rng))
     if TwoEventProblem.applies(search.settling.solver.builder):
         starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
     for k, start in enumerate(starts):
         search.try_from(start)
         if monitor is not None:
-            monitor(f"{len(search.found)} motions found", (k + 1) / len(starts))
+            monitor(search.progress(), (k + 1) / len(starts))
     return search.orbits()
 
 
@@ -84,7 +93,7 @@ def attracting_orbits(
     Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
     """
     search = _Search(machine, checked_speed(omega), 1)
-    for start in _starts(search.settling, search.omega, checked_generator(rng)):
+    for start in search.starts(checked_generator(rng)):
         search.try_settled(start)
     return tuple(orbit for orbit in search.orbits() if orbit.stable)
 
@@ -97,28 +106,73 @@ class _Search:
         self.settling = Settling(system_of(machine), max_periods)
         self.omega, self.max_periods = omega, max_periods
         self.found: list[Point] = []
+        self.flown = self.lost = 0
+
+    def starts(self, rng: np.random.Generator) -> list[Real]:
+        """Rest, the branch from below, a cloud of states, and stepped speeds."""
+        solver = self.settling.solver
+        n = solver.system.size
+        X = np.abs(solver.builder.contact_free(np.array([self.omega]))[0])
+        gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
+        size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
+        box = np.concatenate([size, self.omega * size])
+        cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
+        stepped = (self._stepped(ratio) for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO))
+        return [
+            np.zeros(2 * n),
+            first_unknowns(solver, self.omega),
+            *_on_branch(solver.system, self.omega),
+            *((2.0 * cloud - 1.0) * box),
+            *(z for z in stepped if z is not None),
+        ]
 
     def try_from(self, start: Real) -> None:
         """Newton from a state and from where it settles to, for every number of periods."""
-        try:
-            settled = self.settling.solver.section(start, self.omega, SETTLING_TURNS)[-1]
-        except IncompleteError:
-            return
-        self._try(start)
-        self._try(settled)
+        settled = self._flown(start, self.omega)
+        if settled is not None:
+            self._try(start)
+            self._try(settled)
 
     def try_settled(self, start: Real) -> None:
         """Newton from where a state settles to."""
-        try:
-            self._try(self.settling.solver.section(start, self.omega, SETTLING_TURNS)[-1])
-        except IncompleteError:
-            return
+        settled = self._flown(start, self.omega)
+        if settled is not None:
+            self._try(settled)
+
+    def progress(self) -> str:
+        """What was found and what was left out, in words."""
+        lost = f", starts left out for too many contacts a turn: {self.lost}" if self.lost else ""
+        return f"{len(self.found)} motions found{lost}"
 
     def orbits(self) -> tuple[Orbit, ...]:
         """What was found, largest motion at the first gap first."""
+        if self.lost and not self.flown:
+            raise IncompleteError(
+                f"No start could be carried over a turn at {self.omega:.6g} rad/s: its contacts "
+                "are too many. Give more damping, or a higher speed."
+            )
+        if self.lost:
+            logger.warning("at %.6g rad/s: %s", self.omega, self.progress())
         which = _first_gap(self.settling.solver.system)
         found = [Orbit(self.machine, point) for point in self.found]
         return tuple(sorted(found, key=lambda o: (-_reach(o, which), -o.state @ which)))
+
+    def _flown(self, z: Real, omega: float) -> Real | None:
+        """Where a state is after some turns; None where a flow does not end, which is counted."""
+        try:
+            states = self.settling.solver.section(z, omega, SETTLING_TURNS)
+        except IncompleteError:
+            self.lost += 1
+            return None
+        self.flown += 1
+        return np.asarray(states[-1])
+
+    def _stepped(self, ratio: float) -> Real | None:
+        """Where the machine settles from rest while the speed is stepped to the one asked for."""
+        z: Real | None = np.zeros(2 * self.settling.solver.system.size)
+        for speed in np.geomspace(ratio * self.omega, self.omega, SWEEP_STEPS):
+            z = None if z is None else self._flown(z, float(speed))
+        return z
 
     def _try(self, z: Real) -> None:
         for periods in range(1, self.max_periods + 1):
@@ -148,22 +202,22 @@ class _Search:
         return point if mirrored is None else mirrored
 
 
-def _starts(settling: Settling, omega: float, rng: np.random.Generator) -> list[Real]:
-    """Rest, the motion from below, stepped speeds, and a cloud of states."""
-    solver = settling.solver
-    n = solver.system.size
-    X = np.abs(solver.builder.contact_free(np.array([omega]))[0])
-    gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
-    size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
-    box = np.concatenate([size, omega * size])
-    cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
-    starts = [np.zeros(2 * n), first_unknowns(solver, omega), *((2.0 * cloud - 1.0) * box)]
-    for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO):
-        z = np.zeros(2 * n)
-        for speed in np.geomspace(ratio * omega, omega, SWEEP_STEPS):
-            z = solver.section(z, float(speed), SETTLING_TURNS)[-1]
-        starts.append(z)
-    return starts
+def _on_branch(system: MechanicalSystem, omega: float) -> list[Real]:
+    """States at ``omega`` of the branch reached from below, wherever it passes that speed."""
+    solver = ExactSolver(system, half_turn=system.symmetric)
+    low, high = omega / BRANCH_RATIO, BRANCH_RATIO * omega
+    course = arclength.Course(
+        low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, arclength.QUICK
+    )
+    traced = solver.trace(first_unknowns(solver, low), low, course)
+    ahead = traced.omega - omega
+    states = []
+    for p in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
+        share = ahead[p] / ((ahead[p] - ahead[p + 1]) or 1.0)
+        guess = (1.0 - share) * traced.u[p] + share * traced.u[p + 1]
+        point = solver.solve(guess, omega)
+        states.append(guess if point is None else point.u)
+    return states
 
 
 def _spread(count: int, size: int, rng: np.random.Generator) -> Real:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from flipflow.analyses.arguments import checked_positive, checked_speeds
 from flipflow.analyses.frequency_response import frequency_response
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import normal_motion
+from flipflow.analyses.periodic_orbits import attracting_orbits
 from flipflow.analyses.transient import Start, normal_direction, run_history, swings
 from flipflow.errors import InputError
 from flipflow.model.drive import SpeedProfile
@@ -20,10 +22,12 @@ from flipflow.model.system import Coordinate, Machine
 from flipflow.results.branch import Branch, SpecialPoint
 from flipflow.results.history import History
 from flipflow.results.orbit import Orbit
+from flipflow.results.status import BranchStatus
 
 Real = NDArray[np.float64]
 BEYOND = 1e-4
 WIDER = 0.15
+LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)
 
 
 @dataclass(frozen=True)
@@ -115,8 +119,11 @@ def ramp(
         )
     (first, last), (low, high) = speeds.tolist(), np.sort(speeds).tolist()
     rate = checked_positive("rate", rate, "rad/s^2")
-    branch = frequency_response(machine, ((1.0 - WIDER) * low, (1.0 + WIDER) * high))
-    orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable]
+    branch = _branch_over(machine, low, high)
+    ends = branch.omega
+    held = ends.size > 0 and ends.min() <= first <= ends.max()
+    orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable] if held else []
+    orbits = orbits or list(attracting_orbits(machine, first))
     if not orbits:
         raise InputError("omega", omega, "no stable motion is known at the first speed")
     orbit = orbits[0] if last > first else orbits[-1]
@@ -129,6 +136,26 @@ def ramp(
     which = orbit.system.named[-1]
     jumps = _jumps(branch, history, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
+
+
+def _ends(omega: object) -> tuple[float, float]:
+    """First and last speed; they may fall, but not be one."""
+    try:
+        first, last = map(float, cast("tuple[float, float]", omega))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give the first and the last speed in rad/s") from None
+    if first == last:
+        raise InputError("omega", omega, "give two different speeds; ff.simulate stays at one")
+    return first, last
+
+
+def _branch_over(machine: Machine, low: float, high: float) -> Branch:
+    """The motions from below over the speeds, begun low enough to come back from every fold."""
+    for share in LOWER_SHARES:
+        branch = frequency_response(machine, (share * low, (1.0 + WIDER) * high))
+        if branch.status is not BranchStatus.TURNED_BACK:
+            break
+    return branch
 
 
 def _with_normal(machine: Machine, omega: float, state: Real) -> Real:

@@ -28,6 +28,7 @@ SAMPLES_A_TURN = 128
 MOST_PERIODS = 1_000_000
 MOST_SAMPLES = 20_000_000
 SETTLED = 1e-6
+ROUNDING = 1e-12
 
 
 def simulate(
@@ -84,6 +85,9 @@ def simulate(
     end = periods * turn
     system = system_of(machine)
     times = _times(t, periods, turn)
+    for one in disturbances:
+        if not isinstance(one, Disturbance):
+            raise InputError("disturbances", one, "give ff.Impulse, ff.LoadStep or ff.Lump")
     blows = sorted(disturbances, key=lambda one: one.t)
     if blows and blows[-1].t >= end:
         raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
@@ -92,6 +96,7 @@ def simulate(
     run.carry(Recording(times, system.size, len(run.kept)), z, blows)
     settling = Settling(system_of(run.machine), MAX_PERIODS)
     distance = settling.distance_ahead(run.z, speed)
+    near = distance is not None and distance <= SETTLED * settling.size(run.z[None], speed)
     return History(
         system=system,
         t=times,
@@ -103,7 +108,7 @@ def simulate(
         angle=speed * times,
         normal=_normal(machine, speed, times, initial, blows, end),
         energy=run.energy(),
-        settled=distance is not None and distance < SETTLED * settling.size(run.z[None], speed),
+        settled=near,
         distance=distance,
         events=run.events(),
         status="The motion was carried to its end.",
@@ -121,9 +126,10 @@ def _times(t: ArrayLike | None, periods: int, turn: float) -> Real:
     times = np.atleast_1d(np.asarray(t, float)).copy()
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
         raise InputError("t", t, "give finite times in one row")
-    if times[0] < 0.0 or times[-1] > periods * turn or (np.diff(times) < 0.0).any():
-        raise InputError("t", t, f"give rising times from 0 to {periods * turn:.6g} s")
-    return times
+    end = periods * turn
+    if times[0] < 0.0 or times[-1] > end * (1.0 + ROUNDING) or (np.diff(times) < 0.0).any():
+        raise InputError("t", t, f"give rising times from 0 to {end:.6g} s")
+    return np.asarray(np.minimum(times, end))
 
 
 class _Run:
@@ -156,16 +162,21 @@ class _Run:
             )
             at = until
             if blow is not None:
-                before = self.stored()
+                before = self.moving()
                 kind = "impulses" if isinstance(blow, Impulse) else "loads"
                 self._strike(blow)
-                self.blown[kind] += self.stored() - before
+                # A blow that makes a clipped stop take hold, or let go, gives it no energy.
+                self.blown[kind] += self.moving() - before
 
-    def stored(self) -> float:
-        """What masses and springs hold, J."""
+    def moving(self) -> float:
+        """What masses hold and springs that always act, J."""
         system = self.build(self.machine).with_bonded()
         x, v = np.split(self.z, 2)
-        return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x) + self.held()
+        return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x)
+
+    def stored(self) -> float:
+        """What masses and all springs hold, J."""
+        return self.moving() + self.held()
 
     def held(self) -> float:
         """What the touched stops hold, J."""

@@ -13,6 +13,7 @@ from flipflow.analyses.arguments import checked_positive
 from flipflow.analyses.linear import linear_response
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.transient import (
+    MOST_TURNS,
     STATUS,
     at_rest,
     movable,
@@ -27,7 +28,7 @@ from flipflow.errors import InputError
 from flipflow.kernels import status
 from flipflow.kernels.unsteady import SHAFT_STATES
 from flipflow.methods.time_stepping import RungeKutta, Stretch
-from flipflow.model.constants import GRAVITY
+from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
 from flipflow.model.elements import Unbalance
 from flipflow.model.screen import FlipFlowScreen
@@ -45,6 +46,11 @@ AT_REST, STOPPED = 0.02, 0.02
 NEAR = (0.8, 1.1)
 PASSING = (0.8, 1.25)
 FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
+NOT_SETTLED = f"had not settled after {MOST_TURNS} turns from rest"
+UNSETTLED = (
+    f"The motion in which the coast-down begins {NOT_SETTLED}: begun a turn later, it would have "
+    "other peaks."
+)
 
 
 def start_up(
@@ -62,6 +68,8 @@ def start_up(
 
     .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
               - \ddot y_1 \cos\varphi) .
+
+    Gravity on the unbalance, a torque of up to m0 r g, is left out; a note says so.
 
     Parameters
     ----------
@@ -112,6 +120,9 @@ def coast_down(
 ) -> RunUp:
     """Let a machine come down from its settled motion at ``speed``, the motor switched off.
 
+    Gravity on the unbalance is left out, so that the last turns come out longer than they are; a
+    note tells the speed below which the shaft would swing.
+
     Parameters
     ----------
     machine
@@ -143,12 +154,13 @@ def coast_down(
         shaft, slowest = shaft.switched_off(), STOPPED * omega
     elif shaft.speeds[0] != omega:
         raise InputError("speeds", shaft.speeds[0], f"begin the profile at {omega:.6g} rad/s")
+    start = settled_start(machine, omega, method)
     history = run_history(
-        machine, shaft, settled_start(machine, omega, method),
-        _longest(shaft, duration, COAST_SECONDS),
+        machine, shaft, start, _longest(shaft, duration, COAST_SECONDS),
         fastest=_fastest(shaft, omega), slowest=slowest, method=method, monitor=monitor,
     )  # fmt: skip
-    return _judged(machine, shaft, omega, history)
+    unsettled = () if start.settled else (UNSETTLED,)
+    return _judged(machine, shaft, omega, history, unsettled)
 
 
 def default_drive(machine: Machine, speed: float | None, method: RungeKutta | None = None) -> Drive:
@@ -161,10 +173,12 @@ def default_drive(machine: Machine, speed: float | None, method: RungeKutta | No
         raise InputError("drive", None, "give a Drive or a SpeedProfile for this machine")
     if speed is None:
         raise InputError("speed", None, "give the working speed, or a drive")
-    power = POWER_FACTOR * steady_power(machine, speed, method)
+    steady, settled = steady_power(machine, speed, method)
+    power = POWER_FACTOR * steady
     drive = assumed_drive(machine.eccentric_moment, speed, power)
     rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
     word = f"rated power {rated}, four times what the dampers take at working speed"
+    word += "" if settled else f", in the mean over 20 turns of a motion that {NOT_SETTLED}"
     return replace(drive, assumed=(word, *drive.assumed))
 
 
@@ -222,7 +236,13 @@ def _steady(done: list[Stretch]) -> bool:
     return bool(abs(spans[0] / spans[1] - 1.0) < STEADY)
 
 
-def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history: History) -> RunUp:
+def _judged(
+    machine: Machine,
+    drive: Drive | SpeedProfile,
+    speed: float,
+    history: History,
+    notes: tuple[str, ...] = (),
+) -> RunUp:
     frequencies = _natural_frequencies(machine)
     final = turn_means(history, history.angle, LAST_TURNS)
     if math.isnan(final) or isinstance(drive, SpeedProfile) or drive.motor is None:
@@ -234,7 +254,7 @@ def _judged(machine: Machine, drive: Drive | SpeedProfile, speed: float, history
         machine, drive, speed, history, outcome, final, near, first,
         _passing(history, first), _peaks(machine, history),
         _power(history) if steady and isinstance(drive, Drive) else {},
-        (*_ended_early(history), *_notes(machine, drive)),
+        (*_ended_early(history), *notes, *_notes(machine, drive)),
     )  # fmt: skip
 
 
@@ -353,13 +373,23 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
             "Normal direction not checked, for want of isolation.normal_stiffness and "
             "normal_damping: amplitudes and forces are those along the surface."
         )
-    if isinstance(drive, SpeedProfile) or drive.motor is None:
-        return [*notes, *(f"Assumed: {text}." for text in getattr(drive, "assumed", ()))]
+    if isinstance(drive, Drive):
+        notes += [*_gravity(machine, drive), *(f"Assumed: {text}." for text in drive.assumed)]
+    return notes
+
+
+def _gravity(machine: Machine, drive: Drive) -> list[str]:
+    """What the weight of the unbalance, which the equations leave out, would change."""
     excitation = machine.system().excitation
     moment = float(np.abs(excitation.vector).max()) if isinstance(excitation, Unbalance) else 0.0
-    if float(drive.torque(0.0)) < moment * GRAVITY:
-        notes.append(
-            f"The torque at rest, {float(drive.torque(0.0)):.3g} N m, is less than the weight of "
-            f"the unbalance may ask for, {moment * GRAVITY:.3g} N m: gravity is not calculated."
-        )
-    return [*notes, *(f"Assumed: {text}." for text in drive.assumed)]
+    torque = moment * GRAVITY
+    if torque == 0.0:
+        return []
+    left_out = f"Gravity on the unbalance, up to {torque:.3g} N m at the shaft, is not calculated"
+    if drive.motor is None:
+        over = 2.0 * math.sqrt(torque / drive.inertia) * RPM
+        return [f"{left_out}: below about {over:.0f} rpm the shaft would swing instead of turning."]
+    at_rest = float(drive.torque(0.0))
+    if at_rest < torque:
+        return [f"{left_out}; the motor's torque at rest, {at_rest:.3g} N m, may not lift it."]
+    return [f"{left_out}."]

@@ -18,7 +18,7 @@ from flipflow.results.history import ContactChange, History, stop_forces
 
 Real = NDArray[np.float64]
 MOST_ROWS = 400_000
-SETTLED, MOST_TURNS, TURNS_AT_ONCE = 1e-7, 2000, 20
+SETTLED, MOST_TURNS, TURNS_AT_ONCE, MOST_PERIODS = 1e-7, 2000, 20, 6
 
 STATUS = {
     status.OK: "The whole time was calculated.",
@@ -33,11 +33,15 @@ STATUS = {
 
 @dataclass(frozen=True)
 class Start:
-    """Where a run begins: (x, x') with the normal direction last in each, angle in rad, rad/s."""
+    """Where a run begins: (x, x') with the normal direction last in each, angle in rad, rad/s.
+
+    ``settled`` is False where it was meant to be a settled motion and is none.
+    """
 
     state: Real
     angle: float
     speed: float
+    settled: bool = True
 
 
 def normal_direction(machine: Machine) -> NormalDirection | None:
@@ -102,31 +106,49 @@ def run_history(
 
 
 def settled_start(machine: Machine, speed: float, method: RungeKutta | None = None) -> Start:
-    """The state into which the machine settles from rest at constant speed, at angle 0."""
+    """The state into which the machine settles from rest at constant speed, at angle 0.
+
+    The motion may repeat after up to six turns. Where it has not settled after 2000 turns, the
+    state then, marked so.
+    """
     movable(machine)
-    profile, turn = SpeedProfile((0.0, 1.0), (speed, speed)), 2.0 * np.pi / speed
-    normal, state = normal_direction(machine), at_rest(machine).state
+    state = at_rest(machine).state
     for _ in range(MOST_TURNS // TURNS_AT_ONCE):
-        before = state
-        for turns in (TURNS_AT_ONCE - 1, 1):
-            stepper = Stepper(
-                system_of(machine), profile, state, normal=normal, method=method, fastest=speed
-            )
-            for _stretch in stepper.run(turns * turn):
-                pass
-            before, state = state, stepper.walk.s[: state.size].copy()
-        if np.abs(state - before).max() <= SETTLED * np.abs(state).max():
-            break
-    return Start(state, 0.0, speed)
+        state = _carried(machine, speed, state, TURNS_AT_ONCE - MOST_PERIODS, method)
+        before = []
+        for _ in range(MOST_PERIODS):
+            before.append(state)
+            state = _carried(machine, speed, state, 1, method)
+        if np.abs(state - before).max(axis=1).min() <= SETTLED * np.abs(state).max():
+            return Start(state, 0.0, speed)
+    return Start(state, 0.0, speed, settled=False)
 
 
-def steady_power(machine: Machine, speed: float, method: RungeKutta | None = None) -> float:
-    """Mean power in W that the dampers take at constant speed, both directions together."""
+def _carried(
+    machine: Machine, speed: float, state: Real, turns: int, method: RungeKutta | None
+) -> Real:
+    """The state after some turns at constant speed."""
+    stepper = Stepper(
+        system_of(machine), SpeedProfile((0.0, 1.0), (speed, speed)), state,
+        normal=normal_direction(machine), method=method, fastest=speed,
+    )  # fmt: skip
+    for _stretch in stepper.run(turns * 2.0 * np.pi / speed):
+        pass
+    return stepper.walk.s[: state.size].copy()
+
+
+def steady_power(
+    machine: Machine, speed: float, method: RungeKutta | None = None
+) -> tuple[float, bool]:
+    """Mean power in W that the dampers take at constant speed, and whether the motion has settled.
+
+    Both directions together, over twenty turns.
+    """
     start = settled_start(machine, speed, method)
-    turn = 2.0 * np.pi / speed
+    duration = TURNS_AT_ONCE * 2.0 * np.pi / speed
     profile = SpeedProfile((0.0, 1.0), (speed, speed))
-    run = run_history(machine, profile, start, turn, fastest=speed, method=method)
-    return run.energy["dissipated"] / turn
+    run = run_history(machine, profile, start, duration, fastest=speed, method=method)
+    return run.energy["dissipated"] / duration, start.settled
 
 
 def swings(t: Real, x: Real, v: Real) -> tuple[Real, Real]:

@@ -102,7 +102,7 @@ class Lanes:
     """
 
     def __init__(self, system: MechanicalSystem, omega: float, threads: int | None) -> None:
-        whole = isinstance(threads, int) and not isinstance(threads, bool)
+        whole = isinstance(threads, (int, np.integer)) and not isinstance(threads, bool)
         if threads is not None and not (whole and 1 <= threads <= MOST_THREADS):
             raise InputError("threads", threads, f"give a whole number from 1 to {MOST_THREADS}")
         self.builder = PlanBuilder(system)

@@ -17,6 +17,7 @@ from flipflow.model.system import MechanicalSystem
 Real = NDArray[np.float64]
 GAUSS_NODES = 16
 TURNS_A_CALL = 32
+SHORTEST = 2.0**-12  # share of a turn
 
 
 class Recording:
@@ -53,7 +54,7 @@ class Recording:
         Raises
         ------
         IncompleteError
-            When the flow does not end, as where stops chatter.
+            When the flow does not end even over a short part of a turn, as where stops chatter.
         """
         solver = ExactSolver(system, half_turn=False)
         node, weight = np.polynomial.legendre.leggauss(GAUSS_NODES)
@@ -61,12 +62,19 @@ class Recording:
             solver.system.C.copy(), solver.system.excitation.vector.astype(np.complex128),
             node, weight, np.zeros(3),
         )  # fmt: skip
-        stretch = TURNS_A_CALL * 2.0 * np.pi / omega
+        turn = 2.0 * np.pi / omega
+        stretch = TURNS_A_CALL * turn
         t = begin
         while t < end:
             until = min(t + stretch, end)
-            z = self._stretch(solver, z, omega, t, until, budget)
-            t = until
+            reached = self._stretch(solver, z, omega, t, until, budget)
+            if reached is None:
+                # A turn has more contacts than are recorded at once: go on by parts of it.
+                stretch = min(stretch, turn) / 2.0
+                if stretch < turn * SHORTEST:
+                    raise IncompleteError(f"the motion could not be carried on beyond {t:.6g} s")
+                continue
+            z, t = reached, until
             tell(t)
         for name, work in zip(self.work, budget.work, strict=True):
             self.work[name] += float(work)
@@ -74,7 +82,8 @@ class Recording:
 
     def _stretch(
         self, solver: ExactSolver, z: Real, omega: float, t: float, until: float, budget: Budget
-    ) -> Real:
+    ) -> Real | None:
+        """State at ``until``; None, and nothing recorded, where the flow does not end."""
         capacity = (TURNS_A_CALL + 2) * MOST_SEGMENTS
         kept = budget.work.copy()
         while True:
@@ -92,7 +101,8 @@ class Recording:
             budget.work[:] = kept
             solver.add_configuration(problem.flow)
         if code != status.OK:
-            raise IncompleteError(f"the motion could not be carried on beyond {t:.6g} s")
+            budget.work[:] = kept
+            return None
         self.row = row
         count = int(changes.used[0])
         self.changes += zip(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.errors import IncompleteError
 from flipflow.kernels import arclength, status
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.solver import STEP_SHARE, Point, Real
@@ -83,10 +84,7 @@ class Settling:
     ) -> Settled:
         """Run from z until the distance falls below ``tolerance`` times the motion's size.
 
-        Raises
-        ------
-        IncompleteError
-            When the flow over a turn does not end.
+        Not settled is, too, where the flow over a turn does not end.
         """
         turns, chunk = 0, FIRST_CHUNK
         recent = np.array(z, float)[None]
@@ -99,9 +97,18 @@ class Settling:
             chunk = min(2 * chunk, LONGEST_CHUNK)
             if point is not None:
                 chunk = self._turns_to_go(point, distance, tolerance * self.size(recent, omega))
-            run = self.solver.section(recent[-1], omega, min(chunk, most - turns))
+            run = self._run(recent[-1], omega, min(chunk, most - turns))
+            if run is None:
+                return Settled(recent[-1].copy(), turns, None, math.inf, False, recent)
             recent = np.concatenate([recent, run])[-RECENT:]
             turns += run.shape[0]
+
+    def _run(self, z: Real, omega: float, turns: int) -> Real | None:
+        """States after 1, 2, ... turns, (turns, 2 N); None where a flow does not end."""
+        try:
+            return self.solver.section(z, omega, turns)
+        except IncompleteError:
+            return None
 
     def approached(self, recent: Real, omega: float) -> Point | None:
         """The stable periodic motion near the last of the recent states (K, 2 N)."""
@@ -142,7 +149,9 @@ class Settling:
 
     def distance_ahead(self, z: Real, omega: float) -> float | None:
         """Distance in m of the state z from the periodic motion ahead; None where none is near."""
-        ahead = self.solver.section(z, omega, 2 * self.max_periods)
+        ahead = self._run(z, omega, 2 * self.max_periods)
+        if ahead is None:
+            return None
         point = self.approached(np.concatenate([z[None], ahead]), omega)
         if point is None:
             return None

@@ -8,6 +8,7 @@ outside the first a value is refused, outside the second it is questioned.
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import EllipsisType
@@ -76,7 +77,7 @@ class Field:
         field = label or self.name
         if value is None and not self.required:
             return None
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise InputError(field, value, f"a number in {self.unit or 'plain units'} belongs here")
         number = float(value)
         too_low = number <= self.lower if self.lower_open else number < self.lower

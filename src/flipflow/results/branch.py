@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -200,7 +202,7 @@ class Branch:
         ends = self.omega
         if ends.size == 0:
             raise IncompleteError(f"The branch has no points. {self.status.value}")
-        if not isinstance(omega, (int, float)) or not ends.min() <= omega <= ends.max():
+        if not isinstance(omega, numbers.Real) or not ends.min() <= omega <= ends.max():
             remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
             raise InputError("omega", omega, remedy)
         hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
@@ -295,7 +297,10 @@ class Branch:
                 continue
 
             def rise(share: float, p: int = p) -> float:
-                point = self.solver.between(self.traced, p, share)
+                try:
+                    point = self.solver.between(self.traced, p, share)
+                except IncompleteError:
+                    return math.inf  # not every motion between two sharp bends can be had
                 low, high, _ = self.solver.extremes(point.u[None], np.array([point.omega]), vector)
                 return sign * float(high[0, 0] - low[0, 0])
 
@@ -304,6 +309,8 @@ class Branch:
                     rise, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
                 ).x
             )
+            if not math.isfinite(rise(share)):
+                continue
             point = self.solver.between(self.traced, p, share)
             orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
             if sign * orbit.amplitude(which) < sign * best.amplitude(which):
