@@ -11,6 +11,16 @@ from dataclasses import dataclass
 
 from flipflow import __version__
 from flipflow.analyses.feasible import limit_bounds, missing_for, missing_words, working_motion
+from flipflow.analyses.limit_row import (
+    ATTENTION,
+    CLOSE,
+    FAIL,
+    NO_LIMIT,
+    NOT_CHECKED,
+    PASS,
+    LimitRow,
+    relative_margin,
+)
 from flipflow.analyses.monitor import Monitor
 from flipflow.analyses.normal import NormalMotion
 from flipflow.analyses.operating_region import OperatingRegion, analysed_range, operating_region
@@ -28,44 +38,7 @@ from flipflow.results.branch import Branch
 from flipflow.results.orbit import Orbit
 from flipflow.results.sensitivity import OneAtATime
 
-PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
-CLOSE = 0.05
 TORNADO_SHARE = 0.05
-NO_LIMIT = (-math.inf, math.inf)
-
-
-@dataclass(frozen=True)
-class LimitRow:
-    """One limit over all load cases.
-
-    Parameters
-    ----------
-    name, label, unit, shown_unit
-        Limit, its words, SI unit and unit to show.
-    limit
-        (least, most) in SI; infinite where there is no such end.
-    worst
-        The value nearest to or farthest beyond the limit, SI; None when not checked.
-    case
-        The load case in which it occurs.
-    margin
-        Distance from the limit as a share of the limit; negative when it is broken.
-    state
-        "pass", "attention" (met, but within 5 %), "fail" or "not checked".
-    reason
-        Why it was not checked.
-    """
-
-    name: str
-    label: str
-    unit: str
-    shown_unit: str
-    limit: tuple[float, float]
-    worst: float | None = None
-    case: str = ""
-    margin: float | None = None
-    state: str = NOT_CHECKED
-    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,13 +283,6 @@ def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) ->
     margin, worst, case_name = min(judged, key=lambda one: one[0])
     state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
     return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
-
-
-def relative_margin(value: float, low: float, high: float) -> float:
-    """Distance from the nearer end as a share of that end; negative beyond it."""
-    to_low = (value - low) / abs(low) if math.isfinite(low) and low != 0.0 else math.inf
-    to_high = (high - value) / abs(high) if math.isfinite(high) and high != 0.0 else math.inf
-    return min(to_low, to_high)
 
 
 def verdict(

@@ -6,8 +6,9 @@ import itertools
 import math
 from collections.abc import Iterator
 
-from flipflow.analyses.assessment import Assessment, CaseAssessment, LimitRow
+from flipflow.analyses.assessment import Assessment, CaseAssessment
 from flipflow.analyses.feasible import REGION, STABILITY, Bound, missing_words
+from flipflow.analyses.limit_row import ATTENTION, FAIL, NOT_CHECKED, PASS, LimitRow
 from flipflow.analyses.operating_region import OperatingRegion
 from flipflow.analyses.quantities import QUANTITIES
 from flipflow.figures.layout import legend_lines
@@ -29,7 +30,6 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, rpm, span, speed
 from flipflow.report.registry import Part, section
 
-FAIL, ATTENTION, PASS, NOT_CHECKED = "fail", "attention", "pass", "not checked"
 NO_NORMAL = (
     "Orbits are not drawn: isolation.normal_stiffness or isolation.normal_damping is missing in "
     "the machine file."
