@@ -32,7 +32,7 @@ def test_speeds_and_counts_take_numbers_of_numpy(screen):
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda s: ff.ramp(s, 120.0, 1.0), "first and the last speed"),
+        (lambda s: ff.ramp(s, 120.0, 1.0), "two different speeds"),
         (lambda s: ff.ramp(s, (120.0, 120.0), 1.0), "two different speeds"),
         (lambda s: ff.simulate(s, 120.0, 5, disturbances=["blow"]), "ff.Impulse"),
         (lambda _: ff.continue_orbit(120.0, "omega", (100.0, 130.0)), "give a motion"),

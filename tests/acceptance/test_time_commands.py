@@ -15,8 +15,9 @@ def test_orbits_lists_three_motions(command):
     assert [one["stability"] for one in document["orbits"]] == ["stable", "unstable", "stable"]
 
 
-def test_sweep_tells_both_jumps_in_rpm(command, tmp_path):
-    arguments = ("--speeds", "1800 rpm", "2050 rpm", "--steps", "26", "-o", str(tmp_path))
+def test_sweep_tells_both_jumps_in_rpm(command, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    arguments = ("--speeds", "1800 rpm", "2050 rpm", "--steps", "26", "-o", ".")
     code, out, err = command("sweep", "ffs0827", *arguments)
     assert code == 0, err
     assert max(map(len, out.splitlines())) <= 80
