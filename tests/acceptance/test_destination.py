@@ -124,12 +124,14 @@ def test_a_document_for_the_terminal_stands_there_alone(command):
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="needs a device that is full")
-def test_an_answer_that_cannot_be_shown_is_in_its_files(tmp_path):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_an_answer_that_cannot_be_shown_is_in_its_files(tmp_path, unbuffered):
     with FULL.open("w") as full:
         ended = subprocess.run(
             [sys.executable, "-m", "flipflow.cli.main", "simulate", *QUICK["simulate"],
              "-o", "out", "--json", "x.json"],
             stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
         )  # fmt: skip
     assert ended.returncode == 4
     assert ended.stderr == "Error: what was found cannot be shown (No space left on device).\n"

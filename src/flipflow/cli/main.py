@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import textwrap
@@ -86,7 +87,10 @@ def _options(
 def main() -> None:
     """Run the command line; an error is one sentence on stderr and the exit code of its class."""
     try:
-        app()
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
     except FlipflowError as error:
         head = "" if isinstance(error, Cancelled) else "Error: "
         typer.echo(_for_terminal(f"{head}{_sentence(str(error))}"), err=True)
@@ -94,6 +98,8 @@ def main() -> None:
     except OSError as error:
         # What is written to files has its own sentence; this is the terminal, or a pipe from it.
         typer.echo(f"Error: what was found cannot be shown ({error.strerror}).", err=True)
+        # What is still held back would be tried again, and fail again, at the interpreter's end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(StoreError.exit_code)
     except KeyboardInterrupt:
         sys.exit(130)
