@@ -22,7 +22,7 @@ OPEN, ENGAGED, RELEASED = "open", "engaged", "released"
 RTOL, ATOL_SHARE = 1e-11, 1e-13
 STEPS_PER_TURN = 100
 MOST_PIECES = 10_000
-TOGETHER = 1e-6  # share of a piece; events closer than its square are one
+TOGETHER, NEAR = 1e-10, 1e-6  # of a turn: events closer than the first are one
 
 
 @dataclass(frozen=True)
@@ -119,21 +119,23 @@ def flow(
         history.append(tuple(states))
         if solution.status == 0:
             return Trajectory(np.array(ends), tuple(pieces), tuple(history), z)
-        for which, target in _due(events, targets, solution):
+        for which, target in _due(events, targets, solution, 2.0 * np.pi / omega):
             states[which] = target
     raise AssertionError(f"more than {MOST_PIECES} contacts")
 
 
-def _due(events: list, targets: list, solution: object) -> list:
+def _due(events: list, targets: list, solution: object, turn: float) -> list:
     """Every change due at the end of a piece: stops that touch at once switch at once."""
     t, z = float(solution.t[-1]), solution.y[:, -1]
-    before = t - TOGETHER * (t - float(solution.t[0]))
+    before = max(t - NEAR * turn, float(solution.t[0]))
     found = []
     for event, target, times in zip(events, targets, solution.t_events, strict=True):
         # scipy names one of the events that fall together, and the others never cross again.
-        earlier = event(before, solution.sol(before))
-        here = abs(event(t, z)) <= TOGETHER * abs(earlier)
-        if times.size or (here and earlier * event.direction < 0.0):
+        now, slope = event(t, z), 0.0
+        if t > before:
+            slope = (now - event(before, solution.sol(before))) / (t - before)
+        together = abs(now) <= TOGETHER * turn * abs(slope)
+        if times.size or (together and slope * event.direction > 0.0):
             found.append(target)
     return found
 

@@ -134,9 +134,7 @@ def test_speed_without_a_stable_motion_is_not_called_out_of_range(screen):
 @pytest.mark.parametrize("minus", [6e-3, 3e-3, math.inf])
 def test_a_clipped_stop_takes_what_it_still_holds_when_it_lets_go(screen, minus):
     """Input = isolation + shear springs + stop, for the compression-only law, too."""
-    clipped = screen.replace(
-        stop_law="compression-only", stop_damping=2e4, clearance_minus=minus
-    )  # fmt: skip
+    clipped = screen.replace(stop_law="compression-only", stop_damping=2e4, clearance_minus=minus)
     orbit = ff.periodic_orbits(clipped, 140.568)[0]
     powers = energy_balance(Working(clipped, orbit))
     taken = powers["isolation"] + powers["shear"] + powers["stop"]

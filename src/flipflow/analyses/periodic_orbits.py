@@ -24,7 +24,7 @@ STARTS = 64
 SETTLING_TURNS = 60
 MOST_PERIODS = 6
 SWEEP_RATIO, SWEEP_STEPS = 1.3, 12
-BRANCH_RATIO, BRANCH_STEPS = 1.5, 60
+BRANCH_RATIOS, BRANCH_STEPS = (1.15, 2.5), 60
 
 logger = logging.getLogger("flipflow")
 
@@ -121,7 +121,7 @@ class _Search:
         return [
             np.zeros(2 * n),
             first_unknowns(solver, self.omega),
-            *_on_branch(solver.system, self.omega),
+            *(z for ratio in BRANCH_RATIOS for z in _on_branch(solver.system, self.omega, ratio)),
             *((2.0 * cloud - 1.0) * box),
             *(z for z in stepped if z is not None),
         ]
@@ -202,10 +202,13 @@ class _Search:
         return point if mirrored is None else mirrored
 
 
-def _on_branch(system: MechanicalSystem, omega: float) -> list[Real]:
-    """States at ``omega`` of the branch reached from below, wherever it passes that speed."""
+def _on_branch(system: MechanicalSystem, omega: float, ratio: float) -> list[Real]:
+    """States at ``omega`` of the branch reached from below, wherever it passes that speed.
+
+    It is followed from ``omega / ratio`` until it has left ``omega * ratio``.
+    """
     solver = ExactSolver(system, half_turn=system.symmetric)
-    low, high = omega / BRANCH_RATIO, BRANCH_RATIO * omega
+    low, high = omega / ratio, omega * ratio
     course = arclength.Course(
         low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, arclength.QUICK
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +92,9 @@ def ramp(
     """Let the speed glide from one value to another at a constant rate.
 
     The motion starts from the periodic one at the first speed that is reached from the side away
-    from the last: from below where the speed rises, from above where it falls. It is carried by
-    the event-located Runge-Kutta pair 5(4).
+    from the last: from below where the speed rises, from above where it falls. Where that one is
+    not stable it is the largest, or the smallest, of the stable motions found by a search. It is
+    carried by the event-located Runge-Kutta pair 5(4).
 
     Parameters
     ----------
@@ -136,17 +136,6 @@ def ramp(
     which = orbit.system.named[-1]
     jumps = _jumps(branch, history, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
-
-
-def _ends(omega: object) -> tuple[float, float]:
-    """First and last speed; they may fall, but not be one."""
-    try:
-        first, last = map(float, cast("tuple[float, float]", omega))
-    except (TypeError, ValueError):
-        raise InputError("omega", omega, "give the first and the last speed in rad/s") from None
-    if first == last:
-        raise InputError("omega", omega, "give two different speeds; ff.simulate stays at one")
-    return first, last
 
 
 def _branch_over(machine: Machine, low: float, high: float) -> Branch:

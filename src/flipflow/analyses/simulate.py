@@ -77,7 +77,7 @@ def simulate(
         For a speed, count, state or disturbance that makes no sense, and for a machine without
         any damping, which never settles.
     IncompleteError
-        Where a turn has too many contacts to be recorded.
+        Where stops chatter: too many contacts even in a small part of a turn.
     """
     speed = checked_speed(omega)
     checked_count("periods", periods, MOST_PERIODS)
