@@ -12,6 +12,7 @@ import flipflow as ff
 from flipflow.kernels import arclength
 from flipflow.methods.scratch import new_branch, new_corrector
 from flipflow.methods.solver import eigenvalues_of
+from flipflow.methods.stability import determinant_minus, determinant_plus
 from kernel_calls import predicted
 
 ANYWHERE = arclength.Course(1.0, 100.0, 1.0, 1.0, 1.0, arclength.QUICK)
@@ -51,6 +52,13 @@ def test_order_of_the_predictor(signatures: tuple[int, int], order: float) -> No
     assert slopes == pytest.approx([order, order], abs=0.1)
 
 
+@pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(3)], ids=repr)
+def test_two_newton_steps_are_enough_at_most_points(method) -> None:
+    """Along the tangent alone it is two points in three or fewer."""
+    branch = ff.frequency_response(ff.load("ffs0827"), (5.0, 250.0), method)
+    assert np.mean(branch.traced.iterations <= 2) > 0.9
+
+
 @pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(9)], ids=repr)
 @pytest.mark.parametrize("clearance_minus", [None, 9e-3], ids=["even gaps", "uneven gaps"])
 def test_recorded_depths_are_those_of_the_motion(method, clearance_minus) -> None:
@@ -80,3 +88,10 @@ def test_multipliers_without_contact_are_those_of_the_return_map(symmetric: bool
         gaps = np.abs(ours[:, None] - expected[None, :])
         assert gaps.min(axis=0).max() < 1e-7
         assert gaps.min(axis=1).max() < 1e-7
+
+
+def test_determinants_of_maps_that_are_not_known() -> None:
+    """Where the flow failed there is no map; that is no reason for a warning."""
+    maps = np.stack([np.full((4, 4), np.nan), 0.5 * np.eye(4)])
+    assert determinant_plus(maps) == pytest.approx([np.nan, 1.5**4], nan_ok=True)
+    assert determinant_minus(maps) == pytest.approx([np.nan, 0.5**4], nan_ok=True)

@@ -385,11 +385,15 @@ def _gravity(machine: Machine, drive: Drive) -> list[str]:
     torque = moment * GRAVITY
     if torque == 0.0:
         return []
-    left_out = f"Gravity on the unbalance, up to {torque:.3g} N m at the shaft, is not calculated"
+    left_out = (
+        f"Gravity on the unbalance, up to {torque:.3g} N m at the shaft, is not calculated."
+    )
     if drive.motor is None:
         over = 2.0 * math.sqrt(torque / drive.inertia) * RPM
-        return [f"{left_out}: below about {over:.0f} rpm the shaft would swing instead of turning."]
+        swings = f"Coasting below about {over:.0f} rpm, the shaft would swing instead of turning."
+        return [left_out, swings]
     at_rest = float(drive.torque(0.0))
     if at_rest < torque:
-        return [f"{left_out}; the motor's torque at rest, {at_rest:.3g} N m, may not lift it."]
-    return [f"{left_out}."]
+        lift = f"The motor's torque at rest, {at_rest:.3g} N m, may not lift the unbalance."
+        return [left_out, lift]
+    return [left_out]

@@ -1,8 +1,8 @@
 """How kernels that only kernels call are compiled: to code that their callers take in, no further.
 
 numba by itself optimises every function with all that it calls, and makes machine code of it, so
-that what lies deep is done again at each level above: two thirds of LLVM's time. Only entries are
-run by themselves; the rest is optimised once, within them.
+that what lies deep is done again at each level above. Only entries are run by themselves; the rest
+is optimised once, within them.
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from flipflow.kernels import status
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.exact import ExactSolver
 from flipflow.methods.solver import Point, Real, Traced
+from flipflow.methods.stability import determinant_minus
 
 BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
 FOLLOWED = (1.0, 4.0)
@@ -122,8 +123,7 @@ class ExactBeside:
         lie beyond +1.
         """
         maps, distance = self.solver.corrected_maps(self.traced.u, self.traced.omega)
-        beyond = np.linalg.det(np.eye(maps.shape[-1]) - maps) < 0.0
-        on_side = (beyond == side) & np.isfinite(distance)
+        on_side = ((determinant_minus(maps) < 0.0) == side) & np.isfinite(distance)
         ends = [0, *(int(position) + 1 for position in positions), side.size]
         shown = [bool(on_side[first:last].any()) for first, last in pairwise(ends)]
         return [before and after for before, after in pairwise(shown)]

@@ -20,12 +20,12 @@ from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.errors import IncompleteError
 from flipflow.kernels.follow import FOLD as OF_FOLD
+from flipflow.kernels.follow import SHARE_TOLERANCE
 from flipflow.methods.balance import BalanceSolver
 from flipflow.methods.confirm import ExactBeside, unconfirmed_note
 from flipflow.methods.solver import Point, Real, Solver, Traced, eigenvalues_of
 from flipflow.methods.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
-SHARE_TOLERANCE = 1e-10
 DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
 BOTTOM_STEPS = 15
 QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)

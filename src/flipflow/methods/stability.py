@@ -69,8 +69,20 @@ def beyond_where_rising(omega_tangent: Real, eigenvalues: Complex) -> bool:
 
 
 def determinant_plus(maps: Real) -> Real:
-    """det(I + map): zero at an eigenvalue -1."""
-    return np.asarray(np.linalg.det(maps + np.eye(maps.shape[-1])))
+    """det(I + map): zero at an eigenvalue -1, NaN where the flow failed."""
+    return _determinant(np.eye(maps.shape[-1]) + maps)
+
+
+def determinant_minus(maps: Real) -> Real:
+    """det(I - map): zero at an eigenvalue +1, NaN where the flow failed."""
+    return _determinant(np.eye(maps.shape[-1]) - maps)
+
+
+def _determinant(matrices: Real) -> Real:
+    known = np.isfinite(matrices).all(axis=(-2, -1))
+    found = np.full(matrices.shape[:-2], np.nan)
+    found[known] = np.linalg.det(matrices[known])
+    return found
 
 
 def neimark_sacker(eigenvalues: Complex) -> Real:
