@@ -14,7 +14,7 @@ import numpy as np
 from scipy_flow import carried
 
 import flipflow as ff
-from flipflow.analyses.attractors import Attractors
+from flipflow.studies.attractors import Attractors
 
 OMEGA = 203.0
 DISPLACEMENT, VELOCITY = 0.08, 16.0

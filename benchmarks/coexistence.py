@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 import flipflow as ff
-from flipflow.methods.special import DOUBLING, STABILITY_CHANGES
+from flipflow.continuation.special_points import DOUBLING, STABILITY_CHANGES
 
 LOW, HIGH, STEP = 20.0, 600.0, 5.0
 FOLLOWED = (10.0, 900.0)

@@ -11,10 +11,10 @@ from contract import INTERVAL
 from one_core import stay_on_one_core
 
 import flipflow as ff
-from flipflow.analyses.frequency_response import first_unknowns, solver_for
-from flipflow.kernels import arclength
-from flipflow.methods.solver import STEP_SHARE
-from flipflow.methods.special import find_special_points
+from flipflow.continuation import arclength
+from flipflow.continuation.frequency_response import first_unknowns, solver_for
+from flipflow.continuation.special_points import find_special_points
+from flipflow.periodic.solver import STEP_SHARE
 
 ROWS = 25
 

@@ -18,7 +18,7 @@ import numpy as np
 from machine_draw import linear_relative_amplitude
 
 from flipflow.errors import IncompleteError
-from flipflow.methods.exact import ExactSolver
+from flipflow.periodic.exact_solver import ExactSolver
 
 SAME_SPEED = 5e-3
 CONTACT_TOLERANCE = 1e-7

@@ -20,8 +20,8 @@ from contract import EXACT_FOLDS, FOLD_TOLERANCE, INTERVAL, check_response
 from one_core import stay_on_one_core
 
 import flipflow as ff
-from flipflow.analyses.frequency_response import contact_free_unknowns
-from flipflow.methods.exact import ExactSolver
+from flipflow.continuation.frequency_response import contact_free_unknowns
+from flipflow.periodic.exact_solver import ExactSolver
 
 HERE = Path(__file__).parent
 ORBIT_SPEED, EXACT_AMPLITUDE = 120.0, 9.969835637e-3

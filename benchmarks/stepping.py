@@ -16,8 +16,8 @@ from one_core import stay_on_one_core
 from scipy_flow import carried
 
 import flipflow as ff
-from flipflow.methods.exact import ExactSolver
-from flipflow.methods.time_stepping import RungeKutta, Stepper
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.transient.time_stepping import RungeKutta, Stepper
 
 OMEGA, TURNS = 120.0, 20
 TURN = 2.0 * np.pi / OMEGA

@@ -10,8 +10,8 @@ import pytest
 
 import flipflow as ff
 from flipflow.cli.main import main
+from flipflow.continuation.branch import Branch
 from flipflow.paper.reproduce import Reproduction
-from flipflow.results.branch import Branch
 
 LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flipflow.results.branch import Branch
-from flipflow.results.orbit import Orbit
+from flipflow.continuation.branch import Branch
+from flipflow.periodic.orbit import Orbit
 
 GAP = np.array([1.0, -1.0])
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from flipflow.kernels.arclength import predict
-from flipflow.kernels.balance import balance_residual
-from flipflow.kernels.compile import kernel
-from flipflow.kernels.dense import lu_factor, lu_sign, lu_solve
-from flipflow.kernels.flow import saltation
-from flipflow.kernels.gapmotion import extremes, next_change, prepare_search
-from flipflow.kernels.sampled import sampled_residual
-from flipflow.kernels.shooting import shooting_residual
+from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
+from flipflow.continuation.arclength import predict
+from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
+from flipflow.dynamics.flow import saltation
+from flipflow.periodic.balance import balance_residual
+from flipflow.periodic.sampled import sampled_residual
+from flipflow.periodic.shooting import shooting_residual
 
 
 @kernel(entry=True)

@@ -12,33 +12,33 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 _HOME = {
-    "HarmonicBalance": "flipflow.methods.options",
-    "PiecewiseExact": "flipflow.methods.options",
-    "SampledHarmonicBalance": "flipflow.methods.options",
-    "frequency_response": "flipflow.analyses.frequency_response",
-    "linear_response": "flipflow.analyses.linear",
-    "loading": "flipflow.analyses.loading",
-    "operating_region": "flipflow.analyses.operating_region",
-    "periodic_orbits": "flipflow.analyses.periodic_orbits",
-    "basins": "flipflow.analyses.basins",
-    "jump_risk": "flipflow.analyses.jump_risk",
-    "start_up": "flipflow.analyses.startup",
-    "coast_down": "flipflow.analyses.startup",
-    "continue_orbit": "flipflow.analyses.continue_orbit",
-    "switch_branch": "flipflow.analyses.continue_orbit",
-    "continue_fold": "flipflow.analyses.continue_field",
-    "assess": "flipflow.analyses.assessment",
-    "simulate": "flipflow.analyses.simulate",
-    "sweep": "flipflow.analyses.sweep",
-    "ramp": "flipflow.analyses.ramp",
-    "poincare_section": "flipflow.analyses.section",
-    "spectrum": "flipflow.analyses.section",
-    "sensitivity": "flipflow.analyses.sensitivity",
+    "HarmonicBalance": "flipflow.periodic.options",
+    "PiecewiseExact": "flipflow.periodic.options",
+    "SampledHarmonicBalance": "flipflow.periodic.options",
+    "frequency_response": "flipflow.continuation.frequency_response",
+    "linear_response": "flipflow.dynamics.linear_response",
+    "loading": "flipflow.studies.loading",
+    "operating_region": "flipflow.studies.operating_region",
+    "periodic_orbits": "flipflow.studies.periodic_orbits",
+    "basins": "flipflow.studies.basins",
+    "jump_risk": "flipflow.studies.jump_risk",
+    "start_up": "flipflow.transient.startup",
+    "coast_down": "flipflow.transient.startup",
+    "continue_orbit": "flipflow.continuation.continue_orbit",
+    "switch_branch": "flipflow.continuation.continue_orbit",
+    "continue_fold": "flipflow.continuation.continue_field",
+    "assess": "flipflow.studies.assessment",
+    "simulate": "flipflow.transient.simulate",
+    "sweep": "flipflow.transient.sweep",
+    "ramp": "flipflow.studies.ramp",
+    "poincare_section": "flipflow.studies.poincare",
+    "spectrum": "flipflow.studies.poincare",
+    "sensitivity": "flipflow.studies.sensitivity",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
-    "response_family": "flipflow.analyses.response_family",
+    "response_family": "flipflow.studies.response_family",
     "reproduce": "flipflow.paper.reproduce",
-    "figure": "flipflow.figures.dispatch",
+    "figure": "flipflow.plotting.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
     "HarmonicForce": "flipflow.model.elements",
     "Unbalance": "flipflow.model.elements",
@@ -64,35 +64,16 @@ __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
-    from flipflow.analyses.assessment import assess as assess
-    from flipflow.analyses.basins import basins as basins
-    from flipflow.analyses.continue_field import continue_fold as continue_fold
-    from flipflow.analyses.continue_orbit import continue_orbit as continue_orbit
-    from flipflow.analyses.continue_orbit import switch_branch as switch_branch
-    from flipflow.analyses.frequency_response import frequency_response as frequency_response
-    from flipflow.analyses.jump_risk import jump_risk as jump_risk
-    from flipflow.analyses.linear import linear_response as linear_response
-    from flipflow.analyses.loading import loading as loading
-    from flipflow.analyses.operating_region import operating_region as operating_region
-    from flipflow.analyses.periodic_orbits import periodic_orbits as periodic_orbits
-    from flipflow.analyses.ramp import ramp as ramp
-    from flipflow.analyses.response_family import response_family as response_family
-    from flipflow.analyses.section import poincare_section as poincare_section
-    from flipflow.analyses.section import spectrum as spectrum
-    from flipflow.analyses.sensitivity import sensitivity as sensitivity
-    from flipflow.analyses.simulate import simulate as simulate
-    from flipflow.analyses.startup import coast_down as coast_down
-    from flipflow.analyses.startup import start_up as start_up
-    from flipflow.analyses.sweep import sweep as sweep
+    from flipflow.continuation.continue_field import continue_fold as continue_fold
+    from flipflow.continuation.continue_orbit import continue_orbit as continue_orbit
+    from flipflow.continuation.continue_orbit import switch_branch as switch_branch
+    from flipflow.continuation.frequency_response import frequency_response as frequency_response
+    from flipflow.dynamics.linear_response import linear_response as linear_response
     from flipflow.errors import InputError as InputError
-    from flipflow.figures.dispatch import figure as figure
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
     from flipflow.io.results import open_result as open_result
     from flipflow.io.results import save as save
-    from flipflow.methods.options import HarmonicBalance as HarmonicBalance
-    from flipflow.methods.options import PiecewiseExact as PiecewiseExact
-    from flipflow.methods.options import SampledHarmonicBalance as SampledHarmonicBalance
     from flipflow.model.disturbance import Impulse as Impulse
     from flipflow.model.disturbance import LoadStep as LoadStep
     from flipflow.model.disturbance import Lump as Lump
@@ -110,6 +91,25 @@ if TYPE_CHECKING:
     from flipflow.model.vary import Choice as Choice
     from flipflow.model.vary import Normal as Normal
     from flipflow.paper.reproduce import reproduce as reproduce
+    from flipflow.periodic.options import HarmonicBalance as HarmonicBalance
+    from flipflow.periodic.options import PiecewiseExact as PiecewiseExact
+    from flipflow.periodic.options import SampledHarmonicBalance as SampledHarmonicBalance
+    from flipflow.plotting.dispatch import figure as figure
+    from flipflow.studies.assessment import assess as assess
+    from flipflow.studies.basins import basins as basins
+    from flipflow.studies.jump_risk import jump_risk as jump_risk
+    from flipflow.studies.loading import loading as loading
+    from flipflow.studies.operating_region import operating_region as operating_region
+    from flipflow.studies.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.studies.poincare import poincare_section as poincare_section
+    from flipflow.studies.poincare import spectrum as spectrum
+    from flipflow.studies.ramp import ramp as ramp
+    from flipflow.studies.response_family import response_family as response_family
+    from flipflow.studies.sensitivity import sensitivity as sensitivity
+    from flipflow.transient.simulate import simulate as simulate
+    from flipflow.transient.startup import coast_down as coast_down
+    from flipflow.transient.startup import start_up as start_up
+    from flipflow.transient.sweep import sweep as sweep
 
 
 def __getattr__(name: str) -> object:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess
 from flipflow.io.assessment import assessment_document
 from flipflow.report.blocks import FigureBlock, Heading, Text
 from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import assess
 
 
 @pytest.fixture(scope="module")

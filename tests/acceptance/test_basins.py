@@ -7,7 +7,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import Cancelled, InputError
-from flipflow.methods.exact import ExactSolver
+from flipflow.periodic.exact_solver import ExactSolver
 from settling import settled_on
 
 OMEGA = 203.0

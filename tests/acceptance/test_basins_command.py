@@ -79,7 +79,7 @@ def test_basins_are_kept_where_there_is_no_jump_risk(command, monkeypatch, tmp_p
         raise IncompleteError("It stands on the edge of a jump.")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("flipflow.analyses.jump_risk.jump_risk", on_the_edge)
+    monkeypatch.setattr("flipflow.studies.jump_risk.jump_risk", on_the_edge)
     code, out, _ = command("basins", "ffs0827-linear", "--cells", "2")
     assert code == 0
     assert "Note: No jump risk: It stands on the edge of a jump." in out
@@ -114,7 +114,7 @@ def test_interrupted_command_writes_what_it_has(command, monkeypatch, tmp_path):
 
         return run_cells(*given, monitor=told, **options)
 
-    monkeypatch.setattr("flipflow.analyses.basins.basins", interrupted)
+    monkeypatch.setattr("flipflow.studies.basins.basins", interrupted)
     code, _, err = command("basins", "ffs0827", "--speed", "203 rad/s", "-o", "out")
     assert code == 130
     assert "Stopped by the user" in err

@@ -11,8 +11,8 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import InputError
-from flipflow.methods.exact import ExactSolver
-from flipflow.results.orbit import Orbit
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.orbit import Orbit
 from judge import close, kinds, minmax
 from reference import integrate
 

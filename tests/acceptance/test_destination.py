@@ -154,7 +154,7 @@ def test_ctrl_c_while_files_are_written_says_what_is_there(command, monkeypatch)
     def pressed(_figure, _path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flipflow.figures.parts.Figure.write", pressed)
+    monkeypatch.setattr("flipflow.plotting.parts.Figure.write", pressed)
     code, _, err = command("sensitivity", *QUICK["sensitivity"], "-o", "out")
     assert code == 130
     assert err == "Stopped by the user; what was finished is in out.\n"
@@ -175,7 +175,7 @@ def test_ctrl_c_in_a_sweep_keeps_the_speeds_that_settled(command, monkeypatch, t
 
         return run(*given, monitor=told, **options)
 
-    monkeypatch.setattr("flipflow.analyses.sweep.sweep", interrupted)
+    monkeypatch.setattr("flipflow.transient.sweep.sweep", interrupted)
     words = ("ffs0827", "--speeds", "800 rpm", "900 rpm", "--steps", "10")
     code, out, err = command("sweep", *words, "-o", "out", "--json", "s.json")
     assert code == 130
@@ -203,7 +203,7 @@ def test_what_ends_a_glide_leaves_the_sweeps(command, monkeypatch, tmp_path, end
     def glide(*_words):
         raise ended
 
-    monkeypatch.setattr("flipflow.analyses.ramp.ramp", glide)
+    monkeypatch.setattr("flipflow.studies.ramp.ramp", glide)
     words = ("ffs0827", "--speeds", "800 rpm", "900 rpm", "--steps", "3", "--rate", "30")
     found, out, err = command("sweep", *words, "--json", "s.json")
     assert (found, err) == (code, said)

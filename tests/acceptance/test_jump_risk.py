@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import flipflow as ff
 from flipflow.errors import InputError
-from flipflow.methods.exact import ExactSolver
+from flipflow.periodic.exact_solver import ExactSolver
 from settling import settled_on
 
 OMEGA = 203.0

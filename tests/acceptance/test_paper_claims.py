@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.lost_symmetry import leaning_motions
 from flipflow.cli.main import main
 from flipflow.errors import InputError
 from flipflow.paper.registry import FIGURES
+from flipflow.studies.lost_symmetry import leaning_motions
 from judge import close
 
 IN_PART = {"S1", "S2", "S4", "M1", "M2", "M4", "M6", "V1g", "V9f"}

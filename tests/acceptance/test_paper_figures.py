@@ -14,7 +14,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import InputError
-from flipflow.figures.drawing import Drawing
+from flipflow.plotting.drawing import Drawing
 from judge import close
 from reference import integrate
 

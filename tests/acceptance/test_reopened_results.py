@@ -15,28 +15,28 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.jump_risk import JumpRisk
-from flipflow.analyses.linear import LinearResponse
-from flipflow.analyses.loading import Loading
-from flipflow.analyses.operating_region import OperatingRegion
-from flipflow.analyses.ramp import Ramp
-from flipflow.analyses.response_family import ResponseFamily
+from flipflow.continuation.branch import Branch
+from flipflow.continuation.field_branch import FieldBranch
+from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError, StoreError
-from flipflow.figures.parts import Figure
 from flipflow.io.assessment import assessment_document
-from flipflow.methods.solver import Point, Solver, Traced
 from flipflow.paper.claims import Claim
 from flipflow.paper.reproduce import Reproduction
-from flipflow.results.basins import Basins
-from flipflow.results.branch import Branch
-from flipflow.results.field_branch import FieldBranch
-from flipflow.results.history import History
-from flipflow.results.orbit import Orbit
-from flipflow.results.run_up import Peak, RunUp
-from flipflow.results.section import Section, Spectrum
-from flipflow.results.sensitivity import Sensitivity
-from flipflow.results.sweep import Sweep
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.solver import Point, Solver, Traced
+from flipflow.plotting.parts import Figure
+from flipflow.studies.assessment import Assessment
+from flipflow.studies.basins import Basins
+from flipflow.studies.jump_risk import JumpRisk
+from flipflow.studies.loading import Loading
+from flipflow.studies.operating_region import OperatingRegion
+from flipflow.studies.poincare import Section, Spectrum
+from flipflow.studies.ramp import Ramp
+from flipflow.studies.response_family import ResponseFamily
+from flipflow.studies.sensitivity import Sensitivity
+from flipflow.transient.history import History
+from flipflow.transient.startup import Peak, RunUp
+from flipflow.transient.sweep import Sweep
 
 NOT_RESULTS = {ff.FlipFlowScreen, ff.Project, Figure}
 DRIVE = ff.Drive(inertia=0.9, motor=ff.Motor(synchronous_speed=157.0, rated_power=5500.0))

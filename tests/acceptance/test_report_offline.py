@@ -15,10 +15,10 @@ import subprocess
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess
 from flipflow.report.blocks import FigureBlock
 from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import assess
 
 CHROMIUM = shutil.which("chromium")
 pytestmark = [

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.methods.exact import ExactSolver
+from flipflow.continuation.branch import Branch
 from flipflow.model.system import MechanicalSystem
-from flipflow.results.branch import Branch
-from flipflow.results.orbit import Orbit
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.orbit import Orbit
 from judge import close
 
 LOWER, UPPER = 1.25, 2.6

@@ -12,13 +12,13 @@ from rich.console import Console
 from scipy import stats
 
 import flipflow as ff
-from flipflow.analyses.feasible import working_motion
-from flipflow.analyses.linear_motions import LINEAR
-from flipflow.analyses.quantities import QUANTITIES
-from flipflow.analyses.sensitivity import one_at_a_time
 from flipflow.errors import Cancelled, InputError, StoreError
-from flipflow.figures.sensitivity import tornado_figure
+from flipflow.plotting.sensitivity import tornado_figure
 from flipflow.report import summary
+from flipflow.studies.feasible import working_motion
+from flipflow.studies.linear_motions import LINEAR
+from flipflow.studies.quantities import QUANTITIES
+from flipflow.studies.sensitivity import one_at_a_time
 
 SEVEN = (
     "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",

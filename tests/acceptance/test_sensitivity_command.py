@@ -85,7 +85,7 @@ def test_command_is_cancelled_without_a_traceback(command, monkeypatch):
     def interrupted(*_args, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flipflow.analyses.sensitivity.sensitivity", interrupted)
+    monkeypatch.setattr("flipflow.studies.sensitivity.sensitivity", interrupted)
     code, _, err = command("sensitivity", "ffs0827", "--vary", "clearance=+-5%")
     assert code == 130
     assert "Traceback" not in err

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.smooth_law import compare_laws
+from flipflow.continuation.branch import Branch
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.smooth import smooth_force
-from flipflow.results.branch import Branch
+from flipflow.studies.smooth_law import compare_laws
 from judge import close, kinds, relative_amplitude
 
 WHAT_BELONGS = ["contact begin", "fold", "fold", "contact end"]

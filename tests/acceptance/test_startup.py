@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.normal import normal_motion
 from flipflow.cli.main import main
+from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.drive import assumed_drive
 
@@ -326,7 +326,7 @@ def test_interrupt_ends_with_130(monkeypatch, capsys):
     def interrupted(*_words, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flipflow.analyses.startup.run_history", interrupted)
+    monkeypatch.setattr("flipflow.transient.startup.run_history", interrupted)
     code, _, err = run(monkeypatch, capsys, "ffs0827", "--motor-power", "1.5 kW")
     assert (code, err) == (130, "Stopped by the user; nothing is written.\n")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.methods.exact import ExactSolver
+from flipflow.periodic.exact_solver import ExactSolver
 from reference import integrate
 
 SPEEDS = np.round(np.arange(0.5, 0.8001, 0.01), 3)

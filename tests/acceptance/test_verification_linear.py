@@ -14,7 +14,7 @@ import scipy.linalg
 from scipy.optimize import brentq
 
 import flipflow as ff
-from flipflow.results.branch import Branch
+from flipflow.continuation.branch import Branch
 from judge import GAP, close, relative_amplitude
 
 FREE = {40.0: 1.001225259e-3, 60.0: 2.281714696e-3, 80.0: 5.681819427e-3}
@@ -37,7 +37,7 @@ def receptance_amplitude(screen: ff.FlipFlowScreen, omega: float, stop: float = 
 @pytest.mark.parametrize("omega", FREE)
 def test_row_1_linear_amplitude_by_linear_analysis(screen, omega: float) -> None:
     """Row 1: closed form; 1e-9 of the value, for ten digits are given."""
-    from flipflow.analyses.linear import linear_response  # noqa: PLC0415
+    from flipflow.dynamics.linear_response import linear_response  # noqa: PLC0415
 
     linear = linear_response(ff.load("ffs0827-linear"), np.array([omega]))
     close("linear analysis", linear.amplitude("relative"), [FREE[omega]], rel=1e-9)
@@ -80,7 +80,7 @@ def test_row_3_natural_frequencies(screen, stop: float, expected: tuple[float, f
     The table gives eight or nine digits: 1e-8 between the two routes, half of the last printed
     digit against the table.
     """
-    from flipflow.analyses.linear import linear_response  # noqa: PLC0415
+    from flipflow.dynamics.linear_response import linear_response  # noqa: PLC0415
 
     k = screen.shear_stiffness + stop * screen.stop_stiffness
     k1 = screen.isolation_stiffness

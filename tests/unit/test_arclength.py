@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import flipflow as ff
-from flipflow.kernels import arclength
-from flipflow.methods.scratch import new_branch, new_corrector
-from flipflow.methods.solver import eigenvalues_of
-from flipflow.methods.stability import determinant_minus, determinant_plus
+from flipflow.continuation import arclength
+from flipflow.periodic.scratch import new_branch, new_corrector
+from flipflow.periodic.solver import eigenvalues_of
+from flipflow.periodic.stability import determinant_minus, determinant_plus
 from kernel_calls import predicted
 
 ANYWHERE = arclength.Course(1.0, 100.0, 1.0, 1.0, 1.0, arclength.QUICK)

@@ -9,14 +9,14 @@ from importlib import resources
 import pytest
 from rich.console import Console
 
-from flipflow.analyses.periodic_orbits import MOST_PERIODS
-from flipflow.analyses.sensitivity import N_MOST
-from flipflow.analyses.simulate import MOST_SAMPLES, SAMPLES_A_TURN
-from flipflow.analyses.startup import MOST_SECONDS
 from flipflow.cli import main, simulate, startup
 from flipflow.errors import IncompleteError
-from flipflow.methods.options import HarmonicBalance
+from flipflow.periodic.options import HarmonicBalance
 from flipflow.report.terminal import say
+from flipflow.studies.periodic_orbits import MOST_PERIODS
+from flipflow.studies.sensitivity import N_MOST
+from flipflow.transient.simulate import MOST_SAMPLES, SAMPLES_A_TURN
+from flipflow.transient.startup import MOST_SECONDS
 
 COMMANDS = [one.__name__ for one in main.COMMANDS]
 
@@ -99,7 +99,7 @@ def test_every_error_is_a_whole_sentence(command, monkeypatch):
     def lost(*_words, **_options):
         raise IncompleteError("no point found between two")
 
-    monkeypatch.setattr("flipflow.analyses.simulate.simulate", lost)
+    monkeypatch.setattr("flipflow.transient.simulate.simulate", lost)
     code, _, err = command("simulate", "ffs0827")
     assert (code, err) == (3, "Error: no point found between two.\n")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.feasible import STABILITY, case_window
-from flipflow.results.branch import Branch
+from flipflow.continuation.branch import Branch
+from flipflow.studies.feasible import STABILITY, case_window
 
 SPAN = (40.0, 75.0)
 

@@ -16,19 +16,19 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Sheet
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess
 from flipflow.errors import InputError, MissingExtra, StoreError
-from flipflow.figures.bars import energy_figure, region_figure
-from flipflow.figures.curves import Curve
-from flipflow.figures.layout import WIDTH, arrange, place_labels
-from flipflow.figures.motion import contact_bands, motions_figure, orbits_figure, portrait_figure
-from flipflow.figures.parts import Axis, Figure, Line, Panel
-from flipflow.figures.plotly import described
-from flipflow.figures.print import _draw
-from flipflow.figures.response import cases_figure
-from flipflow.figures.scales import MM, RPM
-from flipflow.figures.schematic import schematic
-from flipflow.figures.transient import run_ups_figure
+from flipflow.plotting.bars import energy_figure, region_figure
+from flipflow.plotting.curves import Curve
+from flipflow.plotting.layout import WIDTH, arrange, place_labels
+from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figure, portrait_figure
+from flipflow.plotting.parts import Axis, Figure, Line, Panel
+from flipflow.plotting.plotly import described
+from flipflow.plotting.print import _draw
+from flipflow.plotting.response import cases_figure
+from flipflow.plotting.scales import MM, RPM
+from flipflow.plotting.schematic import schematic
+from flipflow.plotting.transient import run_ups_figure
+from flipflow.studies.assessment import assess
 
 
 @pytest.fixture(scope="module")
@@ -388,7 +388,7 @@ def test_schematic_is_a_drawing_with_the_stops_there_are(screen, changes, stops)
 
 def test_figures_load_no_renderer():
     code = (
-        "import sys, flipflow.figures.dispatch; "
+        "import sys, flipflow.plotting.dispatch; "
         "print([m for m in ('plotly', 'matplotlib') if m in sys.modules])"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

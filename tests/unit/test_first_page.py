@@ -10,10 +10,10 @@ import pytest
 from rich.console import Console
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess
 from flipflow.report import first_page, summary
 from flipflow.report.blocks import Heading, Note, Table
 from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import assess
 
 RPM = 30.0 / math.pi
 

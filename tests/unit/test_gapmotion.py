@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flipflow.kernels.gapmotion import Contact, GapMotion
-from flipflow.methods.scratch import new_gap_motion
+from flipflow.dynamics.contact_search import Contact, GapMotion
+from flipflow.periodic.scratch import new_gap_motion
 from judge import close
 from kernel_calls import change_after, range_of
 

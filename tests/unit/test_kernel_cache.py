@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from flipflow.kernels import compile as kernel_compile
+from flipflow.compiled import compile as kernel_compile
 
 INNER = "from tiny.compile import kernel\n\n@kernel\ndef factor(x):\n    return x * {factor}\n"
 OUTER = (

@@ -12,7 +12,7 @@ import pytest
 import flipflow
 
 ROOT = Path(__file__).parents[2]
-MOST_LINES = 400
+MOST_LINES = 600
 VAGUE = {"utils", "util", "helpers", "helper", "common", "manager"}
 HEAVY = ("numba", "scipy", "xarray", "plotly", "matplotlib", "pint", "pydantic")
 

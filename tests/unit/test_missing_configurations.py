@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.methods.balance import BalanceSolver
+from flipflow.periodic.balance_solver import BalanceSolver
 
 OMEGA = 0.9
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.response_family import ResponseFamily, response_family
+from flipflow.continuation.branch_status import BranchStatus
 from flipflow.errors import InputError
-from flipflow.figures.plotly import described
 from flipflow.paper.claims import Number, Part, Verdict, agrees, decide, runs
 from flipflow.paper.page import blocks
 from flipflow.paper.registry import FIGURES, chosen
@@ -25,8 +24,9 @@ from flipflow.paper.trends import (
     Unchanged,
     ZoneTrend,
 )
+from flipflow.plotting.plotly import described
 from flipflow.report.blocks import FigureBlock, Table
-from flipflow.results.status import BranchStatus
+from flipflow.studies.response_family import ResponseFamily, response_family
 
 LABELS = ("4 mm", "6 mm", "8 mm")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flipflow.kernels import status
-from flipflow.methods.field_path import FieldEquations, FoldEquations
-from flipflow.methods.predictor_corrector import Equations, follow, follow_both_ways
+from flipflow.compiled import status
+from flipflow.continuation.field_path import FieldEquations, FoldEquations
+from flipflow.continuation.predictor_corrector import Equations, follow, follow_both_ways
 from judge import close
 
 

@@ -13,10 +13,8 @@ import pytest
 from rich.console import Console
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess
-from flipflow.analyses.quantities import QUANTITIES
 from flipflow.errors import MissingExtra, StoreError
-from flipflow.figures.plotly import library
+from flipflow.plotting.plotly import library
 from flipflow.report import first_page, summary, write_html
 from flipflow.report.blocks import Heading, Note, Table, Text, TitleBlock, Values, Verdict
 from flipflow.report.html import html
@@ -32,6 +30,8 @@ from flipflow.report.numbers import (
     speed,
 )
 from flipflow.report.registry import Part, blocks_of, section
+from flipflow.studies.assessment import assess
+from flipflow.studies.quantities import QUANTITIES
 
 LARGEST = 6e6
 

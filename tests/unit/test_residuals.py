@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.methods.plan import PlanBuilder
-from flipflow.methods.scratch import new_balance, new_sampled, new_shooting
+from flipflow.dynamics.assembly import PlanBuilder
+from flipflow.periodic.scratch import new_balance, new_sampled, new_shooting
 from judge import close
 from kernel_calls import balance, central_differences, jump, residual_of, sampled, shoot
 from reference import integrate

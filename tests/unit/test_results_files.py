@@ -11,11 +11,11 @@ import pytest
 import xarray
 
 import flipflow as ff
-from flipflow.analyses.frequency_response import described
+from flipflow.compiled import status
+from flipflow.continuation.frequency_response import described
 from flipflow.errors import IncompleteError, InputError, StoreError
 from flipflow.io.response import write_response
-from flipflow.kernels import status
-from flipflow.methods.solver import Traced
+from flipflow.periodic.solver import Traced
 
 
 @pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(3)], ids=repr)

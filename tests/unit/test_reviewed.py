@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.analyses.assessment import assess_case, energy_balance, input_hash, verdict
-from flipflow.analyses.quantities import Working
 from flipflow.errors import IncompleteError, InputError
 from flipflow.io.derived import derive
+from flipflow.studies.assessment import assess_case, energy_balance, input_hash, verdict
+from flipflow.studies.quantities import Working
 
 
 @pytest.fixture(scope="module")

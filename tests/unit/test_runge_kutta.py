@@ -13,12 +13,12 @@ from scipy.integrate import solve_ivp
 
 import flipflow as ff
 from flipflow.errors import InputError
-from flipflow.kernels.tableaux import DORMAND_PRINCE, RK4
-from flipflow.methods.exact import ExactSolver
-from flipflow.methods.time_stepping import NormalDirection, RungeKutta, Stepper
 from flipflow.model.drive import Drive, Motor, SpeedProfile
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.system import MechanicalSystem
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.transient.tableaux import DORMAND_PRINCE, RK4
+from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper
 
 OMEGA = 120.0
 TURN = 2.0 * np.pi / OMEGA

@@ -10,7 +10,7 @@ from SALib.analyze import sobol
 from scipy import stats
 
 from flipflow.errors import MissingExtra
-from flipflow.methods.sobol import saltelli_sample, sobol_indices
+from flipflow.studies.sobol import saltelli_sample, sobol_indices
 
 
 def ishigami(u):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.methods.plan import PlanBuilder
-from flipflow.methods.two_event import TwoEventProblem
+from flipflow.dynamics.assembly import PlanBuilder
+from flipflow.periodic.two_event_starts import TwoEventProblem
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
 
 if TYPE_CHECKING:
-    from flipflow.analyses.assessment import Assessment
     from flipflow.cli.destination import Destination
+    from flipflow.studies.assessment import Assessment
 
 
 def analyze(
@@ -35,8 +35,8 @@ def analyze(
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
-        from flipflow.analyses.assessment import assess  # noqa: PLC0415
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
+        from flipflow.studies.assessment import assess  # noqa: PLC0415
 
         assessment = with_progress(lambda monitor: assess(project, monitor, **options))
         _write(assessment, target)
@@ -63,7 +63,7 @@ def _write(assessment: Assessment, target: Destination) -> None:
 
 def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, Any]:
     """Interval and method as the analysis takes them."""
-    from flipflow.methods.options import HarmonicBalance  # noqa: PLC0415  quick --help
+    from flipflow.periodic.options import HarmonicBalance  # noqa: PLC0415  quick --help
 
     options: dict[str, Any] = {}
     if speeds is not None:

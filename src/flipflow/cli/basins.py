@@ -12,9 +12,9 @@ from flipflow.cli.progress import progress, stoppable
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.analyses.jump_risk import JumpRisk
     from flipflow.model.screen import FlipFlowScreen
-    from flipflow.results.basins import Basins
+    from flipflow.studies.basins import Basins
+    from flipflow.studies.jump_risk import JumpRisk
 
 CELLS = 80
 WINDOW = 2.0
@@ -37,7 +37,7 @@ def basins(
     with Destination(output or Path(f"{project.name}-flipflow"), json) as target:
         found, risk, reason = _computed(project.screen, omega, cells)
 
-        from flipflow.figures.dispatch import figure  # noqa: PLC0415  keeps --help quick
+        from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
         document = _document(found, risk)
         target.picture("basins.html", figure(found))
@@ -54,10 +54,10 @@ def _computed(
     screen: FlipFlowScreen, omega: float, cells: int
 ) -> tuple[Basins, JumpRisk | None, str]:
     """Basins, then the jump risk, or why there is none: basins that are found are not lost."""
-    from flipflow.analyses.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.analyses.jump_risk import jump_risk  # noqa: PLC0415
     from flipflow.errors import IncompleteError  # noqa: PLC0415
-    from flipflow.methods.warm import compile_ahead  # noqa: PLC0415
+    from flipflow.studies.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
+    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
+    from flipflow.studies.jump_risk import jump_risk  # noqa: PLC0415
 
     with progress("starting") as monitor:
         compile_ahead(lambda seconds: monitor(f"compiling, once per version: {seconds:.0f} s", 0.0))
@@ -76,11 +76,11 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
     """Relative states up to twice the largest motion's displacement and velocity."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.analyses.periodic_orbits import (  # noqa: PLC0415
+    from flipflow.errors import IncompleteError  # noqa: PLC0415
+    from flipflow.studies.periodic_orbits import (  # noqa: PLC0415
         MOST_PERIODS,
         periodic_orbits,
     )
-    from flipflow.errors import IncompleteError  # noqa: PLC0415
 
     orbits = periodic_orbits(screen, omega) or periodic_orbits(screen, omega, MOST_PERIODS)
     if not orbits:

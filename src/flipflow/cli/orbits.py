@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from flipflow.model.project import Project
-    from flipflow.results.orbit import Orbit
+    from flipflow.periodic.orbit import Orbit
 
 AFTER = "after a small disturbance"
 
@@ -31,9 +31,9 @@ def orbits(
 
     A motion is one that repeats itself after one or more turns of the shaft.
     """
-    from flipflow.analyses.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.studies.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -41,7 +41,7 @@ def orbits(
         with progress("searching; the first run of a version compiles") as tell:
             found = periodic_orbits(project.screen, omega, max_periods, monitor=tell)
         if output is not None:
-            from flipflow.figures.motion import orbit_figure  # noqa: PLC0415  loads plotly
+            from flipflow.plotting.motion import orbit_figure  # noqa: PLC0415  loads plotly
 
             for k, orbit in enumerate(found, 1):
                 target.picture(f"motion-{k}.html", orbit_figure(orbit))

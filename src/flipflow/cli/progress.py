@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TypeVar
 
-from flipflow.analyses.monitor import Monitor
 from flipflow.errors import Cancelled
+from flipflow.model.monitor import Monitor
 
 Result = TypeVar("Result")
 
@@ -35,7 +35,7 @@ def progress(begin: str) -> Iterator[Monitor]:
 
 def with_progress(run: Callable[[Monitor], Result]) -> Result:
     """Run with a bar, the kernels compiled ahead."""
-    from flipflow.methods.warm import compile_ahead  # noqa: PLC0415  keeps --help quick
+    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415  keeps --help quick
 
     with progress("starting") as tell:
         compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from flipflow.analyses.monitor import Monitor
+    from flipflow.model.monitor import Monitor
     from flipflow.model.screen import FlipFlowScreen
     from flipflow.paper.reproduce import ReproducedFigure, Reproduction
 

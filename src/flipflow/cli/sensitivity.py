@@ -23,7 +23,7 @@ from flipflow.cli.progress import progress
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
     from flipflow.model.project import Project
-    from flipflow.results.sensitivity import Sensitivity
+    from flipflow.studies.sensitivity import Sensitivity
 
 POINTS = 100
 
@@ -82,11 +82,11 @@ def _omega(
     """Where the quantity is meant, rad/s, as the analysis takes it."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.analyses.response_quantities import (  # noqa: PLC0415
+    from flipflow.errors import InputError  # noqa: PLC0415
+    from flipflow.studies.response_quantities import (  # noqa: PLC0415
         ResponseQuantity,
         quantity_named,
     )
-    from flipflow.errors import InputError  # noqa: PLC0415
 
     whole = isinstance(quantity_named(quantity), ResponseQuantity)
     if speed is not None and (speeds is not None or whole):
@@ -100,7 +100,7 @@ def _omega(
 
 def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity:
     """Analyse with progress on stderr."""
-    from flipflow.analyses.sensitivity import sensitivity as analysis  # noqa: PLC0415
+    from flipflow.studies.sensitivity import sensitivity as analysis  # noqa: PLC0415
 
     with progress("starting") as tell:
         return analysis(*question, monitor=tell, **options)
@@ -121,8 +121,8 @@ def _write(result: Sensitivity, target: Destination) -> None:
 
 
 def _write_folder(result: Sensitivity, target: Destination) -> None:
-    from flipflow.figures.sensitivity import sensitivity_figure, tornado_figure  # noqa: PLC0415
     from flipflow.io.results import save  # noqa: PLC0415
+    from flipflow.plotting.sensitivity import sensitivity_figure, tornado_figure  # noqa: PLC0415
 
     save(result, target.path("results.json"))
     target.wrote("results.json")

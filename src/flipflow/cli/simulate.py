@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from flipflow.model.disturbance import Impulse
     from flipflow.model.project import Project
-    from flipflow.results.history import History
+    from flipflow.transient.history import History
 
 IMPULSE = "--impulse"
 MOST_TURNS = 100_000  # 128 points a turn are kept
@@ -42,9 +42,9 @@ def simulate(
 
     Shows the motion, the stop force, the energies, and whether the machine has settled.
     """
-    from flipflow.analyses.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
@@ -53,7 +53,7 @@ def simulate(
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
         if output is not None:
-            from flipflow.figures.history import history_figure  # noqa: PLC0415  loads plotly
+            from flipflow.plotting.history import history_figure  # noqa: PLC0415  loads plotly
 
             target.picture("motion.html", history_figure(history))
         if json is not None:

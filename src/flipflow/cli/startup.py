@@ -14,11 +14,11 @@ from flipflow.cli.progress import progress
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.analyses.monitor import Monitor
     from flipflow.cli.destination import Destination
     from flipflow.model.drive import Drive, SpeedProfile
+    from flipflow.model.monitor import Monitor
     from flipflow.model.project import Project
-    from flipflow.results.run_up import RunUp
+    from flipflow.transient.startup import RunUp
 
 POWER = ("motor", "friction", "dampers")
 LONGEST = 3600.0  # s
@@ -145,8 +145,8 @@ def _calculated(
     project: Project, drive: Drive | SpeedProfile | None, seconds: float | None
 ) -> tuple[RunUp, RunUp | None]:
     """Start, and coast down where working speed is reached, with progress on stderr."""
-    from flipflow.analyses.startup import coast_down, start_up  # noqa: PLC0415  keeps --help quick
     from flipflow.model.drive import Drive  # noqa: PLC0415
+    from flipflow.transient.startup import coast_down, start_up  # noqa: PLC0415  keeps --help quick
 
     with progress("start; the first run of a version compiles") as tell:
 
@@ -165,7 +165,7 @@ def _calculated(
 
 
 def _figures(runs: dict[str, RunUp], target: Destination) -> None:
-    from flipflow.figures.transient import run_up_figure  # noqa: PLC0415  keeps --help quick
+    from flipflow.plotting.transient import run_up_figure  # noqa: PLC0415  keeps --help quick
 
     for name, run in runs.items():
         target.picture(f"{name}.html", run_up_figure(run))

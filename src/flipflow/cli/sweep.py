@@ -15,10 +15,10 @@ from flipflow.cli.progress import progress, stoppable
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.analyses.ramp import Ramp
-    from flipflow.figures.parts import Figure
     from flipflow.model.project import Project
-    from flipflow.results.sweep import Sweep
+    from flipflow.plotting.parts import Figure
+    from flipflow.studies.ramp import Ramp
+    from flipflow.transient.sweep import Sweep
 
 LONGEST_GLIDE = 600.0  # s
 
@@ -116,7 +116,7 @@ def _passed(project: Project, ends: tuple[float, float], steps: int, rate: float
 def _swept(project: Project, ends: tuple[float, float], steps: int) -> tuple[Sweep, Sweep | None]:
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.analyses.sweep import sweep as settle  # noqa: PLC0415
+    from flipflow.transient.sweep import sweep as settle  # noqa: PLC0415
 
     omega = np.linspace(*ends, steps)
     with (
@@ -133,7 +133,7 @@ def _swept(project: Project, ends: tuple[float, float], steps: int) -> tuple[Swe
 
 
 def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[Ramp, Ramp]:
-    from flipflow.analyses.ramp import ramp  # noqa: PLC0415  keeps --help quick
+    from flipflow.studies.ramp import ramp  # noqa: PLC0415  keeps --help quick
 
     with progress("gliding; the first run of a version compiles") as tell:
         up = ramp(project.screen, ends, rate, lambda s, share: tell(s, 0.5 * share))
@@ -180,8 +180,8 @@ def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
 
 
 def _figure(project: Project, swept: tuple[Sweep, ...], ends: tuple[float, float]) -> Figure:
-    from flipflow.analyses.frequency_response import frequency_response  # noqa: PLC0415
-    from flipflow.figures.sweep import sweep_figure  # noqa: PLC0415
+    from flipflow.continuation.frequency_response import frequency_response  # noqa: PLC0415
+    from flipflow.plotting.sweep import sweep_figure  # noqa: PLC0415
 
     return sweep_figure(swept, frequency_response(project.screen, ends))
 

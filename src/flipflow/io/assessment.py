@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.transients import Transients
 from flipflow.io.jump_risk import risk_summary
 from flipflow.io.run_up import run_up_summary
 from flipflow.results.codec import plain
-from flipflow.results.sensitivity import OneAtATime
+from flipflow.studies.assessment import Assessment
+from flipflow.studies.sensitivity import OneAtATime
+from flipflow.studies.start_and_blows import Transients
 
 ASSESSMENT = "flipflow/assessment/1"
 

@@ -35,7 +35,7 @@ class Derived:
 
 def derive(screen: FlipFlowScreen) -> Derived:
     """Compute the derived figures of a screen."""
-    from flipflow.analyses.linear import (  # noqa: PLC0415  slow to import
+    from flipflow.dynamics.linear_response import (  # noqa: PLC0415  slow to import
         antiresonance_frequency,
         equal_amplitude_frequency,
         natural_frequencies,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from flipflow.analyses.jump_risk import JumpRisk, Throw
 from flipflow.results.codec import exact
+from flipflow.studies.jump_risk import JumpRisk, Throw
 
 
 def risk_summary(risk: JumpRisk) -> dict[str, Any]:

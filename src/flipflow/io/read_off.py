@@ -10,11 +10,11 @@ from functools import singledispatch
 from typing import Any
 
 from flipflow.io.run_up import run_up_summary
-from flipflow.results.basins import Basins
+from flipflow.periodic.orbit import Orbit
 from flipflow.results.codec import plain
-from flipflow.results.history import History
-from flipflow.results.orbit import Orbit
-from flipflow.results.run_up import RunUp
+from flipflow.studies.basins import Basins
+from flipflow.transient.history import History
+from flipflow.transient.startup import RunUp
 
 
 @singledispatch

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.assessment import Assessment
+from flipflow.continuation.branch import Branch
 from flipflow.io.files import write_file
 from flipflow.model.constants import RPM
-from flipflow.results.branch import Branch
+from flipflow.studies.assessment import Assessment
 
 Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]
 

@@ -10,28 +10,28 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
-from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.jump_risk import JumpRisk
-from flipflow.analyses.linear import LinearResponse
-from flipflow.analyses.loading import Loading
-from flipflow.analyses.operating_region import OperatingRegion
-from flipflow.analyses.ramp import Ramp
-from flipflow.analyses.reopen import CODEC
-from flipflow.analyses.response_family import ResponseFamily
+from flipflow.continuation.branch import Branch
+from flipflow.continuation.field_branch import FieldBranch
+from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError, StoreError
 from flipflow.io.assessment import ASSESSMENT, assessment_document
 from flipflow.io.files import write_file
 from flipflow.io.read_off import read_off
 from flipflow.io.response import branch_csv, branch_netcdf
-from flipflow.results.basins import Basins
-from flipflow.results.branch import Branch
-from flipflow.results.field_branch import FieldBranch
-from flipflow.results.history import History
-from flipflow.results.orbit import Orbit
-from flipflow.results.run_up import RunUp
-from flipflow.results.section import Section, Spectrum
-from flipflow.results.sensitivity import Sensitivity
-from flipflow.results.sweep import Sweep
+from flipflow.periodic.orbit import Orbit
+from flipflow.studies.assessment import Assessment
+from flipflow.studies.basins import Basins
+from flipflow.studies.jump_risk import JumpRisk
+from flipflow.studies.loading import Loading
+from flipflow.studies.operating_region import OperatingRegion
+from flipflow.studies.poincare import Section, Spectrum
+from flipflow.studies.ramp import Ramp
+from flipflow.studies.reopen import CODEC
+from flipflow.studies.response_family import ResponseFamily
+from flipflow.studies.sensitivity import Sensitivity
+from flipflow.transient.history import History
+from flipflow.transient.startup import RunUp
+from flipflow.transient.sweep import Sweep
 
 Document = Mapping[str, Any]
 ORBITS = "flipflow/orbits/1"

@@ -7,7 +7,7 @@ from typing import Any
 
 from flipflow.model.drive import SpeedProfile
 from flipflow.results.codec import plain
-from flipflow.results.run_up import RunUp
+from flipflow.transient.startup import RunUp
 
 
 def run_up_summary(run: RunUp) -> dict[str, Any]:

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from flipflow.analyses.response_family import ResponseFamily, response_family
-from flipflow.figures.family import family_figure
-from flipflow.figures.parts import Figure
 from flipflow.io.units import shown
-from flipflow.methods.options import HarmonicBalance
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.trends import FamilyPair
+from flipflow.periodic.options import HarmonicBalance
+from flipflow.plotting.family import family_figure
+from flipflow.plotting.parts import Figure
 from flipflow.report.blocks import Column, Table, cells
 from flipflow.report.numbers import NOTHING, quantity
+from flipflow.studies.response_family import ResponseFamily, response_family
 
 HARMONICS = 3
 WHOLE = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from flipflow.figures.drawing import Drawing
-from flipflow.figures.parts import Figure
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim
+from flipflow.plotting.drawing import Drawing
+from flipflow.plotting.parts import Figure
 from flipflow.report.blocks import Table
 
 Data = TypeVar("Data")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from flipflow.figures.drawing import Drawing
-from flipflow.figures.schematic import schematic
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.figure import PaperFigure
+from flipflow.plotting.drawing import Drawing
+from flipflow.plotting.schematic import schematic
 from flipflow.report.details import drawn_values
 
 TITLE = "The flip-flow vibrating screen"

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.analyses.linear import LinearResponse, linear_response
-from flipflow.figures.family import speed_axis_in_radians
-from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
-from flipflow.figures.response import LABELS
-from flipflow.figures.scales import MM
+from flipflow.dynamics.linear_response import LinearResponse, linear_response
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
+from flipflow.plotting.family import speed_axis_in_radians
+from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.response import LABELS
+from flipflow.plotting.scales import MM
 
 TITLE = "Amplitude over frequency of the machine without stop"
 HIGHEST = 1.4

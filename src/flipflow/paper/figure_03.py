@@ -10,19 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.linear import linear_response
-from flipflow.analyses.sensitivity import sensitivity
-from flipflow.figures.family import speed_axis_in_radians
-from flipflow.figures.palette import CASES, case_colour, case_symbol
-from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
-from flipflow.figures.sensitivity import INDEX_AXIS, index_order
+from flipflow.dynamics.linear_response import linear_response
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, bands, decide
 from flipflow.paper.figure import PaperFigure
+from flipflow.plotting.family import speed_axis_in_radians
+from flipflow.plotting.palette import CASES, case_colour, case_symbol
+from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.sensitivity import INDEX_AXIS, index_order
 from flipflow.report.blocks import Column, Table, cells
 from flipflow.report.numbers import number
-from flipflow.results.sensitivity import Sensitivity
+from flipflow.studies.sensitivity import Sensitivity, sensitivity
 
 TITLE = "Sobol indices of the relative amplitude of the machine without stop"
 PARAMETERS = (

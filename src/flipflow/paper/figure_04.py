@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.analyses.linear import LinearResponse, linear_response
-from flipflow.figures.palette import case_colour, case_symbol
-from flipflow.figures.parts import Axis, Figure, Panel, Trace
-from flipflow.figures.response import LABELS
-from flipflow.figures.scales import MM
+from flipflow.dynamics.linear_response import LinearResponse, linear_response
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
+from flipflow.plotting.palette import case_colour, case_symbol
+from flipflow.plotting.parts import Axis, Figure, Panel, Trace
+from flipflow.plotting.response import LABELS
+from flipflow.plotting.scales import MM
 
 TITLE = "Phase portraits of both frames, empty and loaded, without stop"
 OMEGA = 79.5

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from flipflow.figures.drawing import Drawing
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.figure_01 import ALONG, draw_machine
+from flipflow.plotting.drawing import Drawing
 
 TITLE = "The screen with piecewise linear springs"
 CAPTION = f"{ALONG} A stop (k3, c3) is touched on either side when |x2| exceeds the gap e."

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.analyses.linear import linear_response
-from flipflow.analyses.smooth_law import LawComparison, compare_laws
+from flipflow.dynamics.linear_response import linear_response
 from flipflow.errors import IncompleteError
-from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
-from flipflow.figures.scales import KN, MM
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.smooth import SHARPNESS
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide
 from flipflow.paper.figure import PaperFigure
+from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.scales import KN, MM
+from flipflow.studies.smooth_law import LawComparison, compare_laws
 
 TITLE = "The stop's law and the hyperbolic tangent that stands in for it"
 REACH = 1.5

@@ -9,23 +9,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import frequency_response
-from flipflow.analyses.linear import linear_response
-from flipflow.analyses.operating_region import Landmarks, analysed_range, landmarks
-from flipflow.analyses.sweep import sweep
-from flipflow.figures.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
-from flipflow.figures.parts import Axis, Band, Figure, Line, Panel, Trace
-from flipflow.figures.response import LABELS
-from flipflow.figures.scales import MM
-from flipflow.methods.options import HarmonicBalance
+from flipflow.continuation.branch import Branch
+from flipflow.continuation.frequency_response import frequency_response
+from flipflow.dynamics.linear_response import linear_response
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import AGREEMENT, Claim, Evaluation, Number, Part, decide, undecided
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.runge_kutta import SteppedSweep, stepped_sweep
 from flipflow.paper.thrown import Thrown, thrown, thrown_panel, thrown_to_the_lower
-from flipflow.results.branch import Branch
-from flipflow.results.orbit import Orbit
-from flipflow.results.sweep import Jump, Sweep
+from flipflow.periodic.options import HarmonicBalance
+from flipflow.periodic.orbit import Orbit
+from flipflow.plotting.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
+from flipflow.plotting.parts import Axis, Band, Figure, Line, Panel, Trace
+from flipflow.plotting.response import LABELS
+from flipflow.plotting.scales import MM
+from flipflow.studies.operating_region import Landmarks, analysed_range, landmarks
+from flipflow.transient.sweep import Jump, Sweep, sweep
 
 Real = NDArray[np.float64]
 TITLE = "Amplitude over frequency of the machine with stop"

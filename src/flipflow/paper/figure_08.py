@@ -7,7 +7,17 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from flipflow.analyses.loading import (
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide, runs, undecided
+from flipflow.paper.figure import PaperFigure
+from flipflow.paper.trends import SECOND, SECOND_PEAK, UP, Trend
+from flipflow.periodic.options import HarmonicBalance
+from flipflow.plotting.loading import loading_figure
+from flipflow.plotting.parts import Figure
+from flipflow.plotting.scales import MM
+from flipflow.report.blocks import Cell, Column, Table, cells
+from flipflow.report.numbers import number
+from flipflow.studies.loading import (
     Change,
     LoadedMachine,
     Loading,
@@ -15,17 +25,7 @@ from flipflow.analyses.loading import (
     loading,
     relative_from_below,
 )
-from flipflow.analyses.response_family import ResponseFamily, response_family
-from flipflow.figures.loading import loading_figure
-from flipflow.figures.parts import Figure
-from flipflow.figures.scales import MM
-from flipflow.methods.options import HarmonicBalance
-from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide, runs, undecided
-from flipflow.paper.figure import PaperFigure
-from flipflow.paper.trends import SECOND, SECOND_PEAK, UP, Trend
-from flipflow.report.blocks import Cell, Column, Table, cells
-from flipflow.report.numbers import number
+from flipflow.studies.response_family import ResponseFamily, response_family
 
 TITLE = "Relative amplitude under load, with stop and without"
 LOAD = Load(stiffness_factor=1.3, name="k2 x 1.3")

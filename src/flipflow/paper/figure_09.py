@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from flipflow.figures.drawing import Drawing
 from flipflow.io.check import check_project
 from flipflow.io.source import bundled_text
 from flipflow.model.project import Project
@@ -14,6 +13,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.figure_01 import draw_machine
 from flipflow.paper.rig import RIG, rig
+from flipflow.plotting.drawing import Drawing
 from flipflow.report.blocks import Column, Table, cells
 
 TITLE = "The test rig"

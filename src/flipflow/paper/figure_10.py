@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.analyses.frequency_response import frequency_response
-from flipflow.analyses.sweep import sweep
+from flipflow.continuation.branch import Branch
+from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError
-from flipflow.figures.family import branch_traces, speed_axis_in_radians
-from flipflow.figures.parts import Axis, Figure, Line, Note, Panel, Trace
-from flipflow.figures.scales import MM
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
@@ -26,8 +23,10 @@ from flipflow.paper.rig import (
     STEP,
     rig,
 )
-from flipflow.results.branch import Branch
-from flipflow.results.sweep import Sweep
+from flipflow.plotting.family import branch_traces, speed_axis_in_radians
+from flipflow.plotting.parts import Axis, Figure, Line, Note, Panel, Trace
+from flipflow.plotting.scales import MM
+from flipflow.transient.sweep import Sweep, sweep
 
 TITLE = "Relative amplitude of the test rig over frequency"
 LOW, HIGH = 20.0, 160.0

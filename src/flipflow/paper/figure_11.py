@@ -8,19 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.frequency_response import frequency_response
-from flipflow.analyses.simulate import simulate
+from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError
-from flipflow.figures.history import envelope
-from flipflow.figures.parts import Axis, Figure, Line, Panel, Trace
-from flipflow.figures.scales import MM
 from flipflow.model.disturbance import Impulse
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.figure_10 import HIGH, LOW
 from flipflow.paper.rig import AT_A, POINT_A, POINT_B, rig
-from flipflow.results.history import History
+from flipflow.plotting.history import envelope
+from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.scales import MM
+from flipflow.transient.history import History
+from flipflow.transient.simulate import simulate
 
 TITLE = 'Relative displacement of the test rig at point "a", disturbed after 12 s'
 # kg m/s on the outer mass while the unbalance points along +x; the paper does not say its own.

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.analyses.lost_symmetry import leaning_motions
-from flipflow.analyses.response_family import Member
-from flipflow.figures.family import leaning_panel
-from flipflow.figures.parts import Figure
-from flipflow.figures.scales import MM
-from flipflow.methods.special import SYMMETRY
+from flipflow.continuation.special_points import SYMMETRY
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide
 from flipflow.paper.families import FamilyPlan, draw_family, family_tables
@@ -30,8 +25,13 @@ from flipflow.paper.trends import (
     ZoneTrend,
     trend_claim,
 )
+from flipflow.periodic.orbit import Orbit
+from flipflow.plotting.family import leaning_panel
+from flipflow.plotting.parts import Figure
+from flipflow.plotting.scales import MM
 from flipflow.report.blocks import Column, Table, cells
-from flipflow.results.orbit import Orbit
+from flipflow.studies.lost_symmetry import leaning_motions
+from flipflow.studies.response_family import Member
 
 TITLE = "Effect of the clearance of the stop spring"
 WHERE = "Fig. 12"

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from flipflow import __version__
-from flipflow.analyses.monitor import Monitor, silent
-from flipflow.figures.drawing import Drawing
+from flipflow.model.monitor import Monitor, silent
 from flipflow.paper.claims import DecidedClaim, Number, Verdict
 from flipflow.paper.reproduce import PAPER, ReproducedFigure, Reproduction
+from flipflow.plotting.drawing import Drawing
 from flipflow.report.blocks import (
     Block,
     Cell,

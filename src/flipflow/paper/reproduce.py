@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from flipflow import __version__
-from flipflow.analyses.monitor import Monitor, silent
-from flipflow.analyses.reopen import CODEC
 from flipflow.errors import IncompleteError, InputError, MissingExtra, StoreError
-from flipflow.figures.drawing import Drawing
-from flipflow.figures.parts import Figure
 from flipflow.io.project import load
 from flipflow.io.results import SUMMARY, document_of
+from flipflow.model.monitor import Monitor, silent
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.registry import FIGURES, chosen
+from flipflow.plotting.drawing import Drawing
+from flipflow.plotting.parts import Figure
 from flipflow.report.blocks import Table
 from flipflow.results.codec import Codec, Form
-from flipflow.results.document import machine_document
+from flipflow.studies.documents import machine_document
+from flipflow.studies.reopen import CODEC
 
 SCHEMA = "flipflow/claims/1"
 PAPER = "Lin, Wang, Xu, Zuo, Liang, Minerals 2024, 14, 406"

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.transient import Start, run_history
-from flipflow.methods.time_stepping import RungeKutta
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.system import Coordinate, MechanicalSystem
-from flipflow.results.history import History
+from flipflow.transient.history import History
+from flipflow.transient.speed_run import Start, run_history
+from flipflow.transient.time_stepping import RungeKutta
 
 Real = NDArray[np.float64]
 METHOD = RungeKutta("rk4")

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.analyses.basins import basins
-from flipflow.analyses.jump_risk import JumpRisk, Throw, jump_risk
-from flipflow.analyses.simulate import simulate
-from flipflow.figures.history import envelope
-from flipflow.figures.parts import Axis, Line, Panel, Trace
-from flipflow.figures.scales import DEGREES, MM
+from flipflow.continuation.branch import Branch
 from flipflow.model.disturbance import Impulse
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Evaluation, Number, Part, decide
-from flipflow.results.basins import Basins
-from flipflow.results.branch import Branch
-from flipflow.results.history import History
+from flipflow.plotting.history import envelope
+from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.scales import DEGREES, MM
+from flipflow.studies.basins import Basins, basins
+from flipflow.studies.jump_risk import JumpRisk, Throw, jump_risk
+from flipflow.transient.history import History
+from flipflow.transient.simulate import simulate
 
 CELLS = 60
 TURNS, BLOW_AFTER = 240, 60

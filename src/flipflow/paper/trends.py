@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.analyses.response_family import Member, ResponseFamily
-from flipflow.figures.scales import MM
+from flipflow.continuation.branch import SpecialPoint
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, Verdict, bands, decide, runs
-from flipflow.results.branch import SpecialPoint
+from flipflow.plotting.scales import MM
+from flipflow.studies.response_family import Member, ResponseFamily
 
 Real = NDArray[np.float64]
 NOTHING_NEW = 1e-9

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from flipflow.analyses.assessment import Assessment, CaseAssessment
-from flipflow.figures.curves import Curve
-from flipflow.figures.palette import STABILITY_WORDS
+from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.io.units import in_unit
+from flipflow.plotting.curves import Curve
+from flipflow.plotting.palette import STABILITY_WORDS
 from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Values, cells
 from flipflow.report.numbers import four_digits, multiplier, number, quantity, rpm
 from flipflow.report.registry import Part, section
-from flipflow.results.branch import Branch, SpecialPoint
+from flipflow.studies.assessment import Assessment, CaseAssessment
 
 METHOD = (
     "motion in closed form between contacts, contact times found by a search that cannot miss "

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flipflow.figures.drawing import Drawing
-from flipflow.figures.parts import Figure
+from flipflow.plotting.drawing import Drawing
+from flipflow.plotting.parts import Figure
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from flipflow.analyses.assessment import Assessment, CaseAssessment
-from flipflow.analyses.quantities import QUANTITIES
-from flipflow.figures.bars import energy_figure, region_figure
-from flipflow.figures.drawing import Drawing
-from flipflow.figures.motion import orbits_figure, portrait_figure
-from flipflow.figures.response import branch_figure
-from flipflow.figures.schematic import schematic
 from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.plotting.bars import energy_figure, region_figure
+from flipflow.plotting.drawing import Drawing
+from flipflow.plotting.motion import orbits_figure, portrait_figure
+from flipflow.plotting.response import branch_figure
+from flipflow.plotting.schematic import schematic
 from flipflow.report.blocks import (
     Block,
     Cell,
@@ -30,6 +28,8 @@ from flipflow.report.blocks import (
 from flipflow.report.first_page import overleaf
 from flipflow.report.numbers import four_digits, named, rpm
 from flipflow.report.registry import Part, section
+from flipflow.studies.assessment import Assessment, CaseAssessment
+from flipflow.studies.quantities import QUANTITIES
 
 SCHEMATIC = (
     "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "

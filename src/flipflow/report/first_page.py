@@ -6,14 +6,9 @@ import itertools
 import math
 from collections.abc import Iterator
 
-from flipflow.analyses.assessment import Assessment, CaseAssessment
-from flipflow.analyses.feasible import REGION, STABILITY, Bound, missing_words
-from flipflow.analyses.limit_row import ATTENTION, FAIL, NOT_CHECKED, PASS, LimitRow
-from flipflow.analyses.operating_region import OperatingRegion
-from flipflow.analyses.quantities import QUANTITIES
-from flipflow.figures.layout import legend_lines
-from flipflow.figures.motion import motions_figure
-from flipflow.figures.response import LEGEND_WITHIN, cases_figure
+from flipflow.plotting.layout import legend_lines
+from flipflow.plotting.motion import motions_figure
+from flipflow.plotting.response import LEGEND_WITHIN, cases_figure
 from flipflow.report.blocks import (
     Block,
     Cell,
@@ -29,6 +24,11 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, rpm, span, speed
 from flipflow.report.registry import Part, section
+from flipflow.studies.assessment import Assessment, CaseAssessment
+from flipflow.studies.feasible import REGION, STABILITY, Bound, missing_words
+from flipflow.studies.limit_row import ATTENTION, FAIL, NOT_CHECKED, PASS, LimitRow
+from flipflow.studies.operating_region import OperatingRegion
+from flipflow.studies.quantities import QUANTITIES
 
 NO_NORMAL = (
     "Orbits are not drawn: isolation.normal_stiffness or isolation.normal_damping is missing in "

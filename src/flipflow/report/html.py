@@ -8,11 +8,11 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flipflow.analyses.assessment import Assessment
 from flipflow.errors import MissingExtra, StoreError
-from flipflow.figures.plotly import START, element, library
+from flipflow.plotting.plotly import START, element, library
 from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import Assessment
 
 if TYPE_CHECKING:
     import jinja2

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from flipflow.analyses.jump_risk import JumpRisk
+from flipflow.periodic.orbit import Orbit
 from flipflow.report.numbers import number, quantity
-from flipflow.results.orbit import Orbit
+from flipflow.studies.jump_risk import JumpRisk
 
 
 def risk_words(risk: JumpRisk) -> list[str]:

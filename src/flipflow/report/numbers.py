@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flipflow.analyses.quantities import QUANTITIES
 from flipflow.io.units import in_unit
+from flipflow.studies.quantities import QUANTITIES
 
 NOTHING = "-"
 LEAST_KILO = 100.0  # N or W; what is less is shown without kilo

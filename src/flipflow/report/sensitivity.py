@@ -6,10 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.response_quantities import REGISTRY
-from flipflow.figures.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
 from flipflow.model.fields import FIELD
+from flipflow.plotting.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
 from flipflow.report.blocks import (
     Block,
     Column,
@@ -23,7 +21,9 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.numbers import NOTHING, number, quantity, rpm
 from flipflow.report.registry import Part, section
-from flipflow.results.sensitivity import Sensitivity
+from flipflow.studies.assessment import Assessment
+from flipflow.studies.response_quantities import REGISTRY
+from flipflow.studies.sensitivity import Sensitivity
 
 
 @section(Sensitivity, Part.DETAILS, 10, brief=True)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flipflow.analyses.assessment import Assessment
-from flipflow.analyses.jump_risk import JumpRisk
-from flipflow.analyses.transients import Transients
-from flipflow.figures.transient import run_ups_figure
+from flipflow.plotting.transient import run_ups_figure
 from flipflow.report.blocks import Block, Column, FigureBlock, Heading, Note, Table, Text, cells
 from flipflow.report.jump_risk import millimetres, moment_words
 from flipflow.report.numbers import NOTHING, number, quantity, rpm
 from flipflow.report.registry import Part, section
-from flipflow.results.run_up import RunUp
+from flipflow.studies.assessment import Assessment
+from flipflow.studies.jump_risk import JumpRisk
+from flipflow.studies.start_and_blows import Transients
+from flipflow.transient.startup import RunUp
 
 PEAKS = (
     ("main_amplitude", "Main frame, amplitude", "mm", "m"),

@@ -1,1 +1,1 @@
-"""Frozen results and their data documents."""
+"""What every result shares: how it is written and read again."""

@@ -1,0 +1,1 @@
+"""Many motions at once, on threads."""

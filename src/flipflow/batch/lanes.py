@@ -1,0 +1,188 @@
+"""Many motions of one machine at one frequency, run on threads until a neighbourhood catches them.
+
+Chunks of lanes go to threads that hold no interpreter lock; each has scratch of its own. What a
+chunk has finished is kept whatever happens to the others.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled import status
+from flipflow.dynamics.assembly import PlanBuilder
+from flipflow.errors import Cancelled, InputError
+from flipflow.model.system import MechanicalSystem
+from flipflow.periodic.scratch import new_shooting
+from flipflow.periodic.solver import Real
+from flipflow.periodic.turns import NOT_SETTLED, settle_lanes
+
+Int = NDArray[np.int64]
+CHUNK = 64
+MOST_THREADS = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """Ellipsoids (z - centre)^T form (z - centre) <= 1 around stroboscopic states, and owners.
+
+    Parameters
+    ----------
+    centre, form
+        Shapes (A, 2 N) and (A, 2 N, 2 N).
+    owner
+        Label of each, (A,).
+    """
+
+    centre: Real
+    form: Real
+    owner: Int
+
+    @classmethod
+    def nothing(cls, size: int) -> Capture:
+        """A capture that catches nothing, for states of ``size`` numbers."""
+        return cls(np.zeros((0, size)), np.zeros((0, size, size)), np.zeros(0, np.int64))
+
+    def joined(self, other: Capture) -> Capture:
+        """Both, those of ``self`` first."""
+        return Capture(
+            np.concatenate([self.centre, other.centre]),
+            np.concatenate([self.form, other.form]),
+            np.concatenate([self.owner, other.owner]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Where lanes ended; all arrays have the lanes first.
+
+    Parameters
+    ----------
+    states
+        States where a lane was caught or given up, (L, 2 N).
+    label
+        Owner of what caught it, -1: nothing did.
+    turns
+        Whole turns run; -1 where the lane was not run because the run was cancelled.
+    code
+        Kernel status of its last turn.
+    cancelled
+        Whether the caller stopped the run.
+    """
+
+    states: Real
+    label: Int
+    turns: Int
+    code: Int
+    cancelled: bool
+
+
+class Lanes:
+    """Runs many states of one machine at one frequency.
+
+    Parameters
+    ----------
+    system
+        The machine.
+    omega
+        Forcing frequency in rad/s.
+    threads
+        Threads to use; None: one for each processor that this process may use.
+
+    Raises
+    ------
+    InputError
+        For a number of threads below 1 or absurd.
+    """
+
+    def __init__(self, system: MechanicalSystem, omega: float, threads: int | None) -> None:
+        whole = isinstance(threads, (int, np.integer)) and not isinstance(threads, bool)
+        if threads is not None and not (whole and 1 <= threads <= MOST_THREADS):
+            raise InputError("threads", threads, f"give a whole number from 1 to {MOST_THREADS}")
+        self.builder = PlanBuilder(system)
+        self.omega = float(omega)
+        self.threads = threads or _processors()
+        self._adding = threading.Lock()
+
+    def settle(
+        self,
+        states: Real,
+        begin: Real,
+        capture: Capture,
+        most: int,
+        tick: Callable[[float], None] | None = None,
+    ) -> Run:
+        """Run states (L, 2 N), which hold at times (L,) of the first turn, until they are caught.
+
+        ``tick`` is called with the share of lanes done; where it raises
+        :class:`~flipflow.errors.Cancelled`, no further chunk is started.
+        """
+        count = states.shape[0]
+        run = Run(
+            np.array(states),
+            np.full(count, NOT_SETTLED),
+            np.full(count, -1),
+            np.full(count, status.OK),
+            cancelled=False,
+        )
+        begin = np.array(begin)
+        parts = [slice(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
+        pool = ThreadPoolExecutor(self.threads)
+        done = 0
+        try:
+            waiting = {pool.submit(self._chunk, run, part, begin, capture, most): part
+                       for part in parts}  # fmt: skip
+            for future in as_completed(waiting):
+                future.result()
+                part = waiting[future]
+                done += part.stop - part.start
+                if tick is not None:
+                    tick(done / count)
+        except Cancelled:
+            pool.shutdown(cancel_futures=True)
+            return Run(run.states, run.label, run.turns, run.code, cancelled=True)
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return run
+
+    def carry(self, states: Real, turns: int) -> Real:
+        """States (L, 2 N) after a number of whole turns; NaN where the flow did not end."""
+        nothing = Capture.nothing(states.shape[1])
+        run = self.settle(states, np.zeros(states.shape[0]), nothing, turns)
+        run.states[run.code != status.OK] = np.nan
+        return run.states
+
+    def _chunk(self, run: Run, part: slice, begin: Real, capture: Capture, most: int) -> None:
+        """Run a part of the lanes; a configuration that is missing is prepared, and all run again.
+
+        Results are written when all lanes have ended, so that a part is either done or not begun.
+        """
+        label, turns, code = (np.zeros(part.stop - part.start, np.int64) for _ in range(3))
+        while True:
+            states = run.states[part].copy()
+            plan = self.builder.plan
+            problem = new_shooting(plan, half_turn=False, length=1.0)
+            settle_lanes(
+                problem, states, begin[part], self.omega, capture.centre, capture.form,
+                capture.owner, most, label, turns, code,
+            )  # fmt: skip
+            if not np.any(code == status.MISSING_CONFIGURATION):
+                break
+            with self._adding:
+                self.builder.add_contact_state(problem.flow.state)
+            code[:] = status.OK
+        run.states[part], run.label[part] = states, label
+        run.turns[part], run.code[part] = turns, code
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

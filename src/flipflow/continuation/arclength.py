@@ -1,0 +1,372 @@
+"""Pseudo-arclength continuation of a branch in omega, compiled whole.
+
+Unknowns w = (u, omega) are measured in steps: each unknown by its own size times ``u_step``,
+omega by ``omega_step``, so that a step of length one is as long as is wanted in any of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from flipflow.compiled import status
+from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
+from flipflow.continuation.problem import depths, residual, signature, unknown_scale
+from flipflow.dynamics.plan import Int, Real
+
+NEWTON_MOST = 8
+NEWTON_FEW, NEWTON_MANY = 3, 4
+QUICK, SHARP = 1e-6, 1e-10
+GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
+LONGEST, SHORTEST = 1.0, 1e-10
+FAR = 2.0
+TOLERATED = 1e-4
+TURN_MOST, ASTRAY_MOST, ASTRAY_AT_CORNER = 0.90, 0.05, 0.3
+AWAY, BACK = 3.0, 0.9
+CONTACT_STEP, STRAND_STEP, SHORT_STEP = 0.03, 1e-4, 1e-3
+REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
+
+
+class Branch(NamedTuple):
+    """Record of up to P points with n unknowns each."""
+
+    u: Real  # (P, n)
+    omega: Real  # (P,)
+    tangent: Real  # (P, n + 1) unit in scaled unknowns, stored unscaled
+    jacobian: Real  # (P, n, n) dr/du, or (P, 0, 0) where nothing is read off it
+    side: Real  # (P,) sign of det [J; tangent]
+    signature: Int  # (P,)
+    depth: Real  # (P, m, 2) greatest depth in m beyond each gap, plus and minus side
+    iterations: Int  # (P,) Newton iterations
+    rejected: Int  # (P,) steps rejected on the way to the point
+    reason: Int  # (P,) why the last of them was
+
+
+class Course(NamedTuple):
+    """Where the branch is followed, and how long a step is."""
+
+    lower: float  # bounds of omega
+    upper: float
+    omega_step: float  # longest step in omega, rad/s
+    u_step: float  # longest step in the unknowns, as a share of their size
+    direction: float  # +1 or -1: sign of d omega at the start
+    tolerance: float  # last Newton step, in steps; the error left is about its square
+
+
+class Corrector(NamedTuple):
+    """Scratch of the bordered Newton solves."""
+
+    w: Real  # (n + 1,)
+    guess: Real  # (n + 1,)
+    border: Real  # (n + 1,) normal of the plane to solve in
+    before: Real  # (n + 1,) tangent at the point before
+    tangent: Real  # (n + 1,)
+    scale: Real  # (n + 1,)
+    side: Real  # (1,) sign of det [J; tangent]
+    r: Real  # (n,)
+    J: Real  # (n, n + 1)
+    A: Real  # (n + 1, n + 1)
+    b: Real  # (n + 1,)
+    pivot: Int  # (n + 1,)
+    depth: Real  # (m, 2) depth beyond each gap, as a branch records it
+
+
+@kernel
+def set_scale(problem: Any, work: Corrector, u: Real, omega: float, course: Course) -> None:
+    """Length of one step in each unknown."""
+    n = work.r.shape[0]
+    unknown_scale(problem, u, omega, work.scale)
+    for k in range(n):
+        work.scale[k] *= course.u_step
+    work.scale[n] = course.omega_step
+
+
+@kernel
+def bordered(work: Corrector) -> bool:
+    """Factor [J; work.border] in scaled unknowns; False when it is singular."""
+    n = work.r.shape[0]
+    for i in range(n):
+        for j in range(n + 1):
+            work.A[i, j] = work.J[i, j] * work.scale[j] / work.scale[i]
+    for j in range(n + 1):
+        work.A[n, j] = work.border[j]
+    return lu_factor(work.A, work.pivot)
+
+
+@kernel
+def newton_update(work: Corrector) -> float:
+    """Add the bordered Newton step to work.w; its length, in steps."""
+    n = work.r.shape[0]
+    plane = 0.0
+    for k in range(n):
+        work.b[k] = -work.r[k] / work.scale[k]
+    for k in range(n + 1):
+        plane += work.border[k] * (work.w[k] - work.guess[k]) / work.scale[k]
+    work.b[n] = -plane
+    lu_solve(work.A, work.pivot, work.b)
+    length = 0.0
+    for k in range(n + 1):
+        length += work.b[k] ** 2
+        work.w[k] += work.b[k] * work.scale[k]
+    return math.sqrt(length)
+
+
+@kernel
+def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
+    """Newton from work.guess within the plane through it normal to work.border (scaled).
+
+    The plane omega = constant has the border (0, ..., 0, 1). Returns status and iterations; the
+    solution stands in work.w, J and its factors belong to the last iterate but one.
+    """
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        work.w[k] = work.guess[k]
+    before = math.inf
+    for iteration in range(1, NEWTON_MOST + 1):
+        if not work.w[n] > 0.0:
+            return status.NO_CONVERGENCE, iteration
+        code = residual(problem, work.w, float(work.w[n]), work.r, work.J)
+        if code != status.OK:
+            return code, iteration
+        if not bordered(work):
+            return status.SINGULAR, iteration
+        length = newton_update(work)
+        if not length < 1e3:
+            return status.NO_CONVERGENCE, iteration
+        # A step that no longer shrinks and is tiny has met the rounding of the residual.
+        if length < tolerance or before <= length < QUICK:
+            return status.OK, iteration
+        before = length
+    return status.NO_CONVERGENCE, NEWTON_MOST
+
+
+@kernel
+def new_tangent(work: Corrector) -> float:
+    """Unit tangent (scaled) from the last factors, into work.tangent; its cosine to work.before."""
+    n = work.r.shape[0]
+    for k in range(n):
+        work.b[k] = 0.0
+    work.b[n] = 1.0
+    lu_solve(work.A, work.pivot, work.b)
+    norm = 0.0
+    cosine = 0.0
+    for k in range(n + 1):
+        norm += work.b[k] ** 2
+    norm = math.sqrt(norm)
+    for k in range(n + 1):
+        work.tangent[k] = work.b[k] / norm
+        cosine += work.tangent[k] * work.before[k]
+    return cosine
+
+
+@kernel
+def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
+    """Write point p of the branch from the corrector's scratch."""
+    n = work.r.shape[0]
+    for i in range(n):
+        branch.u[p, i] = work.w[i]
+    for i in range(branch.jacobian.shape[1]):
+        for j in range(n):
+            branch.jacobian[p, i, j] = work.J[i, j]
+    branch.omega[p] = work.w[n]
+    for k in range(n + 1):
+        branch.tangent[p, k] = work.tangent[k] * work.scale[k]
+    branch.signature[p] = signature(problem)
+    branch.side[p] = work.side[0]
+    depths(problem, float(work.w[n]), branch.depth[p])
+
+
+@kernel
+def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course) -> None:
+    """Scale of point p, and its unit tangent in scaled unknowns into work.before."""
+    n = work.r.shape[0]
+    for k in range(n):
+        work.guess[k] = branch.u[p, k]
+    set_scale(problem, work, work.guess, branch.omega[p], course)
+    norm = 0.0
+    for k in range(n + 1):
+        work.before[k] = branch.tangent[p, k] / work.scale[k]
+        norm += work.before[k] ** 2
+    for k in range(n + 1):
+        work.before[k] /= math.sqrt(norm)
+
+
+@kernel
+def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course) -> bool:
+    """Guess a step along the branch from point p; True when it ends on a bound of omega.
+
+    A guess beyond the bound is drawn back along the tangent and corrected at that omega.
+    """
+    n = work.r.shape[0]
+    omega = branch.omega[p] + step * work.before[n] * work.scale[n]
+    share = 1.0
+    ends = omega > course.upper or omega < course.lower
+    if ends:
+        bound = course.upper if omega > course.upper else course.lower
+        share = (bound - branch.omega[p]) / (omega - branch.omega[p])
+        omega = bound
+    for k in range(n):
+        work.guess[k] = branch.u[p, k] + share * step * work.before[k] * work.scale[k]
+        work.border[k] = 0.0 if ends else work.before[k]
+    work.guess[n] = omega
+    work.border[n] = 1.0 if ends else work.before[n]
+    if not ends and p > 0 and branch.signature[p] == branch.signature[p - 1]:
+        chord = chord_to(work, branch, p)
+        if step < FAR * chord:
+            bend(work, branch, p, step, chord)
+    return ends
+
+
+@kernel
+def chord_to(work: Corrector, branch: Branch, p: int) -> float:
+    """The way from point p - 1 to point p, in steps, into work.b; its length."""
+    n = work.r.shape[0]
+    square = 0.0
+    for k in range(n + 1):
+        here = branch.u[p, k] if k < n else branch.omega[p]
+        before = branch.u[p - 1, k] if k < n else branch.omega[p - 1]
+        work.b[k] = (here - before) / work.scale[k]
+        square += work.b[k] ** 2
+    return math.sqrt(square)
+
+
+@kernel
+def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> None:
+    """Turn the guess on the tangent of point p into one on the cubic through p - 1 and p.
+
+    With h the chord, left in work.b by ``chord_to``, d its direction, t and t' the tangents at p
+    and p - 1 and r = step / h, that is step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')) farther.
+    """
+    norm = 0.0
+    for k in range(work.b.shape[0]):
+        norm += (branch.tangent[p - 1, k] / work.scale[k]) ** 2
+    norm = math.sqrt(norm)
+    ratio = step / chord
+    for k in range(work.b.shape[0]):
+        d = work.b[k] / chord
+        behind = branch.tangent[p - 1, k] / (work.scale[k] * norm)
+        second = 2.0 * work.before[k] - 3.0 * d + behind
+        third = work.before[k] - 2.0 * d + behind
+        work.guess[k] += step * work.scale[k] * ratio * (second + ratio * third)
+
+
+@kernel
+def astray(work: Corrector) -> float:
+    """Distance of the corrected point from the guess, in steps: far away is another strand."""
+    square = 0.0
+    for k in range(work.w.shape[0]):
+        square += ((work.w[k] - work.guess[k]) / work.scale[k]) ** 2
+    return math.sqrt(square)
+
+
+@kernel
+def judge(
+    problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, iterations: int,
+    course: Course,
+) -> int:  # fmt: skip
+    """Why the corrected step from point p is refused, REASON_NONE when it is good.
+
+    The sign of det [J; tangent] is the same all along a branch. A corrected point where it differs
+    lies on another strand that runs the other way.
+    """
+    n = work.r.shape[0]
+    laboured = iterations > NEWTON_MANY and step > SHORT_STEP
+    if code != status.OK or laboured:
+        return REASON_NEWTON
+    if work.w[n] > course.upper or work.w[n] < course.lower:
+        return REASON_BOUND
+    cosine = new_tangent(work)
+    work.side[0] = lu_sign(work.A, work.pivot)
+    if cosine < 0.0:
+        work.side[0] = -work.side[0]
+        for k in range(work.tangent.shape[0]):
+            work.tangent[k] = -work.tangent[k]
+    # Where two contacts change at once the branch has a corner, which only a short step may turn.
+    off = ASTRAY_MOST if step > SHORT_STEP else ASTRAY_AT_CORNER
+    if abs(cosine) < TURN_MOST or astray(work) > off * step:
+        return REASON_TURN
+    if work.side[0] != branch.side[p] and step > STRAND_STEP:
+        return REASON_STRAND
+    if signature(problem) != branch.signature[p] and step > CONTACT_STEP:
+        return REASON_CONTACT
+    return REASON_NONE
+
+
+@kernel
+def from_start(work: Corrector, branch: Branch) -> float:
+    """Distance of the corrected point from the first one, in steps."""
+    n = work.r.shape[0]
+    square = ((work.w[n] - branch.omega[0]) / work.scale[n]) ** 2
+    for k in range(n):
+        square += ((work.w[k] - branch.u[0, k]) / work.scale[k]) ** 2
+    return math.sqrt(square)
+
+
+@kernel
+def arrival(branch: Branch, course: Course, p: int, ends: bool, back: bool) -> int:
+    """How the branch ends with point p; OK when it goes on."""
+    if back:
+        return status.CLOSED
+    if not ends:
+        return status.OK
+    return status.REACHED_UPPER if branch.omega[p] == course.upper else status.REACHED_LOWER
+
+
+@kernel
+def trace(
+    problem: Any, work: Corrector, branch: Branch, u: Real, omega: float, course: Course
+) -> tuple[int, int]:
+    """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
+
+    The first point is corrected at fixed omega, the last stands exactly on the bound; a branch
+    that comes back to its first point is closed there. A step is
+    refused and halved when Newton fails, when the tangent turns too far, and, down to a small
+    length, when the contacts of a turn change: points then gather where a contact begins, for
+    what is narrow hides there.
+    """
+    n = work.r.shape[0]
+    for k in range(n):
+        work.guess[k] = u[k]
+        work.border[k] = 0.0
+        work.before[k] = 0.0
+    work.guess[n] = omega
+    work.border[n] = 1.0
+    work.before[n] = course.direction
+    set_scale(problem, work, work.guess, omega, course)
+    p, step, length, travelled = 0, 0.0, 0.1, 0.0
+    ends = False
+    while p < branch.omega.shape[0]:
+        if p > 0:
+            step = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
+            ends = predict(work, branch, p - 1, step, course)
+        # A correction as long as the step itself would not tell one strand from the next.
+        tolerance = course.tolerance if p == 0 else min(course.tolerance, TOLERATED * step)
+        code, iterations = correct(problem, work, tolerance)
+        if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
+            return code, p
+        reason = judge(problem, work, branch, max(p - 1, 0), step, code, iterations, course)
+        if reason != REASON_NONE and p > 0:
+            branch.reason[p] = reason
+            branch.rejected[p] += 1
+            length = step * HALVE
+            if length < SHORTEST:
+                return status.STEP_TOO_SMALL, p
+            continue
+        store(problem, work, branch, p)
+        branch.iterations[p] = iterations
+        distance = from_start(work, branch)
+        travelled = max(travelled, distance)
+        # Beside a fold the other strand passes the first point, too, with omega the other way.
+        same_way = branch.tangent[p, n] * branch.tangent[0, n] > 0.0
+        back = travelled > AWAY and distance < BACK * step and same_way
+        ended = arrival(branch, course, p, ends, back)
+        if ended != status.OK:
+            return ended, p + 1
+        if p > 0 and iterations <= NEWTON_FEW:
+            length = min(step * GROW, LONGEST)
+        elif p > 0 and iterations >= NEWTON_MANY:
+            length = step * SHRINK
+        recall(problem, work, branch, p, course)
+        p += 1
+    return status.POINT_LIMIT, p

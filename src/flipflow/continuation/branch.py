@@ -1,0 +1,335 @@
+"""A branch of periodic motions over frequency."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
+from flipflow.continuation.special_points import FOLD
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
+from flipflow.periodic.options import Method
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.solver import Point, Solver, Traced
+from flipflow.periodic.stability import STABLE, stability_words
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """A point where the character of the motion changes.
+
+    Parameters
+    ----------
+    kind
+        "fold" (a saddle-node: the amplitude jumps here), "contact begin", "contact end",
+        "symmetry breaking", "period doubling" or "Neimark-Sacker".
+    orbit
+        The motion at the point.
+    position
+        Where it stands along the branch: point index plus share of the step; half a step beyond
+        an end where the branch meets the one from which it comes.
+    spring, side
+        The stop and its side (+1, -1) for contact; -1 and 0 otherwise.
+    """
+
+    kind: str
+    orbit: Orbit
+    position: float
+    spring: int = -1
+    side: int = 0
+
+    def __repr__(self) -> str:
+        return f"SpecialPoint({self.kind}, {self.omega:.9g} rad/s)"
+
+    @property
+    def omega(self) -> float:
+        """Frequency in rad/s."""
+        return self.orbit.omega
+
+    def amplitude(self, which: Coordinate) -> float:
+        """Half peak-to-peak of a coordinate in m."""
+        return self.orbit.amplitude(which)
+
+
+@dataclass(frozen=True)
+class ShortenedStep:
+    """A step that was refused: omega in rad/s where it began, how often halved, why at last."""
+
+    omega: float
+    times: int
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Periodic motions followed over frequency, in the order in which they hang together.
+
+    Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
+    points; it is what :func:`flipflow.frequency_response` returns, and
+    :func:`flipflow.continue_orbit` and :func:`flipflow.switch_branch` over frequency.
+
+    Parameters
+    ----------
+    machine
+        What was analysed.
+    method
+        Options of the method used.
+    solver, traced
+        The solver and the points it left.
+    return_maps
+        Linearised return maps over a turn, or over half a turn with sign, (n, 2 N, 2 N).
+    saddle_side_at_start
+        Whether an odd number of real multipliers lies beyond +1 where the branch rises.
+    multipliers
+        Floquet multipliers of the full turn, (n, 2 N), largest modulus first.
+    stability
+        Words, (n,): "stable", "unstable" or "undetermined".
+    special_points
+        In branch order, each refined to rounding.
+    status
+        How the branch ended; ``status.complete`` is False when it could not be finished.
+    notes
+        A sentence for each thing that could not be settled.
+    version
+        Version of flipflow.
+    """
+
+    machine: Machine
+    method: Method
+    solver: Solver
+    traced: Traced
+    return_maps: Real
+    saddle_side_at_start: bool
+    multipliers: NDArray[np.complex128]
+    stability: NDArray[np.str_]
+    special_points: tuple[SpecialPoint, ...]
+    status: BranchStatus
+    notes: tuple[str, ...]
+    version: str
+
+    def __repr__(self) -> str:
+        ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s, " if self.omega.size else ""
+        counts = Counter(point.kind for point in self.special_points)
+        kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
+        return f"Branch({self.omega.size} points, {ends}{kinds}, {self.status.name})"
+
+    @property
+    def system(self) -> MechanicalSystem:
+        """The machine as it was solved."""
+        return self.solver.system
+
+    @property
+    def periods(self) -> int:
+        """Number of forcing periods after which the motions repeat."""
+        return self.solver.turns
+
+    @property
+    def omega(self) -> Real:
+        """Frequency in rad/s along the branch, (n,); both ends exactly as asked for."""
+        return self.traced.omega
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where ``stability`` is "stable", (n,)."""
+        return np.asarray(self.stability == STABLE)
+
+    @property
+    def folds(self) -> tuple[SpecialPoint, ...]:
+        """The saddle-nodes, in branch order."""
+        return self.points_of(FOLD)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the branch was followed to the end of the interval."""
+        return self.status.complete
+
+    @cached_property
+    def error(self) -> Real:
+        """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
+        return self.solver.errors(self.traced.u, self.omega)
+
+    @property
+    def shortened_steps(self) -> tuple[ShortenedStep, ...]:
+        """Steps that were refused and halved on the way, the one at which the branch ended too."""
+        rejected, reason = self.traced.rejected, self.traced.reason
+        return tuple(
+            ShortenedStep(float(self.omega[p - 1]), int(rejected[p]), STEP_REASON[int(reason[p])])
+            for p in np.flatnonzero(rejected)
+            if p > 0
+        )
+
+    def points_of(self, kind: str) -> tuple[SpecialPoint, ...]:
+        """Special points of one kind, in branch order."""
+        return tuple(point for point in self.special_points if point.kind == kind)
+
+    def amplitude(self, which: Coordinate) -> Real:
+        """Half peak-to-peak of a coordinate at every point in m, (n,)."""
+        low, high, _ = self._extremes(which)
+        return np.asarray((high - low) / 2.0)
+
+    def phase(self, which: Coordinate) -> Real:
+        """Phase of the first harmonic against the force in rad, (n,); positive: it leads."""
+        return np.asarray(np.angle(self._extremes(which)[2]))
+
+    def orbit(self, i: int) -> Orbit:
+        """The motion at point i of the branch."""
+        if not -self.omega.size <= i < self.omega.size:
+            raise InputError("i", i, f"the branch has points 0 to {self.omega.size - 1}")
+        u, omega = self.traced.u[i], float(self.omega[i])
+        point = Point(self.solver, u, omega, known_map=self.return_maps[i])
+        return Orbit(self.machine, point, str(self.stability[i]))
+
+    def orbits_at(self, omega: float) -> tuple[Orbit, ...]:
+        """The motions of this branch at exactly ``omega``, in branch order, each solved for.
+
+        Raises
+        ------
+        InputError
+            For a frequency outside the branch.
+        IncompleteError
+            When the branch has no points.
+        """
+        ends = self.omega
+        if ends.size == 0:
+            raise IncompleteError(f"The branch has no points. {self.status.value}")
+        if not isinstance(omega, numbers.Real) or not ends.min() <= omega <= ends.max():
+            remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
+            raise InputError("omega", omega, remedy)
+        hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
+        found: list[Orbit] = []
+        for p in hits:
+            span = ends[p + 1] - ends[p]
+            share = (omega - ends[p]) / span if span else 0.0
+            guess = (1.0 - share) * self.traced.u[p] + share * self.traced.u[p + 1]
+            point = self.solver.solve(guess, omega)
+            if point is None:
+                continue
+            same = any(np.allclose(point.u, one.unknowns, rtol=1e-7, atol=1e-12) for one in found)
+            if not same:
+                found.append(self._solved(point, rises=span > 0.0))
+        return tuple(found)
+
+    @cached_property
+    def rising_path(self) -> tuple[slice, ...]:
+        """Runs of points that a machine passes when its speed is raised slowly from below.
+
+        Each run rises in omega. At a fold the machine jumps to the next stable part of the branch
+        that leads on to higher speed.
+        """
+        runs: list[slice] = []
+        begin, size = 0, self.omega.size
+        while begin < size:
+            falls = np.flatnonzero(np.diff(self.omega[begin:]) <= 0.0)
+            end = begin + int(falls[0]) + 1 if falls.size else size
+            runs.append(slice(begin, end))
+            ahead = np.arange(end, size)
+            beyond = ahead[(self.omega[end:] > self.omega[end - 1]) & self.stable[end:]]
+            begin = int(beyond[0]) if falls.size and beyond.size else size
+        return tuple(runs)
+
+    def orbit_from_below(self, omega: float) -> Orbit | None:
+        """The motion met at ``omega`` when the speed is raised slowly from below."""
+        for k, run in enumerate(self.rising_path):
+            low = self.omega[run.start] if k == 0 else self._end_of(self.rising_path[k - 1])
+            if low <= omega <= self._end_of(run):
+                return self.solve_in(run, omega)
+        return None
+
+    def _end_of(self, run: slice) -> float:
+        """Highest omega of a run: the refined fold behind its last point, or that point."""
+        last = run.stop - 1
+        folds = [fold.omega for fold in self.folds if last - 1 <= fold.position <= last + 1]
+        return max([float(self.omega[last]), *folds])
+
+    def solve_in(self, run: slice, omega: float) -> Orbit | None:
+        """The motion at exactly ``omega`` near a run of rising points."""
+        if run.stop - run.start < 2:
+            return None
+        at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, run.stop - 1)
+        before, after = int(at) - 1, int(at)
+        span = self.omega[after] - self.omega[before]
+        share = min((omega - self.omega[before]) / span, 1.0) if span else 0.0
+        guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
+        point = self.solver.solve(guess, omega)
+        if point is None:
+            return None
+        return self._solved(point, rises=True)
+
+    def _solved(self, point: Point, *, rises: bool) -> Orbit:
+        """A motion solved for on a part of the branch that rises or falls in omega."""
+        side = np.array([self.saddle_side_at_start ^ (not rises)])
+        word = stability_words(point.eigenvalues[None], side)[0]
+        return Orbit(self.machine, point, str(word))
+
+    def peak(self, which: Coordinate) -> SpecialPoint:
+        """The motion of largest amplitude on the branch, refined between its points."""
+        if self.omega.size == 0:
+            raise IncompleteError(f"The branch has no points. {self.status.value}")
+        return self._refined(which, int(self.amplitude(which).argmax()), "peak")
+
+    def peaks(self, which: Coordinate) -> tuple[SpecialPoint, ...]:
+        """Every resonance peak: local maxima of the amplitude in branch order, refined."""
+        tops = _inner_maxima(self.amplitude(which))
+        return tuple(self._refined(which, int(top), "peak") for top in tops)
+
+    def troughs(self, which: Coordinate) -> tuple[SpecialPoint, ...]:
+        """Every local minimum of the amplitude in branch order, refined: antiresonances."""
+        feet = _inner_maxima(-self.amplitude(which))
+        return tuple(self._refined(which, int(foot), "trough") for foot in feet)
+
+    def _refined(self, which: Coordinate, top: int, kind: str) -> SpecialPoint:
+        """The peak or trough near point ``top``, searched in the steps on both sides of it."""
+        sign = -1.0 if kind == "peak" else 1.0
+        vector = self.system.coordinate(which)[None]
+        best = SpecialPoint(kind, self.orbit(top), float(top))
+        for p in (top - 1, top):
+            if not 0 <= p < self.omega.size - 1:
+                continue
+
+            def rise(share: float, p: int = p) -> float:
+                try:
+                    point = self.solver.between(self.traced, p, share)
+                except IncompleteError:
+                    return math.inf  # not every motion between two sharp bends can be had
+                low, high, _ = self.solver.extremes(point.u[None], np.array([point.omega]), vector)
+                return sign * float(high[0, 0] - low[0, 0])
+
+            share = float(
+                minimize_scalar(
+                    rise, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
+                ).x
+            )
+            if not math.isfinite(rise(share)):
+                continue
+            point = self.solver.between(self.traced, p, share)
+            orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
+            if sign * orbit.amplitude(which) < sign * best.amplitude(which):
+                best = SpecialPoint(kind, orbit, p + share)
+        return best
+
+    def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
+        key = tuple(self.system.coordinate(which))
+        if key not in self._seen:
+            low, high, first = self.solver.extremes(self.traced.u, self.omega, np.array([key]))
+            self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
+        return self._seen[key]
+
+    @cached_property
+    def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real, NDArray[np.complex128]]]:
+        return {}
+
+
+def _inner_maxima(values: Real) -> NDArray[np.intp]:
+    """Indices of local maxima, ends left out."""
+    inner = (values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])
+    return np.flatnonzero(inner) + 1

@@ -1,0 +1,139 @@
+"""Special points of a truncated series held against the exact flow.
+
+Where a motion has sharper detail than the harmonics kept, the series wiggles about it: it turns
+back where the exact motion does not, and the exact motion that Newton reaches from it is now one,
+now another. A fold of the series is one of the machine when the exact motions before and after it,
+up to the next folds of the series, lie on opposite sides of an eigenvalue +1, and on the sides
+that the number of folds passed tells. Any other special point is one when the exact branch, taken
+between exact motions on both sides of it, has a zero of the test function. Beside a fold, where
+there is no exact motion at the speed of the series, the exact branch is followed past it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from flipflow.compiled import status
+from flipflow.errors import IncompleteError
+from flipflow.periodic.balance_solver import BalanceSolver
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.solver import Point, Real, Traced
+from flipflow.periodic.stability import determinant_minus
+
+BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
+FOLLOWED = (1.0, 4.0)
+EDGE = 1e-6
+ZERO = 1e-3
+LISTED = 8
+
+
+@dataclass(frozen=True, eq=False)
+class ExactBeside:
+    """The exact motions beside a branch of a truncated series."""
+
+    solver: BalanceSolver
+    traced: Traced
+
+    @cached_property
+    def exact(self) -> ExactSolver:
+        """Solver of the exact motions, of the same symmetry."""
+        return ExactSolver(self.solver.system, half_turn=self.solver.half_turn)
+
+    def at(self, position: float) -> Point | None:
+        """The exact motion that Newton reaches from the series at a position along the branch."""
+        p = int(position)
+        if not 0 <= p < self.traced.omega.size - 1:
+            return None
+        try:
+            near = self.solver.between(self.traced, p, position - p)
+        except IncompleteError:
+            return None
+        state = self.solver.states(near.u[None], np.array([near.omega]))[0]
+        return self.exact.solve(state, near.omega)
+
+    def crosses(self, position: float, room: float, test: Callable[[Point], float]) -> bool:
+        """Whether the exact branch has a zero of a test less than ``room`` steps off a position."""
+        for share in BESIDE:
+            sides = [self.at(position + sign * share) for sign in (-1.0, 1.0) if share < 0.5 * room]
+            ends = [side for side in sides if side is not None]
+            if len(ends) == 2 and self._zero_between(ends[0], ends[1], test):
+                return True
+        return False
+
+    def passes(self, position: float, room: float, test: Callable[[Traced, Real], Real]) -> bool:
+        """Whether the exact branch, followed past a position, has a zero of a test there.
+
+        It is followed by its own arc length from an exact motion behind the position over the
+        speeds of the series up to as far ahead: past folds, where no exact motion has the speed
+        of the series.
+        """
+        omega, course = self.traced.omega, self.traced.course
+        for steps in FOLLOWED:
+            start = max(position - min(steps, 0.5 * room), 0.0)
+            begin = self.at(start)
+            if begin is None:
+                continue
+            first, last = max(int(position - steps), 0), int(position + steps) + 2
+            speeds = np.append(omega[first:last], begin.omega)
+            low, high = float(speeds.min()), float(speeds.max())
+            direction = float(np.sign(self.traced.tangent[int(start), -1]))
+            window = course._replace(
+                lower=low - EDGE * low, upper=high + EDGE * high, direction=direction
+            )
+            followed = self.exact.trace(begin.u, begin.omega, window)
+            maps = self.exact.return_maps(followed.u, followed.omega, followed.jacobian)
+            values = test(followed, maps)
+            if np.any(values[1:] * values[:-1] < 0.0):
+                return True
+        return False
+
+    def _zero_between(self, first: Point, last: Point, test: Callable[[Point], float]) -> bool:
+        """Whether a test has a zero, not a jump, on the exact branch between two motions."""
+        values = test(first), test(last)
+        if not values[0] * values[1] < 0.0:
+            return False
+        record = self.exact.new_branch(2)
+        for k, end in enumerate((first, last)):
+            record.u[k], record.omega[k] = end.u, end.omega
+        record.tangent[:] = np.append(last.u - first.u, last.omega - first.omega)
+        chord = Traced.recorded(record, 2, status.OK, self.traced.course)
+
+        def value(share: float) -> float:
+            if share in (0.0, 1.0):
+                return values[int(share)]
+            return test(self.exact.between(chord, 0, share))
+
+        try:
+            root = float(brentq(value, 0.0, 1.0, xtol=1e-9, rtol=1e-9))
+            return abs(value(root)) < ZERO * min(abs(values[0]), abs(values[1]))
+        except IncompleteError:
+            return False
+
+    def folds_shown(self, positions: Real, side: NDArray[np.bool_]) -> list[bool]:
+        """Which folds of the series at given positions the exact motions show.
+
+        ``side`` tells for each point of the branch whether an odd number of eigenvalues should
+        lie beyond +1.
+        """
+        maps, distance = self.solver.corrected_maps(self.traced.u, self.traced.omega)
+        on_side = ((determinant_minus(maps) < 0.0) == side) & np.isfinite(distance)
+        ends = [0, *(int(position) + 1 for position in positions), side.size]
+        shown = [bool(on_side[first:last].any()) for first, last in pairwise(ends)]
+        return [before and after for before, after in pairwise(shown)]
+
+
+def unconfirmed_note(kind: str, omegas: Sequence[float]) -> str:
+    """What is said of special points of the series that the exact flow does not show."""
+    where = ", ".join(f"{omega:.7g}" for omega in omegas[:LISTED])
+    more = f" and {len(omegas) - LISTED} more" if len(omegas) > LISTED else ""
+    return (
+        f"{kind} of the series at {where}{more} rad/s: the exact motions beside it do not show it; "
+        "raise the harmonics"
+    )

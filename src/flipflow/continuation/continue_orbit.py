@@ -1,0 +1,184 @@
+"""Follow any periodic motion over frequency, or over a field of the machine."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+from flipflow.continuation import arclength
+from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.continue_field import field_branch
+from flipflow.continuation.field_branch import FieldBranch
+from flipflow.continuation.frequency_response import SAMPLED, described, method_of
+from flipflow.continuation.special_points import DOUBLING, SYMMETRY
+from flipflow.continuation.switching import (
+    Followed,
+    beside,
+    child_of,
+    distance_to,
+    follow_away,
+    follow_both_ways,
+    image,
+    meeting,
+)
+from flipflow.errors import InputError, SampledContactWarning
+from flipflow.model.arguments import check_interval
+from flipflow.model.system import Machine
+from flipflow.periodic.balance_solver import BalanceSolver, SampledSolver
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.options import Method, PiecewiseExact
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.solver import STEP_SHARE, Point, Solver
+from flipflow.periodic.stability import UNDETERMINED
+
+SYMMETRIC = 1e-9
+
+
+def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> Branch | FieldBranch:
+    """Follow a periodic motion over frequency or over a field of the machine, both ways.
+
+    The motion may repeat after any number of forcing periods, be stable or not, and lie on a
+    branch detached from all others. Its branch is followed through its folds by
+    pseudo-arclength until it leaves the interval, closes, or meets the branch from which it comes:
+    that of half its period, or of the symmetric motions. A motion that is its own mirror image is
+    followed as such, so that the loss of symmetry is seen.
+
+    Parameters
+    ----------
+    orbit
+        Where to start: a motion of :func:`~flipflow.periodic_orbits`, of a branch, or a special
+        point's.
+    field
+        "omega", or a field of :class:`~flipflow.FlipFlowScreen` such as "clearance": the speed
+        then stays that of ``orbit``, and the motions are exact.
+    interval
+        (low, high) in rad/s or in the field's SI unit; it holds the motion's own value.
+
+    Returns
+    -------
+    Branch or FieldBranch
+        Over omega a :class:`~flipflow.continuation.branch.Branch`, else a
+        :class:`~flipflow.continuation.field_branch.FieldBranch`.
+
+    Raises
+    ------
+    InputError
+        For a field that is not known or has no finite value, and for an interval that is empty or
+        does not hold the motion.
+
+    Warns
+    -----
+    SampledContactWarning
+        When the orbit's own method samples the contact force.
+    """
+    if not isinstance(orbit, Orbit):
+        raise InputError("orbit", orbit, "give a motion, for example one of ff.periodic_orbits")
+    if field != "omega":
+        return field_branch(orbit, field, interval, solver_like(orbit, ExactSolver))
+    low, high = check_interval(interval)
+    if not low <= orbit.omega <= high:
+        remedy = f"the motion is one at {orbit.omega:.9g} rad/s; give an interval that holds it"
+        raise InputError("interval", interval, remedy)
+    solver = solver_like(orbit, type(orbit.point.solver))
+    u = orbit.unknowns if solver is orbit.point.solver else solver.unknowns_from(orbit.motion)
+    method = method_of(solver)
+    if isinstance(solver, SampledSolver):
+        warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
+    followed = follow_both_ways(solver, u, orbit.omega, _course(low, high, method))
+    return _branch(orbit.machine, method, solver, followed)
+
+
+def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
+    """Follow the motions that branch off at a period doubling or a symmetry breaking.
+
+    From a period doubling those of twice the periods, from a symmetry breaking those that lean to
+    one side; the mirror images of the latter are motions, too, of the same amplitudes. The first
+    motion lies a small way along the critical eigenvector of the return map and is solved for in
+    the plane of fixed amplitude, omega being unknown. Motions are exact, whatever the method
+    that found the point.
+
+    Parameters
+    ----------
+    point
+        A special point of a branch over frequency, of one of these two kinds.
+    interval
+        (low, high) in rad/s; it holds the point.
+
+    Returns
+    -------
+    Branch
+        Its first special point is the one it comes from; where it ends on the parent branch again,
+        its last one is that end.
+
+    Raises
+    ------
+    InputError
+        For a point of another kind, or an interval that does not hold it.
+    IncompleteError
+        When no motion was found beside the point.
+    """
+    low, high = check_interval(interval)
+    if getattr(point, "kind", None) not in (DOUBLING, SYMMETRY):
+        raise InputError("point", point, f"give a special point: {DOUBLING} or {SYMMETRY}")
+    if not low < point.omega < high:
+        remedy = f"the point stands at {point.omega:.9g} rad/s; give an interval around it"
+        raise InputError("interval", interval, remedy)
+    parent = _exact_point(point)
+    child = child_of(parent.solver)
+    method = PiecewiseExact()
+    course = _course(low, high, method)
+    first = beside(child, parent, course)
+    followed = follow_away(child, first, course, parent)
+    return _branch(point.orbit.machine, method, child, followed)
+
+
+def solver_like(orbit: Orbit, kind: type[Solver]) -> Solver:
+    """A solver of a kind for the orbit's periods, the mirror-symmetric one where it is symmetric.
+
+    The orbit's own solver where that is such a one.
+    """
+    own = orbit.point.solver
+    turns = own.turns
+    symmetric = own.half_turn
+    if own.system.symmetric and turns % 2 == 1 and not symmetric:
+        mirrored = image(
+            ExactSolver(own.system, half_turn=True, turns=turns), orbit.state, orbit.omega
+        )
+        symmetric = distance_to(orbit.state, mirrored, orbit.omega) < SYMMETRIC
+    if isinstance(own, kind) and own.half_turn == symmetric:
+        return own
+    if kind is SampledSolver and isinstance(own, SampledSolver):
+        return SampledSolver(own.system, own.order, own.samples, own.sharpness, half_turn=symmetric)
+    if kind is BalanceSolver and isinstance(own, BalanceSolver):
+        return BalanceSolver(own.system, own.order, half_turn=symmetric)
+    return ExactSolver(own.system, half_turn=symmetric, turns=turns)
+
+
+def _exact_point(point: SpecialPoint) -> Point:
+    """The special point of the exact flow."""
+    solver = solver_like(point.orbit, ExactSolver)
+    if solver is point.orbit.point.solver:
+        return point.orbit.point
+    exact = meeting(solver, solver.unknowns_from(point.orbit.motion), point.omega)
+    if exact is None:
+        raise InputError(
+            "point", point, "no exact motion has such a point near; use PiecewiseExact"
+        )
+    return exact
+
+
+def _course(low: float, high: float, method: Method) -> arclength.Course:
+    return arclength.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK
+    )
+
+
+def _branch(machine: Machine, method: Method, solver: Solver, followed: Followed) -> Branch:
+    """The described branch, with the points at which it meets its parent."""
+    branch = described(machine, method, solver, followed.traced)
+    kind = DOUBLING if solver.turns % 2 == 0 else SYMMETRY
+    start, end = (
+        () if point is None else (SpecialPoint(kind, Orbit(machine, point, UNDETERMINED), at),)
+        for point, at in ((followed.start, -0.5), (followed.end, branch.omega.size - 0.5))
+    )
+    return dataclasses.replace(branch, special_points=(*start, *branch.special_points, *end))

@@ -1,0 +1,132 @@
+"""A branch of periodic motions over a field of the machine."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.continuation.branch import SpecialPoint
+from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.special_points import FOLD
+from flipflow.errors import InputError
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Coordinate
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.stability import STABLE
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSpecialPoint(SpecialPoint):
+    """A special point of a branch over a field; ``value`` is the field's, in SI.
+
+    A "cusp" stands on a curve of folds, where two folds are born.
+    """
+
+    value: float = np.nan
+
+    def __repr__(self) -> str:
+        return f"FieldSpecialPoint({self.kind}, {self.value:.9g} at {self.omega:.9g} rad/s)"
+
+
+@dataclass(frozen=True, eq=False)
+class FieldBranch:
+    """Periodic motions, or folds, followed over a field of the machine.
+
+    Arrays are (n,) over its points, in the order in which they hang together. It is what
+    :func:`flipflow.continue_orbit` returns for a field of the machine, and
+    :func:`flipflow.continue_fold`.
+
+    Parameters
+    ----------
+    machine
+        The screen from which the branch was followed.
+    field
+        Name of the field.
+    orbits
+        The motions, each of its own screen.
+    values
+        The field's values in SI, (n,).
+    special_points
+        In branch order, each refined on corrected points.
+    status
+        How the branch ended; ``status.complete`` is False when it could not be finished.
+    notes
+        A sentence for each thing that could not be settled.
+    version
+        Version of flipflow.
+    """
+
+    machine: FlipFlowScreen
+    field: str
+    orbits: tuple[Orbit, ...]
+    values: Real
+    special_points: tuple[FieldSpecialPoint, ...]
+    status: BranchStatus
+    notes: tuple[str, ...]
+    version: str
+
+    def __repr__(self) -> str:
+        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}, " if self.orbits else ""
+        counts = Counter(point.kind for point in self.special_points)
+        kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
+        size = len(self.orbits)
+        return f"FieldBranch({self.field}, {size} points, {ends}{kinds}, {self.status.name})"
+
+    @cached_property
+    def omega(self) -> Real:
+        """Frequency in rad/s along the branch, (n,); it varies along a curve of folds only."""
+        return np.array([orbit.omega for orbit in self.orbits])
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers of the full period, (n, 2 N), largest modulus first."""
+        return np.array([orbit.multipliers for orbit in self.orbits])
+
+    @cached_property
+    def stability(self) -> NDArray[np.str_]:
+        """Words, (n,): "stable", "unstable" or "undetermined"."""
+        return np.array([orbit.stability for orbit in self.orbits], dtype="<U12")
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where ``stability`` is "stable", (n,)."""
+        return np.asarray(self.stability == STABLE)
+
+    @cached_property
+    def error(self) -> Real:
+        """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
+        return np.array([orbit.error for orbit in self.orbits])
+
+    @property
+    def folds(self) -> tuple[FieldSpecialPoint, ...]:
+        """The saddle-nodes, in branch order."""
+        return self.points_of(FOLD)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the branch was followed to both its ends, or all round."""
+        return self.status.complete
+
+    def points_of(self, kind: str) -> tuple[FieldSpecialPoint, ...]:
+        """Special points of one kind, in branch order."""
+        return tuple(point for point in self.special_points if point.kind == kind)
+
+    def amplitude(self, which: Coordinate) -> Real:
+        """Half peak-to-peak of a coordinate at every point in m, (n,)."""
+        return np.array([orbit.amplitude(which) for orbit in self.orbits])
+
+    def phase(self, which: Coordinate) -> Real:
+        """Phase of the first harmonic against the force in rad, (n,); positive: it leads."""
+        return np.array([orbit.phase(which) for orbit in self.orbits])
+
+    def orbit(self, i: int) -> Orbit:
+        """The motion at point i of the branch."""
+        if not -len(self.orbits) <= i < len(self.orbits):
+            raise InputError("i", i, f"the branch has points 0 to {len(self.orbits) - 1}")
+        return self.orbits[i]

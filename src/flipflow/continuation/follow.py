@@ -1,0 +1,161 @@
+"""A branch followed whole, and its points and special points between those that were stored.
+
+A fold is a zero of the tangent's share in omega, a contact begins or ends at a zero of the depth
+beyond its gap. Both are sought on corrected points, never interpolated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from flipflow.compiled import status
+from flipflow.compiled.compile import kernel
+from flipflow.continuation.arclength import (
+    SHARP,
+    Branch,
+    Corrector,
+    Course,
+    bend,
+    chord_to,
+    correct,
+    new_tangent,
+    recall,
+    trace,
+)
+from flipflow.continuation.problem import depths, residual
+from flipflow.dynamics.plan import Real
+
+TRACE_ALL = -1
+FOLD = -1
+SHARE_TOLERANCE = 1e-10
+MOST_ROOT_STEPS = 100
+
+
+@kernel
+def correct_between(
+    problem: Any, work: Corrector, branch: Branch, p: int, share: float, course: Course
+) -> int:
+    """A point of the branch between points p and p + 1: beside ``share`` of the cubic through them.
+
+    The plane to solve in stands across their chord.
+    It stands in work.w, its Jacobian in work.J, its tangent, in the branch's direction, in
+    work.tangent (scaled by work.scale).
+    """
+    n = work.r.shape[0]
+    recall(problem, work, branch, p + 1, course)
+    chord = chord_to(work, branch, p + 1)
+    step = (share - 1.0) * chord
+    for k in range(n + 1):
+        end = branch.u[p + 1, k] if k < n else branch.omega[p + 1]
+        work.guess[k] = end + step * work.before[k] * work.scale[k]
+        work.border[k] = work.b[k] / chord
+    bend(work, branch, p + 1, step, chord)
+    for k in range(n + 1):
+        work.before[k] = work.border[k]
+    code, _ = correct(problem, work, SHARP)
+    if code != status.OK:
+        return code
+    new_tangent(work)
+    return residual(problem, work.w, float(work.w[n]), work.r, work.J)
+
+
+@kernel
+def height_of(problem: Any, work: Corrector, test: int) -> float:
+    """The test at the point in work: FOLD, or the depth beyond gap test // 2 on one side."""
+    if test == FOLD:
+        return float(work.tangent[work.r.shape[0]])
+    depths(problem, float(work.w[work.r.shape[0]]), work.depth)
+    return float(work.depth[test // 2, test % 2])
+
+
+@kernel
+def height_between(
+    problem: Any, work: Corrector, branch: Branch, p: int, share: float, test: int, course: Course
+) -> tuple[int, float]:
+    """Status and the test at a share of step p; at its ends as it was recorded.
+
+    Where a branch turns within a step its ends corrected anew would run along the chord.
+    """
+    if not 0.0 < share < 1.0:
+        end = p + int(share)
+        if test == FOLD:
+            return status.OK, float(branch.tangent[end, work.r.shape[0]]) / course.omega_step
+        return status.OK, float(branch.depth[end, test // 2, test % 2])
+    code = correct_between(problem, work, branch, p, share, course)
+    if code != status.OK:
+        return code, math.nan
+    return code, height_of(problem, work, test)
+
+
+@kernel
+def zero_between(
+    problem: Any, work: Corrector, branch: Branch, p: int, low: float, high: float, test: int,
+    course: Course,
+) -> tuple[int, float]:  # fmt: skip
+    """Zero of a test between two shares of step p by Chandrupatla's method: status and share.
+
+    The point is left in work. T. R. Chandrupatla, Advances in Engineering Software 28 (1997) 145.
+    """
+    a, b = low, high
+    code_a, f_a = height_between(problem, work, branch, p, a, test, course)
+    code_b, f_b = height_between(problem, work, branch, p, b, test, course)
+    if code_a != status.OK or code_b != status.OK or not f_a * f_b < 0.0:
+        return status.NO_CONVERGENCE, low
+    c, f_c = a, f_a
+    t = f_a / (f_a - f_b)
+    for _ in range(MOST_ROOT_STEPS):
+        x = a + t * (b - a)
+        code, f = height_between(problem, work, branch, p, x, test, course)
+        if code != status.OK:
+            return code, x
+        if (f > 0.0) == (f_a > 0.0):
+            c, f_c = a, f_a
+        else:
+            c, f_c = b, f_b
+            b, f_b = a, f_a
+        a, f_a = x, f
+        closest = SHARE_TOLERANCE / abs(b - a) if b != a else 1.0
+        if closest > 0.5 or f == 0.0:
+            return status.OK, x
+        t = _next_share(a, b, c, f_a, f_b, f_c)
+        t = min(1.0 - closest, max(closest, t))
+    return status.NO_CONVERGENCE, a
+
+
+@kernel
+def _next_share(a: float, b: float, c: float, f_a: float, f_b: float, f_c: float) -> float:
+    """Share of the way from a to b: inverse quadratic where that is sure to shrink, else half."""
+    place, height = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
+    if not (height * height < place and (1.0 - height) ** 2 < 1.0 - place):
+        return 0.5
+    outer = f_a / (f_b - f_a) * f_c / (f_b - f_c)
+    return outer + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+
+
+@kernel(entry=True)
+def follow(
+    problem: Any,
+    work: Corrector,
+    branch: Branch,
+    u: Real,
+    omega: float,
+    course: Course,
+    p: int,
+    low: float,
+    high: float,
+    test: int,
+) -> tuple[int, int, float]:
+    """Trace the branch from (u, omega), or find a point within step p >= 0.
+
+    That is the one at the share ``low`` when ``high`` is the same, else the zero of a test between
+    the two. Returns status, points and share. One entry for all: each is optimised anew with all
+    that it calls.
+    """
+    if p == TRACE_ALL:
+        code, points = trace(problem, work, branch, u, omega, course)
+        return code, points, 0.0
+    if low == high:
+        return correct_between(problem, work, branch, p, low, course), p, low
+    code, share = zero_between(problem, work, branch, p, low, high, test, course)
+    return code, p, share

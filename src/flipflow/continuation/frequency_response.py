@@ -1,0 +1,245 @@
+"""Which periodic motions exist over frequency."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow import __version__
+from flipflow.compiled import status
+from flipflow.continuation import arclength
+from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
+from flipflow.errors import InputError, SampledContactWarning
+from flipflow.model.arguments import check_interval
+from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.periodic.balance_solver import BalanceSolver, SampledSolver
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.options import (
+    HarmonicBalance,
+    Method,
+    PiecewiseExact,
+    SampledHarmonicBalance,
+)
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.solver import STEP_SHARE, Real, Solver, Traced
+from flipflow.periodic.stability import (
+    UNDETERMINED,
+    beyond_where_rising,
+    full_turn,
+    saddle_side,
+    stability_words,
+)
+
+SETTLING_TURNS = 4000
+SCAN_POINTS = 2000
+SAMPLED = (
+    "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
+    "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
+)
+
+
+def frequency_response(
+    machine: Machine, omega: tuple[float, float], method: Method | None = None
+) -> Branch:
+    """Follow the periodic motions of a machine over an interval of frequency.
+
+    The branch is the one reached from below: it starts from the motion that hangs together with
+    the contact-free one at lower frequency, and is followed through its folds by pseudo-arclength
+    until it leaves the interval. Every point has its stability and error, every special point is
+    refined. Motions detached from this branch are not seen.
+
+    Parameters
+    ----------
+    machine
+        Whatever has ``.system()``: a screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        The interval (low, high) in rad/s.
+    method
+        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`;
+        :class:`~flipflow.SampledHarmonicBalance` only to reproduce what others do.
+
+    Returns
+    -------
+    Branch
+        Its ``status`` says whether the whole interval was covered.
+
+    Raises
+    ------
+    InputError
+        For an interval that is empty, reversed or absurd, and for a machine without damping.
+
+    Warns
+    -----
+    SampledContactWarning
+        When the method samples the contact force; the branch has the same sentence as a note.
+    """
+    low, high = check_interval(omega)
+    method = method or PiecewiseExact()
+    if not isinstance(method, Method):
+        raise InputError("method", method, "give ff.PiecewiseExact() or ff.HarmonicBalance(3)")
+    solver = solver_for(system_of(machine), method)
+    course = arclength.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK
+    )
+    if isinstance(solver, SampledSolver):
+        warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
+    return followed(machine, method, solver, course)
+
+
+def followed(machine: Machine, method: Method, solver: Solver, course: arclength.Course) -> Branch:
+    """The branch over ``course`` with stability and special points."""
+    traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
+    return described(machine, method, solver, traced)
+
+
+def described(machine: Machine, method: Method, solver: Solver, traced: Traced) -> Branch:
+    """Stability and special points of traced motions."""
+    if traced.omega.size == 0:
+        return _finished(machine, method, solver, traced, np.zeros((0, 0, 0)), [], [])
+    maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
+    eigenvalues = solver.eigenvalues(traced, maps)
+    found, notes = find_special_points(solver, traced, maps, eigenvalues)
+    return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
+
+
+def solver_for(
+    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
+) -> Solver:
+    """The solver of a method. Without stops both are the closed form, which shooting meets."""
+    symmetric = system.symmetric if half_turn is None else half_turn
+    springs = system.with_bonded().springs
+    if isinstance(method, HarmonicBalance) and springs:
+        return BalanceSolver(system, method.harmonics, half_turn=symmetric)
+    if isinstance(method, SampledHarmonicBalance) and springs:
+        if any(spring.law != "paper" for spring in springs):
+            raise InputError(
+                "law", "compression-only", "only the paper's law has a smooth form to sample"
+            )
+        return SampledSolver(
+            system, method.harmonics, method.samples, method.sharpness, half_turn=symmetric
+        )
+    return ExactSolver(system, half_turn=symmetric, turns=turns)
+
+
+def method_of(solver: Solver) -> Method:
+    """The method that a solver belongs to, with the usual number of points."""
+    if isinstance(solver, SampledSolver):
+        return SampledHarmonicBalance(solver.order, solver.samples, solver.sharpness)
+    if isinstance(solver, BalanceSolver):
+        return HarmonicBalance(solver.order)
+    return PiecewiseExact()
+
+
+def first_unknowns(solver: Solver, omega: float) -> Real:
+    """Unknowns of the motion at ``omega`` that is reached from below.
+
+    Where no lower frequency touches a stop that is the contact-free motion. Otherwise the branch
+    is followed up from a frequency without contact, and where there is none, the machine is let
+    settle from rest.
+    """
+    lower = lowest_contact(solver, omega)
+    if lower is None:
+        return contact_free_unknowns(solver, omega)
+    while lower > 1e-3 * omega:
+        lower *= 0.96
+        if contact_free(solver, lower):
+            course = arclength.Course(
+                lower, omega, (omega - lower) / 50, STEP_SHARE, 1.0, arclength.QUICK
+            )
+            traced = solver.trace(contact_free_unknowns(solver, lower), lower, course)
+            if traced.code == status.REACHED_UPPER:
+                return np.asarray(traced.u[-1])
+            break
+    return settled_unknowns(solver, omega)
+
+
+def lowest_contact(solver: Solver, omega: float) -> float | None:
+    """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
+    scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
+    X = solver.builder.contact_free(scan)
+    beyond = np.zeros(scan.size, dtype=bool)
+    for spring in solver.builder.springs:
+        beyond |= np.abs(X @ spring.direction) >= min(spring.gaps)
+    return float(scan[beyond][0]) if beyond.any() else None
+
+
+def contact_free(solver: Solver, omega: float) -> bool:
+    """Whether the linear motion at ``omega`` stays within all gaps."""
+    X = solver.builder.contact_free(np.array([omega]))[0]
+    return all(abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs)
+
+
+def contact_free_unknowns(solver: Solver, omega: float) -> Real:
+    """The solver's unknowns of the linear motion."""
+    X = solver.builder.contact_free(np.array([omega]))[0]
+    if isinstance(solver, BalanceSolver):
+        u = np.zeros(solver.unknowns)
+        at = int(np.flatnonzero(solver.harmonics == 1)[0])
+        D = np.array([spring.direction for spring in solver.builder.springs])
+        m = D.shape[0]
+        begin = 2 * m * at if solver.harmonics[0] != 0 else m + 2 * m * (at - 1)
+        A = D @ X
+        u[begin : begin + 2 * m] = np.stack([A.real, A.imag], axis=1).ravel()
+        return u
+    return np.concatenate([X.real, (1j * omega * X).real])
+
+
+def settled_unknowns(solver: Solver, omega: float) -> Real:
+    """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
+    exact = (
+        solver if isinstance(solver, ExactSolver) else ExactSolver(solver.system, half_turn=False)
+    )
+    z = exact.settled(np.zeros(exact.unknowns), omega, SETTLING_TURNS)
+    if exact is solver:
+        return z
+    point = exact.solve(z, omega)
+    return solver.unknowns_from(exact.motion(z if point is None else point.u, omega))
+
+
+def _finished(
+    machine: Machine,
+    method: Method,
+    solver: Solver,
+    traced: Traced,
+    maps: Real,
+    found: list[Found],
+    notes: list[str],
+    eigenvalues: NDArray[np.complex128] | None = None,
+) -> Branch:
+    if eigenvalues is None:
+        eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
+    side = saddle_side(traced.tangent[:, -1], eigenvalues) if eigenvalues.size else None
+    beyond = beyond_where_rising(traced.tangent[:, -1], eigenvalues)
+    special = tuple(
+        SpecialPoint(
+            one.kind,
+            Orbit(machine, one.point, word_of(one.kind)),
+            one.index + one.share,
+            one.spring,
+            one.side,
+        )
+        for one in found
+    )
+    return Branch(
+        machine=machine,
+        method=method,
+        solver=solver,
+        traced=traced,
+        return_maps=maps,
+        saddle_side_at_start=beyond,
+        multipliers=full_turn(eigenvalues, half_turn=solver.half_turn),
+        stability=stability_words(eigenvalues, side),
+        special_points=special,
+        status=BranchStatus.from_code(traced.code),
+        notes=(*([SAMPLED] if isinstance(solver, SampledSolver) else []), *notes),
+        version=__version__,
+    )
+
+
+def word_of(kind: str) -> str | None:
+    """Where stability changes the motion is neither; elsewhere its multipliers tell."""
+    return UNDETERMINED if kind in STABILITY_CHANGES else None

@@ -1,0 +1,107 @@
+"""What every problem offers to the arc-length loop: residual, signature, depth, scale.
+
+Dispatch is by problem type at compile time. A compiled function handed over as an argument would
+be compiled anew in every process. The plain functions serve where compiling is switched off.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.types import NamedTuple as NamedTupleType
+
+from flipflow.compiled.compile import chosen_by_type
+from flipflow.dynamics.plan import Real
+from flipflow.periodic.balance import balance_residual, series_scale
+from flipflow.periodic.sampled import (
+    Sampled,
+    passages,
+    sampled_depths,
+    sampled_residual,
+    sampled_scale,
+)
+from flipflow.periodic.series import Balance, contact_count, series_depths
+from flipflow.periodic.shooting import (
+    Shooting,
+    crossings,
+    flow_depths,
+    shooting_residual,
+    state_scale,
+)
+
+_RESIDUAL: dict[type, Any] = {
+    Shooting: shooting_residual,
+    Balance: balance_residual,
+    Sampled: sampled_residual,
+}
+_SIGNATURE: dict[type, Any] = {Shooting: crossings, Balance: contact_count, Sampled: passages}
+_DEPTHS: dict[type, Any] = {
+    Shooting: flow_depths,
+    Balance: series_depths,
+    Sampled: sampled_depths,
+}
+_SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale, Sampled: sampled_scale}
+
+
+def residual(problem: Any, u: Real, omega: float, r: Real, J: Real) -> int:
+    """Write the residual r(u, omega) and J = [dr/du, dr/d omega]; return a status."""
+    return int(_RESIDUAL[type(problem)](problem, u, omega, r, J))
+
+
+def signature(problem: Any) -> int:
+    """A number that changes when the contacts of the last residual's motion change."""
+    return int(_SIGNATURE[type(problem)](problem))
+
+
+def depths(problem: Any, omega: float, depth: Real) -> None:
+    """Write the greatest depth in m beyond each gap, (m, 2), of the last residual's motion."""
+    _DEPTHS[type(problem)](problem, omega, depth)
+
+
+def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
+    """Write the size of each unknown."""
+    _SCALE[type(problem)](problem, u, omega, scale)
+
+
+def _kind(problem: Any) -> Any:
+    return problem.instance_class if isinstance(problem, NamedTupleType) else None
+
+
+@chosen_by_type(residual)
+def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
+    chosen = _RESIDUAL[_kind(problem)]
+
+    def run(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
+        return chosen(problem, u, omega, r, J)
+
+    return run
+
+
+@chosen_by_type(signature)
+def _signature(problem: Any) -> Any:
+    chosen = _SIGNATURE[_kind(problem)]
+
+    def run(problem: Any) -> Any:
+        return chosen(problem)
+
+    return run
+
+
+@chosen_by_type(depths)
+def _depths(problem: Any, omega: Any, depth: Any) -> Any:
+    chosen = _DEPTHS[_kind(problem)]
+
+    def run(problem: Any, omega: Any, depth: Any) -> Any:
+        return chosen(problem, omega, depth)
+
+    return run
+
+
+@chosen_by_type(unknown_scale)
+def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
+    chosen = _SCALE[_kind(problem)]
+
+    def run(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
+        return chosen(problem, u, omega, scale)
+
+    return run

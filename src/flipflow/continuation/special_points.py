@@ -1,0 +1,320 @@
+"""Special points of a finished branch: found from the signs of test functions, then refined.
+
+Every test function is a smooth number along the branch: the tangent's share in omega (fold),
+det(I + map) (loss of symmetry or period doubling), prod (1 - lambda_i lambda_j) (Neimark-Sacker),
+and the depth of each contact. A zero is refined on corrected points of the branch, never
+interpolated. Two zeros within one step leave a dip without a change of sign: every dip is followed
+to its bottom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from flipflow.continuation.confirm import ExactBeside, unconfirmed_note
+from flipflow.continuation.follow import FOLD as OF_FOLD
+from flipflow.continuation.follow import SHARE_TOLERANCE
+from flipflow.errors import IncompleteError
+from flipflow.periodic.balance_solver import BalanceSolver
+from flipflow.periodic.solver import Point, Real, Solver, Traced, eigenvalues_of
+from flipflow.periodic.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
+
+DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
+BOTTOM_STEPS = 15
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+FOLD = "fold"
+CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
+SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Neimark-Sacker"
+STABILITY_CHANGES = (FOLD, SYMMETRY, DOUBLING, NEIMARK_SACKER)
+
+
+class Follower(Protocol):
+    """Whatever can solve for a point between two of the branch it has followed."""
+
+    def between(self, traced: Any, p: int, share: float) -> Point:
+        """The branch's point at ``share`` of the way from point p to point p + 1."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A refined special point: after branch point ``index``, at ``share`` of the step."""
+
+    kind: str
+    index: int
+    share: float
+    point: Point
+    spring: int = -1
+    side: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One test function: its values at the branch points and anywhere between.
+
+    ``suspects`` are steps without a change of sign that may hide two zeros all the same;
+    ``zero`` finds one between two shares of a step where kernels know the test.
+    """
+
+    kind: str
+    values: Real
+    evaluate: Callable[[Point], float]
+    spring: int = -1
+    side: int = 0
+    suspects: tuple[int, ...] = ()
+    zero: Callable[[int, float, float], tuple[float, Point]] | None = None
+
+
+def find_special_points(
+    solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
+) -> tuple[list[Found], list[str]]:
+    """All special points in branch order, and a sentence for each that could not be refined."""
+    tests = [*_map_tests(solver, traced, maps, eigenvalues), *_contact_tests(solver, traced)]
+    found, notes = zeros_of(tests, solver, traced)
+    if isinstance(solver, BalanceSolver) and solver.confirmed:
+        side = saddle_side(traced.tangent[:, -1], eigenvalues)
+        return _confirmed(ExactBeside(solver, traced), found, notes, side)
+    return found, notes
+
+
+def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Found], list[str]]:
+    """Zeros of test functions in branch order, and a sentence for each that was not refined."""
+    found: list[Found] = []
+    notes: list[str] = []
+    for test in tests:
+        for p, low, high in _brackets(solver, traced, test, notes):
+            try:
+                found.append(_refine(solver, traced, test, p, low, high))
+            except IncompleteError as error:
+                notes.append(f"{test.kind}: {error}")
+    kept = sorted((one for one in found if _is_real(one)), key=lambda one: (one.index, one.share))
+    return kept, notes
+
+
+def _confirmed(
+    beside: ExactBeside, found: list[Found], notes: list[str], side: NDArray[np.bool_]
+) -> tuple[list[Found], list[str]]:
+    """Special points of a series that the exact motions beside it show; notes of the others."""
+    positions = np.array([one.index + one.share for one in found])
+    shown = np.ones(len(found), dtype=bool)
+    for kind in STABILITY_CHANGES:
+        ours = np.flatnonzero([one.kind == kind for one in found])
+        if not ours.size:
+            continue
+        ends = np.array([-1.0, *positions[ours], beside.traced.omega.size])
+        room = np.minimum(ends[1:-1] - ends[:-2], ends[2:] - ends[1:-1])
+        shown[ours] = (
+            beside.folds_shown(positions[ours], side)
+            if kind == FOLD
+            else [
+                beside.crosses(*at, _TEST[kind]) for at in zip(positions[ours], room, strict=True)
+            ]
+        )
+        if kind in _ALONG:
+            for i, steps in zip(ours, room, strict=True):
+                shown[i] = shown[i] or beside.passes(positions[i], steps, _ALONG[kind])
+        omegas = [found[i].point.omega for i in ours if not shown[i]]
+        notes += [unconfirmed_note(kind, omegas)] if omegas else []
+    return [one for one, kept in zip(found, shown, strict=True) if kept], notes
+
+
+def _minus_one_test(point: Point) -> float:
+    return float(determinant_plus(point.return_map))
+
+
+def _neimark_sacker_test(point: Point) -> float:
+    return float(neimark_sacker(point.eigenvalues))
+
+
+def _fold_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
+    return traced.tangent[:, -1]
+
+
+def _neimark_sacker_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
+    return neimark_sacker(eigenvalues_of(maps))
+
+
+# Both stand where a branch turns, and where no exact motion has the speed of the series.
+_ALONG: dict[str, Callable[[Traced, Real], Real]] = {
+    FOLD: _fold_along,
+    NEIMARK_SACKER: _neimark_sacker_along,
+}
+_TEST: dict[str, Callable[[Point], float]] = {
+    SYMMETRY: _minus_one_test,
+    DOUBLING: _minus_one_test,
+    NEIMARK_SACKER: _neimark_sacker_test,
+}
+
+
+def _map_tests(
+    solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
+) -> list[Test]:
+    fold = traced.tangent[:, -1] / traced.course.omega_step
+    flips = determinant_plus(maps)
+    hidden = partial(_plunges, arc=_arc(traced), signature=traced.signature)
+    kind = SYMMETRY if solver.half_turn else DOUBLING
+    return [
+        Test(
+            FOLD,
+            fold,
+            lambda point: point.omega_tangent,
+            suspects=hidden(fold),
+            zero=partial(solver.zero_between, traced, OF_FOLD),
+        ),
+        Test(kind, flips, _minus_one_test, suspects=hidden(flips)),
+        Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
+    ]
+
+
+def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
+    """Greatest depth beyond each gap over the turn; one side serves for a symmetric motion."""
+    springs = solver.builder.springs
+    if not springs:
+        return []
+    tests = []
+    for j, spring in enumerate(springs):
+        for at, side in enumerate((1, -1)):
+            gap = spring.gaps[at]
+            if np.isinf(gap) or (side < 0 and solver.half_turn):
+                continue
+
+            def evaluate(point: Point, j: int = j, side: int = side, gap: float = gap) -> float:
+                least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
+                return float((most[0, j] if side > 0 else -least[0, j]) - gap)
+
+            depth = traced.depth[:, j, at]
+            zero = partial(solver.zero_between, traced, 2 * j + at)
+            tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side, zero=zero))
+    return tests
+
+
+def _brackets(
+    solver: Follower, traced: Any, test: Test, notes: list[str]
+) -> list[tuple[int, float, float]]:
+    """Steps (p, low share, high share) within which the test changes sign."""
+    values = test.values
+    sign = np.sign(values)
+    brackets = [(int(p), 0.0, 1.0) for p in np.flatnonzero(sign[1:] * sign[:-1] < 0.0)]
+    suspects = [*((p - 1, p) for p in _dips(values)), *((p,) for p in test.suspects)]
+    settled: set[int] = set()
+    for steps in suspects:
+        for start in steps:
+            if start in settled:
+                break
+            try:
+                bottom = _bottom(solver, traced, test, start, plunges=len(steps) == 1)
+            except IncompleteError as error:
+                notes.append(f"{test.kind}: {error}")
+                continue
+            if bottom is not None:
+                brackets += [(start, 0.0, bottom), (start, bottom, 1.0)]
+                settled.add(start)
+                break
+    return brackets
+
+
+def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> tuple[int, ...]:
+    """Steps with contact and no change of sign which the slope at one end carries the test across.
+
+    A motion without contact has the eigenvalues of the linear machine, all within the circle.
+    """
+    slope = np.diff(values) / np.diff(arc)
+    step = np.diff(arc)[1:-1]
+    first, last = values[1:-2], values[2:-1]
+    ahead, behind = first + slope[:-2] * step, last - slope[2:] * step
+    over = (first * last > 0.0) & ((ahead * first < 0.0) | (behind * last < 0.0))
+    touches = (signature[1:-2] != 0) | (signature[2:-1] != 0)
+    return tuple(int(p) + 1 for p in np.flatnonzero(over & touches))
+
+
+def _arc(traced: Traced) -> Real:
+    """Length along the branch at its points, in steps."""
+    size = np.abs(traced.u).max(axis=0, initial=0.0) * traced.course.u_step
+    shape = traced.u / np.where(size > 0.0, size, 1.0)
+    scaled = np.column_stack([shape, traced.omega / traced.course.omega_step])
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1))])
+
+
+def _dips(values: Real) -> list[int]:
+    """Interior points where |test| is least and by its neighbours may fall to nothing."""
+    inner = np.abs(values[1:-1])
+    before, after = np.abs(values[:-2]), np.abs(values[2:])
+    same = (np.sign(values[:-2]) == np.sign(values[1:-1])) & (
+        np.sign(values[2:]) == np.sign(values[1:-1])
+    )
+    least = same & (inner <= before) & (inner < after)
+    curvature = before - 2.0 * inner + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bottom = inner - (after - before) ** 2 / (8.0 * curvature)
+    low = LOW * float(np.abs(values).max(initial=0.0))
+    sharp = inner < SHARP_DIP * np.minimum(before, after)
+    deep = (bottom < DIP * inner) | (inner < low) | sharp
+    return [int(p) + 1 for p in np.flatnonzero(least & deep)]
+
+
+def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool) -> float | None:
+    """Share in step p where the test has the other sign, None when it never has.
+
+    A plunge that is nowhere between lower than at the ends has ended.
+    """
+    sign = float(np.sign(test.values[p]))
+    low, high = 0.0, 1.0
+
+    def height(share: float) -> float:
+        return sign * test.evaluate(solver.between(traced, p, share))
+
+    if plunges:
+        first, last = np.abs(test.values[p : p + 2])
+        heights = [first, *(height(share) for share in QUARTERS[1:-1]), last]
+        lowest = int(np.argmin(heights))
+        if lowest in (0, len(QUARTERS) - 1):
+            return None
+        low, high = QUARTERS[lowest - 1], QUARTERS[lowest + 1]
+    best = minimize_scalar(
+        height, bounds=(low, high), method="bounded", options={"maxiter": BOTTOM_STEPS}
+    )
+    return float(best.x) if best.fun < 0.0 else None
+
+
+def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high: float) -> Found:
+    """Root of the test on corrected points between two shares of step p."""
+    if test.zero is not None:
+        share, point = test.zero(p, low, high)
+    else:
+        share, point = _zero_between(solver, traced, test, p, low, high)
+    kind = test.kind
+    if kind == CONTACT_BEGIN:
+        deeper = test.values[p + 1] > 0.0 if high == 1.0 else test.values[p] < 0.0
+        kind = CONTACT_BEGIN if deeper == (point.omega_tangent > 0.0) else CONTACT_END
+    return Found(kind, p, share, point, test.spring, test.side)
+
+
+def _zero_between(
+    solver: Follower, traced: Any, test: Test, p: int, low: float, high: float
+) -> tuple[float, Point]:
+    """Share and point of the root, by a test that only Python can evaluate."""
+    last: dict[float, Point] = {}
+
+    def value(share: float) -> float:
+        if share in (0.0, 1.0):
+            return float(test.values[p + int(share)])
+        last[share] = solver.between(traced, p, share)
+        return test.evaluate(last[share])
+
+    share = float(brentq(value, low, high, xtol=SHARE_TOLERANCE, rtol=1e-12))
+    return share, last[share] if share in last else solver.between(traced, p, share)
+
+
+def _is_real(found: Found) -> bool:
+    """A product of two real eigenvalues passing one also zeroes the Neimark-Sacker test."""
+    if found.kind != NEIMARK_SACKER:
+        return True
+    return has_unit_pair(found.point.eigenvalues)

@@ -1,0 +1,199 @@
+"""Where branches meet: motions that lose their symmetry or double their period.
+
+A motion of an even number n of periods may come from one of n / 2; a leaning motion of a machine
+that is its own mirror image comes from a symmetric one. Where they meet, the return map of the
+parent has the eigenvalue -1, over n / 2 periods, or over half of n with sign.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from flipflow.compiled import status
+from flipflow.continuation import arclength
+from flipflow.continuation.predictor_corrector import CLOSE, NEAR, SAME
+from flipflow.errors import IncompleteError
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.solver import Point, Real, Solver, Traced
+from flipflow.periodic.stability import determinant_plus
+
+FINER = (1.0, 0.05, 0.01, 0.001)
+SMALL = 1e-3
+SECANT, SECANT_MOST = 1e-6, 30
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Traced motions, and the motions of the parent branch that they end in."""
+
+    traced: Traced
+    start: Point | None = None
+    end: Point | None = None
+
+
+def parent_of(solver: Solver) -> ExactSolver | None:
+    """The solver of the motions from which this solver's may branch off; None where there is none.
+
+    A series of one forcing period whose machine is symmetric holds odd harmonics only.
+    """
+    if not isinstance(solver, ExactSolver) or solver.half_turn:
+        return None
+    if solver.turns % 2 == 0:
+        return ExactSolver(solver.system, half_turn=False, turns=solver.turns // 2)
+    if solver.system.symmetric and solver.system.springs:
+        return ExactSolver(solver.system, half_turn=True, turns=solver.turns)
+    return None
+
+
+def child_of(parent: Solver) -> ExactSolver:
+    """The solver of the motions that branch off at an eigenvalue -1 of the parent's return map."""
+    turns = parent.turns if parent.half_turn else 2 * parent.turns
+    return ExactSolver(parent.system, half_turn=False, turns=turns)
+
+
+def image(parent: ExactSolver, u: Real, omega: float) -> Real:
+    """The state half a child's period later, mirrored where the parent's motions are.
+
+    The parent's motions are their own images; a child's image is another motion of its branch.
+    NaN where the flow does not end.
+    """
+    found = parent.residual(u, omega)
+    return np.full(u.size, np.nan) if found is None else np.asarray(u + found[0])
+
+
+def distance_to(state: Real, other: Real, omega: float) -> float:
+    """Largest difference of two states, velocities over omega, as a share of the larger motion."""
+    size = state.size // 2
+    weight = np.concatenate([np.ones(size), np.full(size, 1.0 / omega)])
+    reach = max(np.abs(state * weight).max(), np.abs(other * weight).max())
+    return float(np.abs((state - other) * weight).max() / reach)
+
+
+def meeting(parent: Solver, u: Real, omega: float) -> Point | None:
+    """The parent's motion near (u, omega) whose return map has the eigenvalue -1, by secants."""
+    last = [parent.solve(u, omega)]
+
+    def value(w: float) -> float:
+        guess = last[-1]
+        point = None if guess is None or w <= 0.0 else parent.solve(guess.u, w)
+        last.append(point)
+        return math.nan if point is None else float(determinant_plus(point.return_map))
+
+    answer = root_scalar(
+        value, method="secant", x0=omega, x1=omega * (1.0 + SECANT), xtol=1e-12 * omega,
+        maxiter=SECANT_MOST,
+    )  # fmt: skip
+    guess = last[-1]
+    if not (answer.converged and math.isfinite(answer.root)) or guess is None:
+        return None
+    return parent.solve(guess.u, float(answer.root))
+
+
+def follow_until_meeting(
+    solver: Solver, u: Real, omega: float, course: arclength.Course
+) -> tuple[Traced, Point | None]:
+    """Follow the branch one way until it leaves the interval or meets its parent.
+
+    With the motion where it does. A long step may land on the parent, which looks like the child
+    where the two meet: the branch is then followed anew with finer steps.
+    """
+    parent = parent_of(solver)
+    if parent is None:
+        return solver.trace(u, omega, course), None
+    for finer in FINER:
+        traced = solver.trace(u, omega, course._replace(u_step=course.u_step * finer))
+        if traced.omega.size == 0:
+            return traced, None
+        apart = _distances(parent, traced)
+        landed = np.flatnonzero(apart < SAME)
+        if landed.size == 0 or landed[0] == 0:
+            break
+    # The sign of det [J; tangent] changes where two branches cross and nowhere else.
+    crossed = np.flatnonzero(np.diff(np.sign(traced.record.side[: traced.omega.size])))
+    stalled = [apart.size - 1] if traced.code == status.STEP_TOO_SMALL else []
+    beyond = [int(p) - 1 for p in landed[:1] if p > 0]
+    for p in sorted({*map(int, crossed), *stalled, *beyond}):
+        if apart[p] > NEAR and p not in beyond:
+            continue
+        state, at = traced.u[p], float(traced.omega[p])
+        point = meeting(parent, (state + image(parent, state, at)) / 2.0, at)
+        if point is not None:
+            # Beside the meeting two branches are one to rounding; nothing is read off there.
+            clear = int(np.flatnonzero(apart[: p + 1] > CLOSE).max(initial=0))
+            return Traced.recorded(traced.record, clear + 1, status.FOLLOWED, traced.course), point
+    return traced, None
+
+
+def follow_both_ways(solver: Solver, u: Real, omega: float, course: arclength.Course) -> Followed:
+    """Follow the branch from (u, omega) both ways; it begins at its end of lower omega."""
+    up, down = course._replace(direction=1.0), course._replace(direction=-1.0)
+    if omega == course.upper:
+        return _one_way(*follow_until_meeting(solver, u, omega, down), None)
+    ahead, end = follow_until_meeting(solver, u, omega, up)
+    if ahead.code == status.CLOSED or ahead.omega.size == 0 or omega == course.lower:
+        return _one_way(ahead, end, None)
+    back, start = follow_until_meeting(solver, u, omega, down)
+    if ahead.omega[-1] < back.omega[-1]:
+        return Followed(ahead.reversed_into(back), end, start)
+    return Followed(back.reversed_into(ahead), start, end)
+
+
+def follow_away(child: Solver, first: Point, course: arclength.Course, parent: Point) -> Followed:
+    """Follow a child branch from a motion beside its parent, away from it."""
+    direction = math.copysign(1.0, first.omega - parent.omega)
+    traced, end = follow_until_meeting(
+        child, first.u, first.omega, course._replace(direction=direction)
+    )
+    return _one_way(traced, end, parent)
+
+
+def _one_way(traced: Traced, end: Point | None, start: Point | None) -> Followed:
+    """A trace that began at an end of its branch."""
+    ended = traced.code in (status.REACHED_UPPER, status.REACHED_LOWER)
+    return Followed(replace(traced, code=status.FOLLOWED if ended else traced.code), start, end)
+
+
+def _distances(parent: ExactSolver, traced: Traced) -> Real:
+    """How far each motion is from being one of the parent's."""
+    return np.array(
+        [
+            distance_to(u, image(parent, u, float(omega)), float(omega))
+            for u, omega in zip(traced.u, traced.omega, strict=True)
+        ]
+    )
+
+
+def beside(child: Solver, parent: Point, course: arclength.Course) -> Point:
+    """The child's motion a small way along the critical eigenvector of the parent's return map.
+
+    Solved for in the plane of fixed amplitude, omega being unknown.
+
+    Raises
+    ------
+    IncompleteError
+        When no such motion is found.
+    """
+    own = parent_of(child)
+    values, vectors = np.linalg.eig(parent.return_map)
+    critical = vectors[:, np.abs(values + 1.0).argmin()].real
+    n = critical.size // 2
+    weight = np.concatenate([np.ones(n), np.full(n, 1.0 / parent.omega)])
+    away = SMALL * critical / np.abs(critical * weight).max()
+    away *= max(np.abs(parent.u * weight).max(), child.length)
+    record = child.new_branch(2)
+    record.u[:] = parent.u, parent.u + away
+    record.omega[:] = parent.omega
+    record.tangent[:] = np.append(away, 0.0)
+    chord = Traced.recorded(record, 2, status.OK, course)
+    point = child.between(chord, 0, 1.0)
+    mirrored = parent.u if own is None else image(own, point.u, point.omega)
+    moved = distance_to(point.u, mirrored, point.omega)
+    if not SMALL < moved < NEAR:
+        raise IncompleteError(
+            f"no motion was found beside the one at {parent.omega:.6g} rad/s that branches off"
+        )
+    return point

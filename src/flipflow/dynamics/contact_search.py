@@ -1,0 +1,323 @@
+"""Motion at the gaps as a sum of exponentials, and the certified search for the next contact.
+
+Both a free flight of the exact flow and a truncated Fourier series are, at gap j,
+
+    y_j(t) = offset_j + Re sum_i amplitude_ji exp(rate_i t),
+
+so one search serves both. With a bound |h''| <= B on all that is still to come, a switching
+function of value h > 0 and slope h' cannot vanish before the positive root of
+h + h' s - B s^2 / 2. Stepping to that root again and again converges to the first zero and can
+never jump over one, nor over two close together. With a bound B3 on the third derivative besides,
+the curvature over the next S seconds is known to stay above h'' - B3 S, which close to a zero is
+a far smaller B: the search then converges like the third power.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.plan import Complex, Int, Real
+
+# A spring that is open, engaged on a side, or (+-2) beyond its gap without a force.
+OPEN, PLUS, MINUS = 0, 1, -1
+NOTHING = -9
+MAX_SEARCH = 20_000
+AT_GAP = 4e-16
+SMALLEST_STEP = 1e-11
+
+
+class GapMotion(NamedTuple):
+    """Sum of exponentials at m gaps; the scratch in which a segment or series is written."""
+
+    offset: Real  # (m,)
+    amplitude: Complex  # (m, r)
+    rate: Complex  # (r,)
+    factor: Complex  # (r,) exp(rate t), filled by ``exponentials``
+    decay: Real  # (r,) its size
+    curve: Complex  # (m, r) amplitude rate^2, filled by ``prepare_search``
+    bound: Real  # (m, r) its size
+    size: Real  # (r,) |rate|
+    turn: Complex  # (r,) terms of one gap, carried from sample to sample by ``extremes``
+    ratio: Complex  # (r,) what carries them
+    spacing: Int  # (1,) 0: any rates; s > 0: rates are i (r_0, r_0 + s, r_0 + 2 s, ...)
+
+
+class Contact(NamedTuple):
+    """The law of each spring, as the search needs it."""
+
+    gap_plus: Real
+    gap_minus: Real
+    stiffness: Real
+    damping: Real
+    clipped: Int
+
+
+@kernel(inline=True)
+def exponential(x: complex) -> complex:
+    """exp(x) without the special cases of infinite arguments."""
+    size = math.exp(x.real)
+    return complex(size * math.cos(x.imag), size * math.sin(x.imag))
+
+
+@kernel(inline=True)
+def modulus(x: complex) -> float:
+    """|x| without the care for overflow that makes abs() slow."""
+    return math.sqrt(x.real * x.real + x.imag * x.imag)
+
+
+@kernel(inline=True)
+def reciprocal(x: complex) -> complex:
+    """1 / x without the care for overflow that makes complex division slow."""
+    square = x.real * x.real + x.imag * x.imag
+    return complex(x.real / square, -x.imag / square)
+
+
+@kernel(inline=True)
+def prepare_search(motion: GapMotion, count: int) -> None:
+    """Fill what the search needs beside the amplitudes."""
+    for i in range(count):
+        motion.size[i] = modulus(motion.rate[i])
+    for j in range(motion.offset.shape[0]):
+        for i in range(count):
+            motion.curve[j, i] = motion.amplitude[j, i] * motion.rate[i] * motion.rate[i]
+            motion.bound[j, i] = modulus(motion.amplitude[j, i]) * motion.size[i] * motion.size[i]
+
+
+@kernel(inline=True)
+def exponentials(motion: GapMotion, count: int, t: float) -> None:
+    """factor_i = exp(rate_i t) and its size, by powers where the rates are equally spaced."""
+    if motion.spacing[0] > 0:
+        motion.factor[0] = exponential(motion.rate[0] * t)
+        motion.decay[0] = 1.0
+        ratio = exponential(1j * (motion.spacing[0] * t))
+        for i in range(1, count):
+            motion.factor[i] = motion.factor[i - 1] * ratio
+            motion.decay[i] = 1.0
+    else:
+        for i in range(count):
+            size = math.exp(motion.rate[i].real * t) if motion.rate[i].real != 0.0 else 1.0
+            angle = motion.rate[i].imag * t
+            motion.factor[i] = complex(size * math.cos(angle), size * math.sin(angle))
+            motion.decay[i] = size
+
+
+@kernel(inline=True)
+def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float]:
+    """y and y' at the time of the last ``exponentials``."""
+    y = motion.offset[j]
+    v = 0.0
+    for i in range(count):
+        term = motion.amplitude[j, i] * motion.factor[i]
+        y += term.real
+        v += term.real * motion.rate[i].real - term.imag * motion.rate[i].imag
+    return y, v
+
+
+@kernel(inline=True)
+def gap_bounds(motion: GapMotion, count: int, j: int) -> tuple[float, float, float]:
+    """y'', and bounds on the second and third derivative from now on."""
+    curvature = 0.0
+    second = 0.0
+    third = 0.0
+    for i in range(count):
+        term = motion.curve[j, i] * motion.factor[i]
+        curvature += term.real
+        share = motion.bound[j, i] * motion.decay[i]
+        second += share
+        third += share * motion.size[i]
+    return curvature, second, third
+
+
+@kernel(inline=True)
+def push_state(
+    motion: GapMotion, contact: Contact, count: int, j: int, gap: float
+) -> tuple[float, float, float, float, float]:
+    """The unclipped force k (y - gap) + c y': value, rate, curvature, bounds on what comes."""
+    k, c = contact.stiffness[j], contact.damping[j]
+    force = k * (motion.offset[j] - gap)
+    slope = 0.0
+    curvature = 0.0
+    second = 0.0
+    third = 0.0
+    for i in range(count):
+        term = motion.amplitude[j, i] * motion.factor[i] * (k + c * motion.rate[i])
+        force += term.real
+        term *= motion.rate[i]
+        slope += term.real
+        term *= motion.rate[i]
+        curvature += term.real
+        size = modulus(term)
+        second += size
+        third += size * motion.size[i]
+    return force, slope, curvature, second, third
+
+
+@kernel(inline=True)
+def root_of_bound(h: float, slope: float, bound: float) -> float:
+    """Least s > 0 with h + slope s - bound s^2 / 2 = 0, infinite where there is none."""
+    inside = slope * slope + 2.0 * bound * h
+    if inside < 0.0:
+        return math.inf
+    root = math.sqrt(inside)
+    if slope < 0.0:
+        return 2.0 * h / (root - slope)
+    return (slope + root) / bound if bound > 0.0 else math.inf
+
+
+@kernel(inline=True)
+def safe_step(h: float, slope: float, curvature: float, second: float, third: float) -> float:
+    """No zero of h comes before this time; second and third bound its derivatives from now on."""
+    h = max(h, 0.0)
+    certain = root_of_bound(h, slope, second)
+    reach = root_of_bound(h, slope, -curvature)
+    if reach > 8.0 * certain:
+        reach = 4.0 * certain
+    return max(certain, min(reach, root_of_bound(h, slope, third * reach - curvature)))
+
+
+@kernel(inline=True)
+def next_change(
+    motion: GapMotion,
+    contact: Contact,
+    state: NDArray[np.int64],
+    count: int,
+    horizon: float,
+    fired: int,
+) -> tuple[float, int, int]:
+    """Time of the next change of contact, the spring, and its new state.
+
+    ``fired`` names the spring whose change began this segment (-1: none): its switching function
+    stands at zero there and its sign is known, so rounding must not fire it again. Returns
+    (horizon, -1, 0) when nothing happens before, and a time of NaN when the search does not end.
+    """
+    t = 0.0
+    least = SMALLEST_STEP * horizon
+    prepare_search(motion, count)
+    for _ in range(MAX_SEARCH):
+        exponentials(motion, count, t)
+        step = math.inf
+        for j in range(state.shape[0]):
+            low, new = spring_change(motion, contact, state[j], count, j)
+            if new != NOTHING and not (t == 0.0 and j == fired):
+                # The last step may have been the smallest one: Newton takes back what it overshot.
+                return max(t + max(min(low, least), -least), 0.0), j, new
+            step = min(step, max(low, least))
+        t += step
+        if t >= horizon:
+            return horizon, -1, 0
+    return math.nan, -1, 0
+
+
+@kernel(inline=True)
+def spring_change(
+    motion: GapMotion, contact: Contact, state: int, count: int, j: int
+) -> tuple[float, int]:
+    """Time before which spring j cannot change, or Newton's last step and its new state."""
+    y, v = gap_state(motion, count, j)
+    a, second, third = gap_bounds(motion, count, j)
+    scale = abs(y) + abs(motion.offset[j])
+    if state == OPEN:
+        up = contact.gap_plus[j] - y
+        down = y + contact.gap_minus[j]
+        return _sooner(
+            _approach(up, -v, -a, second, third, scale, PLUS),
+            _approach(down, v, a, second, third, scale, MINUS),
+        )
+    side = 1.0 if state > 0 else -1.0
+    gap = contact.gap_plus[j] if state > 0 else -contact.gap_minus[j]
+    leave = _approach(side * (y - gap), side * v, side * a, second, third, scale, OPEN)
+    if contact.clipped[j] == 0:
+        return leave
+    force, slope, bend, low2, low3 = push_state(motion, contact, count, j, gap)
+    push_scale = contact.stiffness[j] * scale + contact.damping[j] * abs(v)
+    if abs(state) == 1:
+        # A clipped spring leaves by losing its force, which always comes before the gap.
+        return _approach(side * force, side * slope, side * bend, low2, low3, push_scale, 2 * state)
+    again = _approach(
+        -side * force, -side * slope, -side * bend, low2, low3, push_scale, state // 2
+    )
+    return _sooner(leave, again)
+
+
+@kernel(inline=True)
+def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]:
+    """Whichever changes now, else whichever cannot change for the shorter time."""
+    if one[1] != NOTHING or (two[1] == NOTHING and one[0] <= two[0]):
+        return one
+    return two
+
+
+@kernel(inline=True)
+def _approach(
+    h: float, slope: float, curvature: float, second: float, third: float, scale: float, target: int
+) -> tuple[float, int]:
+    """Safe step towards the zero of h; Newton's step and ``target`` once it is there."""
+    if h == math.inf:
+        return math.inf, NOTHING
+    if h <= AT_GAP * scale and slope < 0.0:
+        return -h / slope, target
+    return safe_step(h, slope, curvature, second, third), NOTHING
+
+
+@kernel
+def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[float, float]:
+    """Smallest and largest y_j over [0, duration]: its ends and every zero of y' between samples.
+
+    The samples stand a third of a radian apart at the mean frequency of the motion; a pair of
+    zeros between two of them could hide only a ripple smaller than what the samples resolve.
+    """
+    weight = 0.0
+    for i in range(count):
+        weight += modulus(motion.amplitude[j, i])
+    exponentials(motion, count, 0.0)
+    _, second, _ = gap_bounds(motion, count, j)
+    frequency = math.sqrt(second / weight) if weight > 0.0 else 0.0
+    samples = min(1 + int(3.0 * frequency * duration), 4000)
+    step = duration / samples
+    for i in range(count):
+        motion.turn[i] = motion.amplitude[j, i]
+        motion.ratio[i] = exponential(motion.rate[i] * step)
+    low, high = math.inf, -math.inf
+    v_before = 0.0
+    for k in range(samples + 1):
+        y, v = motion.offset[j], 0.0
+        for i in range(count):
+            term = motion.turn[i]
+            y += term.real
+            v += term.real * motion.rate[i].real - term.imag * motion.rate[i].imag
+            motion.turn[i] = term * motion.ratio[i]
+        low, high = min(low, y), max(high, y)
+        if k > 0 and v * v_before < 0.0:
+            y = _stationary_value(motion, count, j, (k - 1) * step, k * step, v_before, v)
+            low, high = min(low, y), max(high, y)
+        v_before = v
+    return low, high
+
+
+@kernel(inline=True)
+def _stationary_value(
+    motion: GapMotion, count: int, j: int, a: float, b: float, v_a: float, v_b: float
+) -> float:
+    """y where y' = 0 in [a, b]: Newton from the chord's zero, kept inside the bracket."""
+    t = a + (b - a) * v_a / (v_a - v_b)
+    y = 0.0
+    for _ in range(60):
+        exponentials(motion, count, t)
+        y, v = gap_state(motion, count, j)
+        curvature, _, _ = gap_bounds(motion, count, j)
+        if v * v_a > 0.0:
+            a = t
+        else:
+            b = t
+        new = t - v / curvature if curvature != 0.0 else 0.5 * (a + b)
+        if not a < new < b:
+            new = 0.5 * (a + b)
+        if abs(new - t) < 1e-8 * (abs(t) + b - a):
+            break
+        t = new
+    return y

@@ -1,0 +1,175 @@
+"""The machine without contact, in closed form: amplitudes, phases, natural frequencies, peaks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+
+from flipflow.dynamics.contact_free import complex_amplitudes
+from flipflow.errors import InputError
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
+
+Real = NDArray[np.float64]
+SCAN_POINTS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class LinearResponse:
+    """Response of the machine as long as no stop is touched; bonded stops count as springs.
+
+    Parameters
+    ----------
+    machine
+        What was analysed.
+    system
+        The same as matrices.
+    omega
+        Frequencies in rad/s, (n,).
+    """
+
+    machine: Machine
+    system: MechanicalSystem
+    omega: Real
+
+    def __repr__(self) -> str:
+        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        return f"LinearResponse({self.omega.size} frequencies, {ends})"
+
+    @cached_property
+    def complex_amplitudes(self) -> NDArray[np.complex128]:
+        """X of x = Re(X exp(i omega t)) in m, (n, N)."""
+        return complex_amplitudes(self.system, self.omega)
+
+    def amplitude(self, which: Coordinate) -> Real:
+        """Amplitude of a coordinate in m, (n,)."""
+        return np.abs(self.complex_amplitudes @ self.system.coordinate(which))
+
+    def phase(self, which: Coordinate) -> Real:
+        """Phase of a coordinate against the force in rad, (n,); positive: it leads."""
+        return np.angle(self.complex_amplitudes @ self.system.coordinate(which))
+
+    @cached_property
+    def natural_frequencies(self) -> Real:
+        """Undamped natural frequencies in rad/s, rising, (N,): K v = w^2 M v."""
+        return natural_frequencies(self.machine)
+
+    @cached_property
+    def shapes(self) -> Real:
+        """Mode shapes as columns, (N, N), each scaled to a largest entry of 1."""
+        shapes = _modes(self.system)[1]
+        largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None], axis=0)
+        return np.asarray(shapes / largest)
+
+    def peaks(self, which: Coordinate) -> tuple[tuple[float, float], ...]:
+        """Resonance peaks of a coordinate as (omega in rad/s, amplitude in m), rising in omega."""
+        vector = self.system.coordinate(which)
+        top = 2.0 * float(self.natural_frequencies[-1])
+        grid = np.linspace(top / SCAN_POINTS, top, SCAN_POINTS)
+
+        def amplitude(omega: ArrayLike) -> Real:
+            X = complex_amplitudes(self.system, np.atleast_1d(np.asarray(omega, float)))
+            return np.abs(X @ vector)
+
+        values = amplitude(grid)
+        inner = (values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])
+        found = []
+        for k in np.flatnonzero(inner) + 1:
+            best = minimize_scalar(
+                lambda w: -float(amplitude(w)[0]),
+                bounds=(grid[k - 1], grid[k + 1]),
+                method="bounded",
+                options={"xatol": 1e-9 * grid[k]},
+            )
+            found.append((float(best.x), float(-best.fun)))
+        return tuple(found)
+
+    @property
+    def omega_ea(self) -> float | None:
+        """w_ea in rad/s, where main and relative amplitude are equal; None for other machines."""
+        return equal_amplitude_frequency(self.machine)
+
+    @property
+    def omega_ar(self) -> float | None:
+        """w_ar in rad/s, the antiresonance of the main frame; None for other machines."""
+        return antiresonance_frequency(self.machine)
+
+
+def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
+    """Response without contact over frequencies: (K - w^2 M + i w C) X = F.
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        Frequencies in rad/s, (n,) or one.
+
+    Raises
+    ------
+    InputError
+        For frequencies that are not finite or not above 0, and without any damping.
+    """
+    try:
+        frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, "give frequencies in rad/s, one or (n,)") from None
+    if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies > 0.0)):
+        raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
+    system = system_of(machine).with_bonded()
+    system.require_damping()
+    return LinearResponse(machine, system, frequencies)
+
+
+def equal_amplitude_frequency(machine: Machine) -> float | None:
+    """w_ea = k2 / sqrt(2 m2 k2 - c2^2) in rad/s; None where damping rules it out (paper, 2.2).
+
+    A stop without gap adds its stiffness and damping to k2 and c2.
+    """
+    if not isinstance(machine, FlipFlowScreen):
+        return None
+    (k2, c2), m2 = _between_frames(machine), machine.floating_mass
+    square = 2.0 * m2 * k2 - c2**2
+    return k2 / math.sqrt(square) if square > 0.0 else None
+
+
+def antiresonance_frequency(machine: Machine) -> float | None:
+    """w_ar = sqrt(k2 / m2) in rad/s (paper, 2.2); k2 as of :func:`equal_amplitude_frequency`."""
+    if not isinstance(machine, FlipFlowScreen):
+        return None
+    return math.sqrt(_between_frames(machine)[0] / machine.floating_mass)
+
+
+def _between_frames(screen: FlipFlowScreen) -> tuple[float, float]:
+    """Stiffness and damping between the frames as long as no gap closes."""
+    k2, c2 = screen.shear_stiffness, screen.shear_damping
+    if not screen.stop().bonded:
+        return k2, c2
+    return k2 + screen.stop_stiffness, c2 + screen.stop_damping
+
+
+def natural_frequencies(machine: Machine) -> Real:
+    """Undamped natural frequencies in rad/s without contact, rising, (N,): K v = w^2 M v."""
+    return np.sqrt(np.maximum(_modes(machine.system().with_bonded())[0], 0.0))
+
+
+def bonded_natural_frequencies(machine: Machine) -> Real:
+    """Undamped natural frequencies in rad/s with every stop engaged, rising, (N,)."""
+    system = machine.system()
+    K = system.K.copy()
+    for spring in system.springs:
+        if spring.acts:
+            K += spring.stiffness * np.outer(spring.direction, spring.direction)
+    squares = scipy.linalg.eigh(K, system.M, eigvals_only=True)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+
+def _modes(system: MechanicalSystem) -> tuple[Real, Real]:
+    squares, shapes = scipy.linalg.eigh(system.K, system.M)
+    return np.asarray(squares), np.asarray(shapes)

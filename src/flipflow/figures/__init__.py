@@ -1,1 +1,0 @@
-"""Figures: neutral descriptions made from results, and two renderers, page and print."""

@@ -1,1 +1,0 @@
-"""Methods: options, machines flattened into plans, solvers of periodic motions."""

@@ -1,0 +1,1 @@
+"""Periodic motions: shooting, harmonic balance, multipliers, and what is read off a motion."""

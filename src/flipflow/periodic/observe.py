@@ -1,0 +1,286 @@
+"""What is read off periodic motions, point by point along a branch: the only loops over points."""
+
+from __future__ import annotations
+
+import math
+
+from flipflow.compiled import status
+from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import lu_factor, lu_solve
+from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
+from flipflow.dynamics.flow import run_flow, segment_motion, segment_state
+from flipflow.dynamics.plan import Complex, Int, Real
+from flipflow.periodic.balance import contact_forces, prepare_receptance
+from flipflow.periodic.sampled import Sampled, sampled_forces
+from flipflow.periodic.series import Balance, contact_integrals, record_contacts, set_series
+from flipflow.periodic.shooting import Shooting, shoot
+
+ROUNDING = 1e-9
+
+
+@kernel(entry=True)
+def observe_flow(
+    problem: Shooting,
+    states: Real,
+    omega: Real,
+    waiting: int,
+    coordinate: Real,
+    motion: GapMotion,
+    low: Real,
+    high: Real,
+    first: Complex,
+    code: Int,
+) -> None:
+    """Extremes and first harmonic of coordinates (G, N) over the turn from each state (P, 2 N).
+
+    ``waiting`` turns pass first; the state after them replaces the one given. ``motion`` is
+    scratch for G coordinates; low, high, first are (P, G), code (P,). The record of the last
+    turn stays in the problem's flow.
+    """
+    plan, flow = problem.plan, problem.flow
+    for p in range(omega.shape[0]):
+        turn = problem.fraction * 2.0 * math.pi / omega[p]
+        code[p] = _turn_after(problem, states[p], omega[p], turn, waiting)
+        if code[p] == status.MISSING_CONFIGURATION:
+            break
+        if code[p] != status.OK:
+            continue
+        for g in range(coordinate.shape[0]):
+            low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
+        for e in range(flow.segments[0]):
+            segment_motion(plan, flow, e, omega[p], coordinate, motion)
+            count = plan.mode_count[flow.slot[e]] + 1
+            prepare_search(motion, count)
+            for g in range(coordinate.shape[0]):
+                smallest, largest = extremes(motion, count, g, flow.length[e])
+                low[p, g] = min(low[p, g], smallest)
+                high[p, g] = max(high[p, g], largest)
+                share = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega[p])
+                first[p, g] += 2.0 * share / turn
+
+
+@kernel(inline=True)
+def _turn_after(problem: Shooting, z: Real, omega: float, turn: float, waiting: int) -> int:
+    """Record a turn after ``waiting`` turns from z, which becomes the state at its start."""
+    flow = problem.flow
+    for k in range(flow.z.shape[0]):
+        flow.z[k] = z[k]
+    for _ in range(waiting):
+        code = run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
+        if code != status.OK:
+            return code
+    for k in range(flow.z.shape[0]):
+        z[k] = flow.z[k]
+    return run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
+
+
+@kernel(inline=True)
+def first_harmonic(
+    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
+) -> complex:
+    """int y exp(-i omega t) dt over one segment, in closed form."""
+    turn = exponential(-1j * omega * start)
+    total = motion.offset[g] * _mean_of_exponential(-1j * omega, length)
+    for i in range(count):
+        amplitude = motion.amplitude[g, i]
+        total += 0.5 * amplitude * _mean_of_exponential(motion.rate[i] - 1j * omega, length)
+        conjugate = motion.rate[i].conjugate() - 1j * omega
+        total += 0.5 * amplitude.conjugate() * _mean_of_exponential(conjugate, length)
+    return total * turn
+
+
+@kernel
+def _mean_of_exponential(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt."""
+    if abs(rate) * length < 1e-9:
+        return length * (1.0 + 0.5 * rate * length)
+    return (exponential(rate * length) - 1.0) / rate
+
+
+@kernel(entry=True)
+def observe_series(
+    motion: GapMotion, offset: Real, amplitude: Complex, low: Real, high: Real
+) -> None:
+    """Extremes over a turn of series with means (P, G) and amplitudes (P, G, n_h)."""
+    count = motion.rate.shape[0]
+    for p in range(offset.shape[0]):
+        for g in range(offset.shape[1]):
+            motion.offset[0] = offset[p, g]
+            for i in range(count):
+                motion.amplitude[0, i] = amplitude[p, g, i]
+            prepare_search(motion, count)
+            low[p, g], high[p, g] = extremes(motion, count, 0, 2.0 * math.pi)
+
+
+@kernel(entry=True)
+def describe_balance(problem: Balance, u: Real, omega: Real, series: Complex, code: Int) -> None:
+    """Displacement harmonics (P, n_h, N) of points; the last one's contacts stay recorded."""
+    for p in range(omega.shape[0]):
+        set_series(problem, u[p])
+        prepare_receptance(problem, omega[p])
+        code[p] = record_contacts(problem, omega[p])
+        if code[p] == status.MISSING_CONFIGURATION:
+            break
+        if code[p] != status.OK:
+            continue
+        contact_integrals(problem, omega[p])
+        contact_forces(problem, omega[p])
+        _displacements(problem, omega[p], series[p])
+
+
+@kernel(entry=True)
+def describe_sampled(problem: Sampled, u: Real, omega: Real, series: Complex) -> None:
+    """Displacement harmonics (P, n_h, N) of points under the sampled force."""
+    for p in range(omega.shape[0]):
+        set_series(problem.balance, u[p])
+        prepare_receptance(problem.balance, omega[p])
+        sampled_forces(problem, omega[p])
+        _displacements(problem.balance, omega[p], series[p])
+
+
+@kernel(inline=True)
+def _displacements(problem: Balance, omega: float, series: Complex) -> None:
+    """X_h = delta_h1 X_linear - (K - h^2 omega^2 M + i h omega C)^-1 D^T Lambda_h by modes."""
+    plan = problem.plan
+    n = series.shape[1]
+    for a in range(problem.harmonics.shape[0]):
+        h = problem.harmonics[a]
+        for k in range(n):
+            series[a, k] = problem.flow.drive[0, k] if h == 1 else 0.0
+        for i in range(plan.mode_count[0]):
+            push = 0j
+            push_conj = 0j
+            for j in range(problem.linear.shape[0]):
+                push += plan.gap_pick[i, j] * problem.force[a, j]
+                push_conj += plan.gap_pick[i, j].conjugate() * problem.force[a, j]
+            push /= 1j * h * omega - plan.rate[0, i]
+            push_conj /= 1j * h * omega - plan.rate[0, i].conjugate()
+            for k in range(n):
+                series[a, k] -= plan.right[0, k, i] * push
+                if plan.weight[0, i] == 2.0:
+                    series[a, k] -= plan.right[0, k, i].conjugate() * push_conj
+
+
+@kernel(entry=True)
+def corrected(
+    problem: Shooting,
+    states: Real,
+    omega: Real,
+    harmonics: Int,
+    series: Complex,
+    A: Real,
+    pivot: Int,
+    delta: Real,
+    maps: Real,
+    error: Real,
+    code: Int,
+) -> None:
+    """Return map and distance in m of motions from the exact ones, by a Newton step of the flow.
+
+    delta = (I - M)^-1 (flow(z) - z) corrects the state (P, 2 N) in place. The map (P, 2 N, 2 N),
+    with the problem's sign, is the one at the corrected state. The distance is the largest
+    difference of any displacement between the corrected flow and the series (P, n_h, N); without
+    harmonics it is that of the states. Where a second step does not shrink, as next to a fold,
+    the distance is infinite and the map the one at the state given; NaN where the flow fails.
+    """
+    for p in range(omega.shape[0]):
+        code[p], first, last = _correct_state(
+            problem, states[p], omega[p], A, pivot, delta, maps[p]
+        )
+        if code[p] == status.MISSING_CONFIGURATION:
+            break
+        error[p] = first + last
+        if harmonics.shape[0] > 0 and math.isfinite(error[p]):
+            error[p] = _distance(problem, omega[p], harmonics, series[p], last)
+
+
+@kernel(inline=True)
+def _correct_state(
+    problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real, out: Real
+) -> tuple[int, float, float]:
+    """A Newton step of z in place unless it is rounding; its length and the next's, or infinity."""
+    size = delta.shape[0]
+    n = size // 2
+    for k in range(size):
+        for c in range(size):
+            out[k, c] = math.nan
+    code, first = _newton_step(problem, z, omega, A, pivot, delta)
+    if code != status.OK:
+        return code, math.inf, math.inf
+    _store_map(problem, out)
+    # Steps within the rounding of the flow do not shrink; relative to the motion they are nothing.
+    size_of_motion = 0.0
+    for k in range(n):
+        size_of_motion = max(size_of_motion, abs(z[k]), abs(z[n + k]) / omega)
+    rounding = ROUNDING * size_of_motion
+    if first <= rounding:
+        return code, 0.0, first
+    if not math.isfinite(first):
+        return code, math.inf, math.inf
+    for k in range(size):
+        z[k] += delta[k]
+    code, last = _newton_step(problem, z, omega, A, pivot, delta)
+    if code != status.OK:
+        return code, first, math.inf
+    if not last <= max(0.5 * first, rounding):
+        return code, first, math.inf
+    _store_map(problem, out)
+    return code, first, last
+
+
+@kernel(inline=True)
+def _store_map(problem: Shooting, out: Real) -> None:
+    """The return map that was carried last."""
+    for k in range(out.shape[0]):
+        for c in range(out.shape[0]):
+            out[k, c] = problem.sign * problem.map[k, c]
+
+
+@kernel(inline=True)
+def _newton_step(
+    problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real
+) -> tuple[int, float]:
+    """delta = (I - M)^-1 (flow(z) - z); its largest displacement, infinite when I - M is singular.
+
+    The map M stays in problem.map, without the problem's sign.
+    """
+    size = A.shape[0]
+    n = size // 2
+    code = shoot(problem, z, omega, problem.map)
+    if code != status.OK:
+        return code, math.inf
+    for i in range(size):
+        delta[i] = problem.sign * problem.flow.z[i] - z[i]
+        for j in range(size):
+            A[i, j] = -problem.sign * problem.map[i, j]
+        A[i, i] += 1.0
+    if not lu_factor(A, pivot):
+        return code, math.inf
+    lu_solve(A, pivot, delta)
+    length = 0.0
+    for k in range(n):
+        length = max(length, abs(delta[k]), abs(delta[n + k]) / omega)
+    return code, length
+
+
+@kernel(inline=True)
+def _distance(
+    problem: Shooting, omega: float, harmonics: Int, series: Complex, rest: float
+) -> float:
+    """Largest |x_flow - x_series| over samples of the recorded flow, plus the last correction."""
+    plan, flow = problem.plan, problem.flow
+    n = flow.z.shape[0] // 2
+    turn = problem.fraction * 2.0 * math.pi / omega
+    largest = 0.0
+    for e in range(flow.segments[0]):
+        samples = 2 + int(128.0 * flow.length[e] / turn)
+        for s in range(samples):
+            elapsed = flow.length[e] * s / samples
+            segment_state(plan, flow, e, omega, elapsed, flow.z, problem.rate)
+            for k in range(n):
+                value = flow.z[k]
+                for a in range(harmonics.shape[0]):
+                    angle = 1j * (harmonics[a] * omega * (flow.start[e] + elapsed))
+                    value -= (series[a, k] * exponential(angle)).real
+                largest = max(largest, abs(value))
+    return largest + rest

@@ -1,0 +1,307 @@
+"""One periodic motion and everything that can be read off it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.dynamics.motion import ContactInterval, Motion
+from flipflow.errors import InputError
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
+from flipflow.periodic.solver import Point
+from flipflow.periodic.stability import STABLE, full_turn, stability_words
+
+Real = NDArray[np.float64]
+GAUSS_POINTS = 24
+POINTS_PER_TURN = 720
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic motion of a machine under forcing at ``omega``.
+
+    Time is counted from the moment the unbalance points along +x; SI units; arrays over time are
+    (n,). Coordinates are named ("main", "floating", "relative") or a degree of freedom's index.
+
+    Parameters
+    ----------
+    machine
+        What moves so.
+    point
+        The motion as its solver left it.
+    word
+        Stability where the branch knows it better than the multipliers do.
+    """
+
+    machine: Machine
+    point: Point
+    word: str | None = None
+
+    def __repr__(self) -> str:
+        return f"Orbit({self.omega:.6g} rad/s, {self.stability})"
+
+    @property
+    def unknowns(self) -> Real:
+        """The solver's unknowns at the motion."""
+        return self.point.u
+
+    @property
+    def omega(self) -> float:
+        """Forcing frequency in rad/s."""
+        return self.point.omega
+
+    @property
+    def return_map(self) -> Real:
+        """Linearised return map of the state over a turn, or over half a turn with sign."""
+        return self.point.return_map
+
+    @property
+    def system(self) -> MechanicalSystem:
+        """The machine."""
+        return self.point.solver.system
+
+    @property
+    def periods(self) -> int:
+        """Number of forcing periods after which the motion repeats."""
+        return self.point.solver.turns
+
+    @property
+    def period(self) -> float:
+        """Duration in s after which the motion repeats."""
+        return 2.0 * np.pi * self.periods / self.omega
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion as a function of time, with its record of contacts."""
+        return self.point.solver.motion(self.unknowns, self.omega)
+
+    @cached_property
+    def t(self) -> Real:
+        """Times in s over the period, both ends included, (721,)."""
+        return np.linspace(0.0, self.period, POINTS_PER_TURN * self.periods + 1)
+
+    @cached_property
+    def state(self) -> Real:
+        """State (x, x') at t = 0, shape (2 N,)."""
+        return np.asarray(self.point.solver.states(self.unknowns[None], np.array([self.omega]))[0])
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers of the full period, largest modulus first, (2 N,)."""
+        return full_turn(self.point.eigenvalues, half_turn=self.point.solver.half_turn)
+
+    @cached_property
+    def monodromy(self) -> Real:
+        """Linearised flow over the full period, (2 N, 2 N), saltation included."""
+        M = self.return_map
+        return np.asarray(M @ M if self.point.solver.half_turn else M)
+
+    @cached_property
+    def stability(self) -> str:
+        """Whether it returns after a small disturbance: "stable", "unstable", "undetermined"."""
+        if self.word is not None:
+            return self.word
+        return str(stability_words(self.point.eigenvalues[None], None)[0])
+
+    @property
+    def stable(self) -> bool:
+        """Whether ``stability`` is "stable"."""
+        return self.stability == STABLE
+
+    @cached_property
+    def error(self) -> float:
+        """Estimated distance in m from the exact motion; infinite where nothing is promised."""
+        return float(self.point.solver.errors(self.unknowns[None], np.array([self.omega]))[0])
+
+    def displacement(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
+        """Displacement of a coordinate in m at times t (default: :attr:`t`)."""
+        return self._along(which, t, 0)
+
+    def velocity(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
+        """Velocity of a coordinate in m/s at times t (default: :attr:`t`)."""
+        return self._along(which, t, 1)
+
+    def acceleration(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
+        """Acceleration of a coordinate in m/s^2 at times t; it jumps where a damped stop acts."""
+        return self._along(which, t, 2)
+
+    def stop_force(self, spring: int = 0, t: ArrayLike | None = None) -> Real:
+        """Force H of a stop in N at times t (default: :attr:`t`), positive against +d."""
+        times = np.mod(self.t if t is None else np.asarray(t, float), self.period)
+        flat = np.atleast_1d(times).ravel()
+        return self._force(spring, flat, self.motion.piece(flat)).reshape(times.shape)
+
+    def amplitude(self, which: Coordinate) -> float:
+        """Half peak-to-peak of a coordinate over the period, in m; from the exact extremes."""
+        low, high, _ = self._extremes(which)
+        return (high - low) / 2.0
+
+    def mean(self, which: Coordinate) -> float:
+        """Middle between the greatest and the least value of a coordinate, in m."""
+        low, high, _ = self._extremes(which)
+        return (high + low) / 2.0
+
+    def phase(self, which: Coordinate) -> float:
+        """Phase of the first harmonic against the exciting force in rad; positive: it leads."""
+        _, _, first = self._extremes(which)
+        return float(np.angle(first))
+
+    @property
+    def contact_intervals(self) -> tuple[ContactInterval, ...]:
+        """Every touch of every stop with a gap within the period."""
+        kept = self._kept
+        return tuple(
+            replace(touch, spring=kept[touch.spring]) for touch in self.motion.contact_intervals()
+        )
+
+    def contact_share(self, spring: int = 0) -> float:
+        """Share of the period during which a stop is touched, 0 to 1; 1 for one without gap."""
+        if self._spring(spring).bonded:
+            return 1.0
+        touches = (c for c in self.contact_intervals if c.spring == spring)
+        return sum(c.end - c.start for c in touches) / self.period
+
+    def peak(self, quantity: Callable[[Real, Real, Real, Real], Real]) -> float:
+        """Greatest |quantity| over the period.
+
+        ``quantity(t, x, v, a)`` gets times (K,) and displacement, velocity, acceleration (K, N) on
+        a grid with both sides of every change of contact, and returns (K,); the summit between
+        grid points is that of a parabola through the three highest, within one piece.
+        """
+        t, piece, *states = self._grid
+        return _summit(np.abs(quantity(t, *states)), piece)
+
+    def stop_force_peak(self, spring: int = 0) -> float:
+        """Greatest |H| of a stop over the period in N."""
+        t, piece, *_ = self._grid
+        return _summit(np.abs(self._force(spring, t, piece)), piece)
+
+    def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
+        """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
+
+        With ``spring``, only the time is counted during which that stop is engaged: damping times
+        this is the power that the stop takes.
+        """
+        vector = self.system.coordinate(which)
+
+        def square(t: Real, piece: NDArray[np.intp]) -> Real:
+            rate = self.motion.piece_derivative(t, piece, 1) @ vector
+            engaged = 1.0 if spring is None else np.abs(self._side(spring, piece))
+            return np.asarray(rate**2 * engaged)
+
+        return self._mean(square)
+
+    def input_power(self) -> float:
+        """Mean power that the excitation feeds in, W: only the first harmonic takes part in it."""
+        force = self.system.excitation
+        F = force.vector * self.omega**force.power
+        _, _, first = self.point.solver.extremes(
+            self.unknowns[None], np.array([self.omega]), np.eye(self.system.size)
+        )
+        return float(0.5 * (F.conj() @ (1j * self.omega * first[0])).real)
+
+    def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
+        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+        total = 0.0
+        pieces = self.motion.pieces
+        for e, (start, length) in enumerate(zip(pieces.start, pieces.length, strict=True)):
+            # A free piece may last the whole turn and hold many harmonics: cut it up.
+            parts = 1 + int(16.0 * length / self.period)
+            for part in range(parts):
+                t = start + length * (part + (nodes + 1.0) / 2.0) / parts
+                values = function(t, np.full(t.size, e))
+                total += float(weights @ values) * length / (2.0 * parts)
+        return float(total / self.period)
+
+    def _along(self, which: Coordinate, t: ArrayLike | None, order: int) -> Real:
+        times = self.t if t is None else np.asarray(t, float)
+        return np.asarray(self.motion.derivative(times, order) @ self.system.coordinate(which))
+
+    @cached_property
+    def _grid(self) -> tuple[Real, NDArray[np.intp], Real, Real, Real]:
+        """Times, pieces, displacement, velocity, acceleration on the motion's own grid."""
+        t, piece = self.motion.samples()
+        x, v, a = (self.motion.piece_derivative(t, piece, order) for order in range(3))
+        return t, piece, x, v, a
+
+    @property
+    def touches(self) -> bool:
+        """Whether any stop carries a force during the period; one without gap always does."""
+        always = any(spring.bonded and spring.acts for spring in self._springs)
+        return always or bool(self.contact_intervals)
+
+    @cached_property
+    def _springs(self) -> tuple[ClearanceSpring, ...]:
+        """The springs of the machine as it was given."""
+        return self.machine.system().springs
+
+    @property
+    def _kept(self) -> list[int]:
+        """Numbers of the springs that can open and close: the motion knows no others."""
+        return [j for j, one in enumerate(self._springs) if one.acts and not one.bonded]
+
+    def _spring(self, number: int) -> ClearanceSpring:
+        count = len(self._springs)
+        if not 0 <= number < count:
+            raise InputError("spring", number, f"the machine has {count} springs, from 0 on")
+        return self._springs[number]
+
+    def _side(self, spring: int, piece: NDArray[np.intp]) -> NDArray[np.int64]:
+        """Side (+1, -1) on which a spring is engaged in each piece, 0 where it carries no force."""
+        if self._spring(spring).bonded:
+            return np.ones(piece.shape, np.int64)
+        if spring not in self._kept:
+            return np.zeros(piece.shape, np.int64)
+        state = self.motion.pieces.states[piece, self._kept.index(spring)]
+        return np.where(np.abs(state) == 1, state, 0)
+
+    def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
+        """Force of a spring of the machine as it was given."""
+        stop, side = self._spring(spring), self._side(spring, piece)
+        y = self.motion.piece_derivative(t, piece, 0) @ stop.direction
+        v = self.motion.piece_derivative(t, piece, 1) @ stop.direction
+        plus, minus = stop.gaps
+        gap = np.select([side == 1, side == -1], [plus, -minus])
+        return np.where(side == 0, 0.0, stop.stiffness * (y - gap) + stop.damping * v)
+
+    def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
+        vector = self.system.coordinate(which)[None]
+        low, high, first = self.point.solver.extremes(
+            self.unknowns[None], np.array([self.omega]), vector
+        )
+        return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
+
+
+def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
+    """State (x, x') from "rest", an orbit or numbers, (2 N,)."""
+    if isinstance(initial, Orbit):
+        if initial.state.size != 2 * size:
+            raise InputError("initial", initial, "give an orbit of this machine")
+        return initial.state
+    if isinstance(initial, str):
+        if initial != "rest":
+            raise InputError("initial", initial, 'give "rest", an orbit, or a state (x, x\')')
+        return np.zeros(2 * size)
+    remedy = f"give {2 * size} finite numbers, (x, x')"
+    try:
+        state = np.asarray(initial, float)
+    except (TypeError, ValueError):
+        raise InputError("initial", initial, remedy) from None
+    if state.shape != (2 * size,) or not np.isfinite(state).all():
+        raise InputError("initial", initial, remedy)
+    return state
+
+
+def _summit(values: Real, piece: NDArray[np.intp]) -> float:
+    """Top of the parabola through the highest sample and its neighbours in the same piece."""
+    k = int(values.argmax())
+    if k in (0, values.size - 1) or not piece[k - 1] == piece[k] == piece[k + 1]:
+        return float(values[k])
+    a, b, c = values[k - 1], values[k], values[k + 1]
+    curvature = a - 2.0 * b + c
+    return float(b - (c - a) ** 2 / (8.0 * curvature)) if curvature < 0.0 else float(b)

@@ -1,0 +1,114 @@
+"""Many motions of one machine, turn after turn: the only loops over lanes."""
+
+from __future__ import annotations
+
+import math
+
+from flipflow.compiled import status
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.flow import run_flow
+from flipflow.dynamics.plan import Int, Real
+from flipflow.periodic.shooting import Shooting
+
+NOT_SETTLED = -1
+
+
+@kernel
+def next_turn(problem: Shooting, omega: float) -> int:
+    """Carry flow.z over the problem's part of a turn, with its sign."""
+    duration = problem.fraction * 2.0 * math.pi / omega
+    code = run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
+    for k in range(problem.flow.z.shape[0]):
+        problem.flow.z[k] *= problem.sign
+        if code == status.OK and not math.isfinite(problem.flow.z[k]):
+            code = status.NOT_FINITE
+    return code
+
+
+@kernel
+def finish_turn(problem: Shooting, omega: float, begin: float) -> int:
+    """Carry flow.z from time ``begin`` to the end of the turn; at the start of it, nothing."""
+    flow = problem.flow
+    for k in range(flow.z.shape[0]):
+        if not math.isfinite(flow.z[k]):
+            return status.NOT_FINITE
+    if begin == 0.0:
+        return status.OK
+    duration = 2.0 * math.pi / omega - begin
+    return run_flow(problem.plan, flow, omega, begin, duration, problem.rate)
+
+
+@kernel(entry=True)
+def strobe(problem: Shooting, z: Real, omega: float, record: Real) -> int:
+    """States after 1, 2, ... turns from z into ``record`` (T, 2 N): a Poincare section."""
+    flow = problem.flow
+    for k in range(z.shape[0]):
+        flow.z[k] = z[k]
+    for turn in range(record.shape[0]):
+        code = next_turn(problem, omega)
+        if code != status.OK:
+            return code
+        for k in range(z.shape[0]):
+            record[turn, k] = flow.z[k]
+    return status.OK
+
+
+@kernel(entry=True)
+def settle_lanes(
+    problem: Shooting,
+    states: Real,
+    begin: Real,
+    omega: float,
+    centre: Real,
+    form: Real,
+    owner: Int,
+    most: int,
+    label: Int,
+    turns: Int,
+    code: Int,
+) -> None:
+    """Run every state (L, 2 N) until it is caught: label (L,) is the owner of what caught it.
+
+    Each state holds at its time ``begin`` (L,) within the first turn, and is first carried to the
+    end of that turn. Motion a catches what lies within (z - centre_a)^T form_a (z - centre_a) <= 1
+    at the end of a turn. A lane that nothing catches within ``most`` turns keeps the label
+    NOT_SETTLED. States end where they were caught.
+    """
+    flow = problem.flow
+    for lane in range(states.shape[0]):
+        for k in range(states.shape[1]):
+            flow.z[k] = states[lane, k]
+        turns[lane] = 0
+        label[lane] = NOT_SETTLED
+        code[lane] = finish_turn(problem, omega, begin[lane])
+        if code[lane] == status.OK:
+            label[lane] = caught(flow.z, centre, form, owner)
+        while code[lane] == status.OK and label[lane] == NOT_SETTLED and turns[lane] < most:
+            code[lane] = next_turn(problem, omega)
+            if code[lane] != status.OK:
+                break
+            turns[lane] += 1
+            label[lane] = caught(flow.z, centre, form, owner)
+        if code[lane] == status.MISSING_CONFIGURATION:
+            return
+        for k in range(states.shape[1]):
+            states[lane, k] = flow.z[k]
+
+
+@kernel
+def caught(z: Real, centre: Real, form: Real, owner: Int) -> int:
+    """Owner of the first motion whose neighbourhood holds z, or NOT_SETTLED."""
+    size = z.shape[0]
+    for a in range(centre.shape[0]):
+        value = 0.0
+        for i in range(size):
+            row = 0.0
+            for j in range(size):
+                row += form[a, i, j] * (z[j] - centre[a, j])
+            value += row * (z[i] - centre[a, i])
+            if not math.isfinite(value):
+                value = math.inf
+                break
+        if value <= 1.0:
+            return int(owner[a])
+    return NOT_SETTLED

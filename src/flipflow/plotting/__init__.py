@@ -1,0 +1,1 @@
+"""A neutral figure from each result, drawn by plotly or on paper."""

@@ -1,0 +1,181 @@
+"""Where panels, legend and labels go, in pixels: one geometry for both renderers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from flipflow.plotting.parts import Figure, Line, Panel
+
+WIDTH = 690  # the width of an A4 page within its margins, 96 pixels an inch
+FONT = 11
+CHARACTER = 5.9
+LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
+BOTTOM, LEFT, RIGHT = 40, 58, 14
+BARE_GAP, ROW_GAP = 26, 48
+LEGEND_MARK = 42
+SIDES = {0.0: "left", 1.0: "right"}  # flush ends of a horizontal line's label
+
+
+@dataclass(frozen=True)
+class Rect:
+    """A panel's axes: left and top from the upper left corner of the figure, width, height."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Label:
+    """Where the label of a vertical line stands: row above the axes, shift to the right."""
+
+    level: int
+    shift: float
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The figure laid out.
+
+    Parameters
+    ----------
+    rects
+        Axes of each panel.
+    labels
+        For each panel, where the label of each vertical line stands above it.
+    titles
+        For each panel, the height of its title's foot above the axes.
+    legend_top
+        Top of the legend.
+    """
+
+    rects: tuple[Rect, ...]
+    labels: tuple[dict[int, Label], ...]
+    titles: tuple[float, ...]
+    legend_top: float
+
+
+def arrange(figure: Figure) -> Geometry:
+    """Lay out a figure of :data:`WIDTH` pixels."""
+    columns = figure.columns
+    rows = [figure.panels[k : k + columns] for k in range(0, len(figure.panels), columns)]
+    spans = list(_columns(rows, figure.shares or (1.0,) * columns))
+    legend = LEGEND_ROW * legend_rows(figure)
+    heads = [_head(row, spans) for row in rows]
+    room = figure.height - legend - sum(heads) - BOTTOM - ROW_GAP * (len(rows) - 1)
+    height = max(room / len(rows), 20.0)
+    rects, labels, titles = [], [], []
+    top = float(legend)
+    for row, head in zip(rows, heads, strict=True):
+        top += head
+        for panel, (left, width) in zip(row, spans, strict=False):
+            rects.append(Rect(left, top, width, height))
+            labels.append(place_labels(panel, width))
+            titles.append(head - 6.0 - TITLE_ROW)
+        top += height + ROW_GAP
+    return Geometry(tuple(rects), tuple(labels), tuple(titles), 0.0)
+
+
+def legend_names(figure: Figure) -> list[str]:
+    """Entries of the legend, each once, in the order of their first appearance."""
+    names = [t.name for p in figure.panels for t in p.traces if t.legend]
+    names += [b.name for p in figure.panels for b in p.bars if b.legend]
+    return list(dict.fromkeys(names))
+
+
+def legend_columns(figure: Figure) -> int:
+    """Entries of the legend in a row."""
+    return _entries_in_a_row(legend_names(figure))
+
+
+def legend_rows(figure: Figure) -> int:
+    """Rows the legend needs; none where there is one entry only."""
+    return legend_lines(legend_names(figure))
+
+
+def legend_lines(names: Sequence[str]) -> int:
+    """Rows that a legend of these entries needs."""
+    return math.ceil(len(names) / _entries_in_a_row(names)) if len(names) > 1 else 0
+
+
+def _entries_in_a_row(names: Sequence[str]) -> int:
+    widest = max(map(len, names), default=0)
+    return max(int((WIDTH - RIGHT) / (LEGEND_MARK + CHARACTER * widest)), 1)
+
+
+def place_labels(panel: Panel, width: float) -> dict[int, Label]:
+    """Places for the labels of vertical lines, so that none covers another or is cut off.
+
+    Labels of two lines close together are pushed apart, the next ones go a row up.
+    """
+    marked = sorted((line.at, k) for k, line in enumerate(panel.lines) if _labelled(line))
+    if panel.x.bounds is None:
+        return {k: Label(0, 0.0) for _, k in marked}
+    low, high = panel.x.bounds
+    lines = [(at - low) / (high - low) * width for at, _ in marked]
+    halves = [CHARACTER * len(panel.lines[k].text) / 2.0 + 3.0 for _, k in marked]
+    middles = list(_apart(lines, halves, width))
+    ends: list[float] = []
+    labels: dict[int, Label] = {}
+    for (_, k), line, half, middle in zip(marked, lines, halves, middles, strict=True):
+        level = next((n for n, end in enumerate(ends) if middle - half >= end - 1.0), len(ends))
+        ends[level : level + 1] = [middle + half]
+        labels[k] = Label(level, middle - line)
+    return labels
+
+
+def _apart(lines: list[float], halves: list[float], width: float) -> Iterator[float]:
+    """Middles of labels: a label too close to the next moves left of its line, the next right."""
+    moved = False
+    for k, (line, half) in enumerate(zip(lines, halves, strict=True)):
+        middle = line
+        if moved:
+            middle, moved = line + half - 3.0, False
+        elif k + 1 < len(lines) and line + half > lines[k + 1] - halves[k + 1]:
+            middle, moved = line - half + 3.0, True
+        yield max(min(middle, width + RIGHT - half), half - 20.0)
+
+
+def _labelled(line: Line) -> bool:
+    return line.axis == "x" and bool(line.text)
+
+
+def _labels_height(labels: dict[int, Label]) -> float:
+    return float(LABEL_ROW * (max(one.level for one in labels.values()) + 1)) if labels else 0.0
+
+
+def _head(row: Sequence[Panel], spans: Sequence[tuple[float, float]]) -> float:
+    """Height above the axes of a row for labels and titles."""
+    labels = max(
+        _labels_height(place_labels(panel, width))
+        for panel, (_, width) in zip(row, spans, strict=False)
+    )
+    return labels + (TITLE_ROW if any(panel.title for panel in row) else 0.0) + 6.0
+
+
+def _columns(
+    rows: Sequence[Sequence[Panel]], shares: Sequence[float]
+) -> Iterator[tuple[float, float]]:
+    """Left edge and width of each column."""
+    lefts = [
+        max((_left(row[k]) for row in rows if k < len(row)), default=float(BARE_GAP))
+        for k in range(len(shares))
+    ]
+    lefts = [left if k == 0 else left + 6.0 for k, left in enumerate(lefts)]
+    room = WIDTH - RIGHT - sum(lefts)
+    left = 0.0
+    for share, own in zip(shares, lefts, strict=True):
+        left += own
+        width = room * share / sum(shares)
+        yield left, width
+        left += width
+
+
+def _left(panel: Panel) -> float:
+    """Room for the labels of the y axis."""
+    if panel.y.ticks:
+        return 14.0 + CHARACTER * max(len(word) for _, word in panel.y.ticks)
+    return float(LEFT if panel.y.title else BARE_GAP)

@@ -1,0 +1,270 @@
+"""The neutral figure: what is drawn, in the units of its axes, without a word on how.
+
+Builders make it from results; :mod:`flipflow.plotting.plotly` and :mod:`flipflow.plotting.print`
+draw it. Colours are named by what they mean; :mod:`flipflow.plotting.palette` says what they are.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.errors import InputError, StoreError
+
+Real = NDArray[np.float64]
+Role = Literal[
+    "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"
+]
+BandRole = Literal["allowed", "contact", "contact minus"]
+FORMATS = (".html", ".svg", ".pdf", ".png")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: label, unit, and where it shall begin and end or be ticked, if that is fixed."""
+
+    label: str
+    unit: str = ""
+    bounds: tuple[float, float] | None = None
+    ticks: tuple[tuple[float, str], ...] = ()
+
+    @property
+    def title(self) -> str:
+        """Label with the unit."""
+        return f"{self.label}, {self.unit}" if self.unit else self.label
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A line, a cloud of points, or the area between two lines.
+
+    Parameters
+    ----------
+    name
+        What it is called in the legend.
+    x, y
+        Coordinates (n,) in the units of the axes.
+    role
+        "stable" is drawn solid, "unstable" dashed, "undetermined" dotted; "case band" is the area
+        between ``lower`` and ``y``; "point" is drawn as symbols only; "beneath" is wide and pale,
+        for a line that another is laid over.
+    colour
+        Name in the palette.
+    symbol
+        Marks set at a few points of a line, so that lines differ without colour.
+    bold
+        Whether the line is the one to look at.
+    legend
+        Whether it stands in the legend.
+    lower
+        Lower edge of an area, (n,).
+    dash
+        Another dash than the role's.
+    x_also
+        x in other units, for the hover text: pairs of unit and values.
+    """
+
+    name: str
+    x: Real
+    y: Real
+    role: Role = "motion"
+    colour: str = "relative"
+    symbol: str | None = None
+    bold: bool = False
+    legend: bool = True
+    lower: Real | None = None
+    dash: str = ""
+    x_also: tuple[tuple[str, Real], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A grid of cells, each filled with the colour of its kind.
+
+    Parameters
+    ----------
+    x, y
+        Edges of the cells, (n + 1,) and (m + 1,), rising.
+    kind
+        Index into ``colours`` of each cell, (m, n).
+    colours
+        Names in the palette of fills for cells.
+    """
+
+    x: Real
+    y: Real
+    kind: NDArray[np.int64]
+    colours: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A horizontal bar from ``low`` to ``high`` at height ``y``; ``thickness`` in units of y."""
+
+    name: str
+    y: float
+    low: float
+    high: float
+    thickness: float = 0.7
+    colour: str = "relative"
+    hatch: str = ""
+    legend: bool = False
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A reference line across the panel at ``at`` on the x or y axis.
+
+    The label of a vertical line stands above the panel; that of a horizontal one stands on the
+    line, or ``under`` it, its middle at the share ``text_at`` of the panel's width; 0 and 1 are
+    flush.
+    """
+
+    axis: Literal["x", "y"]
+    at: float
+    text: str = ""
+    colour: str = "limit"
+    dash: str = "dot"
+    text_at: float = 1.0
+    under: bool = False
+
+
+@dataclass(frozen=True)
+class Band:
+    """A shaded strip across the panel from ``low`` to ``high`` of the x or y axis."""
+
+    axis: Literal["x", "y"]
+    low: float
+    high: float
+    role: BandRole = "allowed"
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """An arrow from (x0, y0) to (x1, y1)."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    colour: str = "jump"
+
+
+@dataclass(frozen=True)
+class Note:
+    """Text at a point; ``anchor`` is the side of the text that touches the point."""
+
+    x: float
+    y: float
+    text: str
+    anchor: Literal["left", "right", "center"] = "left"
+    colour: str = "jump"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes and all that is drawn into it; ``equal`` keeps both at the same scale."""
+
+    x: Axis
+    y: Axis
+    traces: tuple[Trace, ...] = ()
+    bars: tuple[Bar, ...] = ()
+    bands: tuple[Band, ...] = ()
+    lines: tuple[Line, ...] = ()
+    arrows: tuple[Arrow, ...] = ()
+    notes: tuple[Note, ...] = ()
+    cells: tuple[Cells, ...] = ()
+    title: str = ""
+    equal: bool = False
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One or more panels, row by row, with a title and a sentence that says what is seen.
+
+    Parameters
+    ----------
+    title, caption
+        What it is, and how it is to be read.
+    panels
+        At least one.
+    columns
+        Panels in a row.
+    height
+        Height in pixels at the width of an A4 page, 96 pixels an inch.
+    shares
+        Relative widths of the columns; empty for equal ones.
+    """
+
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    columns: int = 1
+    height: int = 360
+    shares: tuple[float, ...] = ()
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the figure to a file, in the format its ending names.
+
+        Parameters
+        ----------
+        path
+            ``.html`` is one interactive page that opens offline; ``.svg``, ``.pdf`` and ``.png``
+            are for print.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            For another ending.
+        StoreError
+            When the file cannot be written.
+        MissingExtra
+            When matplotlib is needed and not installed.
+        """
+        return write_rendered(path, FORMATS, self._rendered)
+
+    def _rendered(self, ending: str) -> bytes:
+        if ending == ".html":
+            from flipflow.plotting.plotly import page  # noqa: PLC0415  loads plotly
+
+            return page(self).encode()
+        from flipflow.plotting.print import printed  # noqa: PLC0415  loads matplotlib
+
+        return printed(self, ending.removeprefix("."))
+
+
+def write_rendered(
+    path: str | os.PathLike[str], formats: Sequence[str], rendered: Callable[[str], bytes]
+) -> Path:
+    """Write what ``rendered`` makes for the path's ending, one of ``formats``; the file.
+
+    Raises
+    ------
+    InputError
+        For another ending.
+    StoreError
+        When the file cannot be written.
+    """
+    target = Path(path)
+    ending = target.suffix.lower()
+    if ending not in formats:
+        raise InputError("path", str(path), f"give a name that ends in {', '.join(formats)}")
+    data = rendered(ending)
+    try:
+        target.write_bytes(data)
+    except OSError as error:
+        raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
+    return target

@@ -1,0 +1,212 @@
+"""Figures for print: vector or bitmap files by matplotlib, on the same geometry as the page."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from flipflow.errors import MissingExtra
+from flipflow.plotting.layout import (
+    FONT,
+    LABEL_ROW,
+    SIDES,
+    WIDTH,
+    Geometry,
+    Label,
+    arrange,
+    legend_columns,
+    legend_names,
+)
+from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, TINTS
+from flipflow.plotting.parts import Axis, Bar, Cells, Figure, Line, Panel, Trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Sheet
+
+PIXELS_AN_INCH = 96.0
+POINT = 72.0 / PIXELS_AN_INCH
+RESOLUTION = 200
+DATE = {"pdf": "CreationDate", "svg": "Date"}
+STYLES = {"dash": (0, (5, 2.5)), "dot": (0, (1, 2)), "dashdot": (0, (5, 2, 1, 2)), "solid": "-"}
+MARKS = {
+    "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
+    "diamond": "D", "cross": "x",
+}  # fmt: skip
+MARKS_SHOWN = 9
+VEIL = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0}
+FAMILIES = ("Arial", "Liberation Sans", "DejaVu Sans")
+STYLE = {
+    "font.size": FONT * POINT,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.7,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.6,
+    "text.color": INK,
+    "svg.hashsalt": "flipflow",  # the same figure makes the same file
+    "pdf.fonttype": 42,
+    "hatch.linewidth": 0.6,
+}
+
+
+def printed(figure: Figure, form: str) -> bytes:
+    """The figure as a file of the format ``form``: "svg", "pdf" or "png".
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl  # noqa: PLC0415  slow to import
+        from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
+    except ImportError as error:
+        raise MissingExtra(
+            "Figures for print need matplotlib: pip install 'flipflow[report]'."
+        ) from error
+    size = (WIDTH / PIXELS_AN_INCH, figure.height / PIXELS_AN_INCH)
+    buffer = io.BytesIO()
+    style: Any = {**STYLE, "font.family": _families()}
+    with mpl.rc_context(style):
+        sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
+        _draw(sheet, figure, arrange(figure))
+        undated = {DATE[form]: None} if form in DATE else {}
+        sheet.savefig(buffer, format=form, dpi=RESOLUTION, metadata=undated)
+    return buffer.getvalue()
+
+
+def _families() -> list[str]:
+    """The fonts of the list that are installed: matplotlib warns of each that is not."""
+    from matplotlib import font_manager  # noqa: PLC0415
+
+    known = {entry.name for entry in font_manager.fontManager.ttflist}
+    return [name for name in FAMILIES if name in known]
+
+
+def _draw(sheet: Sheet, figure: Figure, geometry: Geometry) -> None:
+    handles: dict[str, Any] = {}
+    for k, (panel, rect) in enumerate(zip(figure.panels, geometry.rects, strict=True)):
+        foot = figure.height - rect.top - rect.height
+        place = (rect.left / WIDTH, foot / figure.height, rect.width / WIDTH,
+                 rect.height / figure.height)  # fmt: skip
+        axes = sheet.add_axes(place)
+        _draw_panel(axes, panel, handles)
+        _draw_labels(axes, panel, geometry, k)
+    names = legend_names(figure)
+    if len(names) > 1:
+        sheet.legend(
+            [handles[name] for name in names], names, loc="upper left", frameon=False,
+            bbox_to_anchor=(0.0, 1.0), ncols=legend_columns(figure),
+            borderaxespad=0.2, handlelength=2.4, columnspacing=1.2,
+        )  # fmt: skip
+
+
+def _draw_panel(axes: Axes, panel: Panel, handles: dict[str, Any]) -> None:
+    axes.set_axisbelow(True)
+    axes.grid(visible=True)
+    for band in panel.bands:
+        span = axes.axvspan if band.axis == "x" else axes.axhspan
+        span(band.low, band.high, facecolor=_rgba(FILLS[band.role]), edgecolor="none", zorder=0.5)
+    for cells in panel.cells:
+        _draw_cells(axes, cells)
+    for trace in panel.traces:
+        _draw_trace(axes, trace, handles)
+    for bar in panel.bars:
+        _draw_bar(axes, bar, handles)
+    for line in panel.lines:
+        rule = axes.axvline if line.axis == "x" else axes.axhline
+        rule(line.at, color=COLOURS[line.colour], lw=0.9, ls=STYLES[line.dash])
+    for arrow in panel.arrows:
+        style = {
+            "arrowstyle": "-|>", "color": COLOURS[arrow.colour], "lw": 1.0, "shrinkA": 0.0,
+            "shrinkB": 0.0,
+        }  # fmt: skip
+        axes.annotate("", (arrow.x1, arrow.y1), (arrow.x0, arrow.y0), arrowprops=style)
+    _set_axis(axes, panel.x, "x")
+    _set_axis(axes, panel.y, "y")
+    if panel.equal:
+        axes.set_aspect("equal", adjustable="box")
+
+
+def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
+    if trace.lower is not None:
+        fill = _rgba(FILLS[trace.colour])
+        area = axes.fill_between(trace.x, trace.lower, trace.y, color=fill, lw=0.0, zorder=1.0)
+        handles.setdefault(trace.name, area)
+        return
+    colour = COLOURS[trace.colour]
+    style: dict[str, Any] = {"color": colour}
+    hollow = (trace.symbol or "").endswith("-open")
+    if trace.role == "point":
+        style |= {"ls": "none", "ms": 5.0, "zorder": 3.0, "mfc": "none" if hollow else colour}
+    else:
+        beneath = trace.role == "beneath"
+        style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
+                  "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
+                  "markevery": max(trace.x.size // MARKS_SHOWN, 1)}  # fmt: skip
+    (handle,) = axes.plot(trace.x, trace.y, marker=MARKS.get(trace.symbol or "", ""), **style)
+    handles.setdefault(trace.name, handle)
+
+
+def _draw_cells(axes: Axes, cells: Cells) -> None:
+    from matplotlib.colors import ListedColormap  # noqa: PLC0415  slow to import
+
+    colours = ListedColormap([TINTS[name] for name in cells.colours])
+    axes.pcolormesh(
+        cells.x, cells.y, cells.kind, cmap=colours, vmin=-0.5, vmax=len(cells.colours) - 0.5,
+        rasterized=True, zorder=0.4,
+    )  # fmt: skip
+
+
+def _draw_bar(axes: Axes, bar: Bar, handles: dict[str, Any]) -> None:
+    box = axes.barh(
+        bar.y, bar.high - bar.low, bar.thickness, bar.low, color=COLOURS[bar.colour],
+        hatch=2 * bar.hatch, edgecolor="white" if bar.hatch else INK, lw=0.5,
+    )  # fmt: skip
+    handles.setdefault(bar.name, box)
+    if bar.text:
+        axes.annotate(bar.text, (bar.high, bar.y), (4.0, 0.0), textcoords="offset points",
+                      va="center")  # fmt: skip
+
+
+def _draw_labels(axes: Axes, panel: Panel, geometry: Geometry, index: int) -> None:
+    if panel.title:
+        axes.annotate(
+            panel.title, (0.0, 1.0), (0.0, (geometry.titles[index] + 4.0) * POINT),
+            xycoords="axes fraction", textcoords="offset points", weight="bold",
+        )  # fmt: skip
+    for k, line in enumerate(panel.lines):
+        if line.text:
+            _draw_line_label(axes, line, geometry.labels[index].get(k))
+    for note in panel.notes:
+        axes.text(note.x, note.y, note.text.replace("<br>", "\n"), color=COLOURS[note.colour],
+                  ha=note.anchor, va="center", bbox=VEIL)  # fmt: skip
+
+
+def _draw_line_label(axes: Axes, line: Line, place: Label | None) -> None:
+    colour = COLOURS[line.colour]
+    if place is not None:
+        up = LABEL_ROW * place.level + 1.0
+        axes.annotate(line.text, (line.at, 1.0), (place.shift * POINT, up * POINT),
+                      xycoords=("data", "axes fraction"), textcoords="offset points",
+                      ha="center", va="bottom", color=colour)  # fmt: skip
+    else:
+        side = SIDES.get(line.text_at, "center")
+        inwards = {"left": 3.0, "right": -3.0}.get(side, 0.0)
+        up, foot = (-2.0, "top") if line.under else (2.0, "bottom")
+        axes.annotate(line.text, (line.text_at, line.at), (inwards, up),
+                      xycoords=("axes fraction", "data"), textcoords="offset points",
+                      ha=side, va=foot, color=colour)  # fmt: skip
+
+
+def _set_axis(axes: Axes, axis: Axis, way: str) -> None:
+    ends: dict[str, Any] = {} if axis.bounds is None else {f"{way}lim": axis.bounds}
+    axes.set(**{f"{way}label": axis.title}, **ends)
+    if axis.ticks:
+        ruler = axes.xaxis if way == "x" else axes.yaxis
+        ruler.set_ticks([at for at, _ in axis.ticks], labels=[word for _, word in axis.ticks])
+
+
+def _rgba(css: str) -> tuple[float, float, float, float]:
+    red, green, blue, alpha = (float(part) for part in css[5:-1].split(","))
+    return red / 255.0, green / 255.0, blue / 255.0, alpha

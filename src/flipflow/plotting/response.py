@@ -1,0 +1,318 @@
+"""Response over speed: one branch in full, or the relative amplitude of all load cases."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.dynamics.linear_response import LinearResponse
+from flipflow.model.system import Coordinate, MechanicalSystem
+from flipflow.plotting.curves import Curve, Jump
+from flipflow.plotting.layout import LEGEND_ROW, legend_rows
+from flipflow.plotting.palette import CASES, case_colour, case_symbol
+from flipflow.plotting.parts import Arrow, Axis, Band, Figure, Line, Panel, Trace
+from flipflow.plotting.scales import DEGREES, HZ, MM, RPM, SPEEDS
+from flipflow.studies.assessment import Assessment
+
+Real = NDArray[np.float64]
+LABELS = {"main": "main frame (x1)", "floating": "floating frame (xf)", "relative": "relative (x2)"}
+SYMBOLS = {"main": "square", "floating": "triangle"}
+KIND_WORDS = {
+    "fold": "jump (fold)", "contact begin": "contact begins", "contact end": "contact ends",
+}  # fmt: skip
+KIND_SYMBOLS = {"fold": "diamond", "contact begin": "circle-open", "contact end": "cross"}
+BAND_POINTS = 300
+NEAR = 0.35
+MOST_COORDINATES = CASES
+LEGEND_WITHIN = 2  # rows of the legend of all load cases that its height has room for
+READING = (
+    "Solid: the motion returns after a small disturbance. Dashed: it does not, so the machine "
+    "leaves it. Arrows: the amplitude jumps, as the speed rises or falls."
+)
+
+
+def branch_figure(branch: Branch, omega: float | None = None, title: str = "") -> Figure:
+    """Amplitude and phase of every coordinate along a branch.
+
+    Parameters
+    ----------
+    branch
+        What :func:`flipflow.frequency_response` returns.
+    omega
+        Working speed in rad/s, marked where it is given.
+    title
+        Title; names the load case in reports.
+
+    Returns
+    -------
+    Figure
+        Two panels, amplitude and phase, over rpm.
+    """
+    names = coordinates(branch.system)
+    curves = [Curve.of(branch, name) for name in names]
+    amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
+    phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
+    axis = speed_axis(branch.omega)
+    points = special_point_traces(branch.special_points, names[-1])
+    jumps = curves[-1].jumps()
+    top = Panel(
+        axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        traces=(*amplitude, *points), lines=(*_working(omega), *_jump_lines(jumps)),
+        arrows=_arrows(jumps),
+    )  # fmt: skip
+    bottom = Panel(
+        axis, _phase_axis(curves), traces=tuple(phase),
+        lines=_working(omega, text=False),
+    )  # fmt: skip
+    caption = (
+        "Amplitude is half the peak-to-peak motion; phase is that of the first harmonic against "
+        f"the unbalance force, negative when the motion lags. {READING}"
+    )
+    return Figure(title or "Response over speed", caption, (top, bottom), height=430)
+
+
+def linear_figure(response: LinearResponse) -> Figure:
+    """Amplitude and phase without contact over rpm, with the natural frequencies marked."""
+    names = coordinates(response.system)
+    curves = [
+        Curve(
+            response.omega,
+            response.amplitude(name),
+            np.unwrap(response.phase(name)),
+            np.full(response.omega.shape, "stable"),
+        )
+        for name in names
+    ]
+    amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
+    phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
+    axis = speed_axis(response.omega)
+    marks = tuple(
+        Line("x", w * RPM, f"w0{k}", "mark")
+        for k, w in enumerate(response.natural_frequencies, start=1)
+        if response.omega.min() <= w <= response.omega.max()
+    )
+    panels = (
+        Panel(axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+              traces=tuple(amplitude), lines=marks),
+        Panel(axis, _phase_axis(curves), traces=tuple(phase)),
+    )  # fmt: skip
+    caption = (
+        "As long as no stop is touched. Amplitude is half the peak-to-peak motion; phase is "
+        "negative when the motion lags behind the unbalance force."
+    )
+    return Figure("Response without contact", caption, panels, height=520)
+
+
+def cases_figure(assessment: Assessment) -> Figure:
+    """Relative amplitude over rpm: band of load cases, jumps, allowed speeds, working speed.
+
+    Parameters
+    ----------
+    assessment
+        What :func:`flipflow.assess` returns.
+
+    Returns
+    -------
+    Figure
+        The neighbourhood of the working speed beside the whole range; without a working speed
+        only the whole range.
+    """
+    curves = [Curve.of(case.branch, "relative") for case in assessment.cases]
+    names = [case.name for case in assessment.cases]
+    whole = _cases_panel(assessment, names, curves, None)
+    near = near_range(assessment)
+    close = () if near is None else (_cases_panel(assessment, names, curves, near),)
+    panels = (*close, whole)
+    caption = (
+        "Half the peak-to-peak motion. Green strip: allowed speeds. Dashed: does not return after "
+        "a small disturbance. Arrows: jumps."
+    )
+    figure = Figure(
+        "Amplitude of the relative motion over speed", caption, panels, len(panels), 216,
+        shares=(0.56, 0.44) if len(panels) == 2 else (),
+    )  # fmt: skip
+    beyond = max(legend_rows(figure) - LEGEND_WITHIN, 0)
+    return dataclasses.replace(figure, height=figure.height + LEGEND_ROW * beyond)
+
+
+def coordinates(system: MechanicalSystem) -> tuple[Coordinate, ...]:
+    """What is drawn of a system: its named coordinates, or the first few degrees of freedom."""
+    if system.coordinates:
+        return tuple(system.coordinates)
+    return tuple(range(min(system.size, MOST_COORDINATES)))
+
+
+def label(which: Coordinate) -> str:
+    """Words for a coordinate."""
+    return LABELS.get(which, which) if isinstance(which, str) else f"x{which + 1}"
+
+
+def speed_axis(omega: Real, bounds: tuple[float, float] | None = None) -> Axis:
+    """Axis of the shaft speed in rpm over all of ``omega`` (rad/s), or over ``bounds`` (rpm)."""
+    ends = bounds or (float(omega.min()) * RPM, float(omega.max()) * RPM)
+    return Axis("shaft speed", "rpm", ends)
+
+
+def near_range(assessment: Assessment) -> tuple[float, float] | None:
+    """The speeds around the working speed in rad/s; None without one."""
+    omega = assessment.omega
+    if omega is None:
+        return None
+    ends = [omega * (1.0 - NEAR), omega * (1.0 + NEAR)]
+    if assessment.project.limits.speed is not None:
+        low, high = assessment.project.limits.speed
+        ends = [min(ends[0], 0.95 * low), max(ends[1], 1.05 * high)]
+    reach = assessment.cases[0].branch.omega
+    low, high = max(ends[0], float(reach.min())), min(ends[1], float(reach.max()))
+    return (low, high) if low < omega < high else None
+
+
+def _traces(which: Coordinate, curve: Curve, quantity: str) -> Iterator[Trace]:
+    name = which if isinstance(which, str) and which in LABELS else ""
+    index = which if isinstance(which, int) else 0
+    scale = MM if quantity == "amplitude" else DEGREES
+    yield from curve_traces(
+        label(which), curve, getattr(curve, quantity) * scale,
+        colour=name or case_colour(index),
+        symbol=SYMBOLS.get(name) if name else case_symbol(index),
+        bold=which == "relative", legend=quantity == "amplitude",
+    )  # fmt: skip
+
+
+def curve_traces(
+    name: str, curve: Curve, y: Real, *, colour: str, symbol: str | None, bold: bool,
+    legend: bool = True, unit: str = "rpm",
+) -> Iterator[Trace]:  # fmt: skip
+    """One trace for each run of equal stability; the first stands in the legend."""
+    for stability, run in curve.runs():
+        omega = curve.omega[run]
+        yield Trace(
+            name, omega * SPEEDS[unit], y[run], stability, colour,  # type: ignore[arg-type]
+            symbol=symbol if stability == "stable" else None, bold=bold, legend=legend,
+            x_also=tuple((u, omega * scale) for u, scale in SPEEDS.items() if u != unit),
+        )  # fmt: skip
+        legend = False
+
+
+def special_point_traces(
+    special_points: Sequence[SpecialPoint], which: Coordinate
+) -> Iterator[Trace]:
+    """Marks at special points, one entry of the legend for each kind."""
+    for kind in dict.fromkeys(point.kind for point in special_points):
+        points = [point for point in special_points if point.kind == kind]
+        omega = np.array([point.omega for point in points])
+        yield Trace(
+            KIND_WORDS.get(kind, kind), omega * RPM,
+            np.array([point.amplitude(which) for point in points]) * MM, "point", "jump",
+            symbol=KIND_SYMBOLS.get(kind, "square-open"),
+            x_also=(("Hz", omega * HZ), ("rad/s", omega)),
+        )  # fmt: skip
+
+
+def _cases_panel(
+    assessment: Assessment,
+    names: Sequence[str],
+    curves: Sequence[Curve],
+    near: tuple[float, float] | None,
+) -> Panel:
+    """All load cases over the whole range, or over ``near`` (rad/s) only."""
+    drawn = [curve if near is None else _within(curve, near) for curve in curves]
+    first = near is not None or near_range(assessment) is None
+    traces = [t for t in (_case_band(curves, near, legend=first),) if t is not None]
+    for k, (name, curve) in enumerate(zip(names, drawn, strict=True)):
+        traces += curve_traces(
+            name, curve, curve.amplitude * MM, colour=case_colour(k), symbol=case_symbol(k),
+            bold=k == 0, legend=first,
+        )  # fmt: skip
+    jumps = curves[0].jumps() if near is None else ()
+    limits = assessment.project.limits.relative_amplitude or ()
+    top = max((float(curve.amplitude.max()) for curve in drawn), default=0.0)
+    words = ("least", "most") if near is not None else ("", "")
+    bounds = None if near is None else (near[0] * RPM, near[1] * RPM)
+    return Panel(
+        speed_axis(curves[0].omega, bounds),
+        Axis("amplitude (|x2|)", "mm", (0.0, 1.08 * MM * max(top, *limits, 0.0))),
+        traces=tuple(traces),
+        bands=tuple(Band("x", a * RPM, b * RPM) for a, b in assessment.region.feasible),
+        lines=(
+            *_working(assessment.omega, text=near is not None),
+            *_jump_lines(jumps, brief=True),
+            *(
+                Line(
+                    "y",
+                    limit * MM,
+                    f"{word} {limit * MM:.3g} mm" if word else "",
+                    text_at=at,
+                    under=word == "least",
+                )
+                for limit, word, at in zip(limits, words, (1.0, 0.0), strict=False)
+            ),
+        ),
+        arrows=_arrows(jumps),
+    )
+
+
+def _case_band(
+    curves: Sequence[Curve], near: tuple[float, float] | None, *, legend: bool
+) -> Trace | None:
+    """Area between the least and the greatest amplitude of all cases, as the speed rises."""
+    if len(curves) < 2:
+        return None
+    low = max(float(curve.omega.min()) for curve in curves)
+    high = min(float(curve.omega.max()) for curve in curves)
+    grid = np.linspace(*(near or (low, high)), BAND_POINTS)
+    values = np.array([np.interp(grid, *curve.from_below()) for curve in curves]) * MM
+    return Trace(
+        "band of load cases", grid * RPM, values.max(axis=0), "case band", "case band",
+        legend=legend, lower=values.min(axis=0),
+    )  # fmt: skip
+
+
+def _within(curve: Curve, near: tuple[float, float]) -> Curve:
+    """The part of a curve in a range, its neighbours outside included so that lines reach it."""
+    inside = (curve.omega >= near[0]) & (curve.omega <= near[1])
+    keep = inside.copy()
+    keep[1:] |= inside[:-1]
+    keep[:-1] |= inside[1:]
+    return Curve(curve.omega[keep], curve.amplitude[keep], curve.phase[keep], curve.stability[keep])
+
+
+def _working(omega: float | None, *, text: bool = True) -> tuple[Line, ...]:
+    if omega is None:
+        return ()
+    return (Line("x", omega * RPM, f"{omega * RPM:.4g} rpm" if text else "", "speed", "dashdot"),)
+
+
+def _arrows(jumps: Sequence[Jump]) -> tuple[Arrow, ...]:
+    return tuple(Arrow(j.omega * RPM, j.start * MM, j.omega * RPM, j.end * MM) for j in jumps)
+
+
+def _jump_lines(jumps: Sequence[Jump], *, brief: bool = False) -> tuple[Line, ...]:
+    """The jump speeds, labelled above the panel."""
+    words = {True: "" if brief else "jump (rising) ", False: "" if brief else "jump (falling) "}
+    return tuple(
+        Line("x", j.omega * RPM, f"{words[j.rising_speed]}{j.omega * RPM:.4g} rpm", "mark")
+        for j in jumps
+    )
+
+
+def _phase_axis(curves: Sequence[Curve]) -> Axis:
+    """Phase in degrees, ticked at quarters or halves of a turn."""
+    low = min(float(curve.phase.min()) for curve in curves) * DEGREES
+    high = max(float(curve.phase.max()) for curve in curves) * DEGREES
+    step = 90.0 if high - low < 600.0 else 180.0
+    first, last = math.floor(low / step + 0.1), math.ceil(high / step - 0.1)
+    ticks = tuple((k * step, f"{k * step:.0f}") for k in range(first, last + 1))
+    margin = 0.04 * (high - low)
+    bounds = (min(low - margin, first * step), max(high + margin, last * step))
+    return Axis("phase", "deg", bounds, ticks)
+
+
+def _from_zero(values: Iterator[Real]) -> tuple[float, float]:
+    top = max(float(value.max()) for value in values)
+    return 0.0, 1.08 * top if top > 0.0 and math.isfinite(top) else 1.0

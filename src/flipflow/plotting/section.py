@@ -1,0 +1,53 @@
+"""Poincare sections and spectra."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.response import coordinates, label
+from flipflow.plotting.scales import HZ, MM
+from flipflow.studies.poincare import Section, Spectrum
+
+MOST_HARMONICS = 6.0
+DECADES = 6.0
+
+
+def section_figure(section: Section) -> Figure:
+    """Velocity over displacement of every coordinate, one point a forcing period."""
+    panels = []
+    for which in coordinates(section.system):
+        x, v = section.displacement(which) * MM, section.velocity(which)
+        points = Trace("once a turn", x, v, "point", symbol="circle", legend=False)
+        panels.append(Panel(Axis(label(which), "mm"), Axis("velocity", "m/s"), (points,)))
+    caption = (
+        f"{section.states.shape[0]} turns, a point whenever the unbalance points along +x. A "
+        "motion that repeats after n turns shows n points, one that never repeats "
+        "shows closed curves."
+    )
+    columns = min(len(panels), 3)
+    return Figure("Poincare section", caption, tuple(panels), columns=columns, height=260)
+
+
+def spectrum_figure(spectrum: Spectrum) -> Figure:
+    """Amplitude over frequency, in decades, with the harmonics of the forcing marked."""
+    shown = spectrum.frequencies <= MOST_HARMONICS * spectrum.omega
+    amplitude = spectrum.amplitudes[shown] * MM
+    top = float(amplitude.max())
+    floor = top * 10.0**-DECADES
+    level = np.log10(np.maximum(amplitude, floor))
+    low, high = int(np.floor(np.log10(floor))), int(np.ceil(np.log10(top)))
+    ticks = tuple((float(k), f"1e{k}") for k in range(low, high + 1))
+    frequency = spectrum.frequencies[shown] * HZ
+    line = Trace(label(spectrum.which), frequency, level, legend=False)
+    marks = tuple(
+        Line("x", k * spectrum.omega * HZ, f"{k} w" if k > 1 else "w", "mark")
+        for k in range(1, int(MOST_HARMONICS) + 1)
+    )
+    panel = Panel(
+        Axis("frequency", "Hz", (0.0, float(frequency[-1]))),
+        Axis(f"{label(spectrum.which)} amplitude", "mm", (float(low), float(high)), ticks),
+        traces=(line,), lines=marks,
+    )  # fmt: skip
+    caption = "Amplitude of each harmonic part; w is the forcing frequency."
+    return Figure("Spectrum", caption, (panel,), height=300)

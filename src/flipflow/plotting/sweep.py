@@ -1,0 +1,81 @@
+"""What a machine settles to over speed, laid over the branch of periodic motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.continuation.branch import Branch
+from flipflow.errors import InputError
+from flipflow.model.system import Coordinate
+from flipflow.plotting.curves import Curve
+from flipflow.plotting.palette import case_colour
+from flipflow.plotting.parts import Axis, Figure, Panel, Trace
+from flipflow.plotting.response import coordinates, curve_traces, label, speed_axis
+from flipflow.plotting.scales import HZ, MM, RPM
+from flipflow.transient.sweep import Sweep
+
+SYMBOLS = ("circle-open", "square-open", "cross", "diamond", "triangle")
+Real = NDArray[np.float64]
+
+
+def sweep_figure(
+    sweeps: Sequence[Sweep], branch: Branch | None = None, which: Coordinate | None = None
+) -> Figure:
+    """Settled amplitudes over rpm, one set of symbols a sweep.
+
+    Parameters
+    ----------
+    sweeps
+        One or more, such as up and down.
+    branch
+        Periodic motions to lay them over.
+    which
+        The coordinate; the relative motion of a screen, or the first degree of freedom.
+
+    Returns
+    -------
+    Figure
+        One panel.
+    """
+    if not sweeps:
+        raise InputError("sweeps", "none", "give at least one")
+    chosen = coordinates(sweeps[0].system)[-1] if which is None else which
+    traces: list[Trace] = []
+    if branch is not None:
+        curve = Curve.of(branch, chosen)
+        traces += curve_traces(
+            "periodic motions", curve, curve.amplitude * MM, colour="relative", symbol=None,
+            bold=False,
+        )  # fmt: skip
+    for k, sweep in enumerate(sweeps):
+        traces += _swept(sweep, chosen, k + 1)
+    top = max(float(trace.y.max()) for trace in traces)
+    omega = np.concatenate([sweep.omega for sweep in sweeps])
+    panel = Panel(
+        speed_axis(omega), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * top)),
+        traces=tuple(traces),
+    )  # fmt: skip
+    caption = (
+        "Symbols: what the machine settles to, each speed reached from the one before. Solid: "
+        "motions that return after a small disturbance; dashed: motions that do not."
+    )
+    return Figure("Settled motion over speed", caption, (panel,), height=380)
+
+
+def _swept(sweep: Sweep, which: Coordinate, k: int) -> Iterator[Trace]:
+    """One cloud of points for each period met."""
+    way = "rising" if sweep.omega[-1] >= sweep.omega[0] else "falling"
+    periods = sweep.periods
+    amplitude = sweep.amplitude(which) * MM
+    for count in np.unique(periods):
+        rows = periods == count
+        word = {0: "not periodic", 1: ""}.get(int(count), f"{count} periods")
+        omega = sweep.omega[rows]
+        yield Trace(
+            f"speed {way}" + (f", {word}" if word else ""), omega * RPM, amplitude[rows], "point",
+            case_colour(k), symbol=SYMBOLS[(2 * (k - 1) + max(int(count) - 1, 0)) % len(SYMBOLS)],
+            x_also=(("Hz", omega * HZ), ("rad/s", omega)),
+        )  # fmt: skip

@@ -1,0 +1,376 @@
+"""From a machine file to a verdict: every load case at working speed against every limit."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flipflow import __version__
+from flipflow.continuation.branch import Branch
+from flipflow.dynamics.normal import NormalMotion
+from flipflow.errors import InputError
+from flipflow.model.constants import GRAVITY, RPM
+from flipflow.model.fields import MOTION_FIELDS
+from flipflow.model.limits import LIMIT_FIELD
+from flipflow.model.monitor import Monitor
+from flipflow.model.project import Project
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.periodic.options import Method, PiecewiseExact
+from flipflow.periodic.orbit import Orbit
+from flipflow.studies.feasible import limit_bounds, missing_for, missing_words, working_motion
+from flipflow.studies.limit_row import (
+    ATTENTION,
+    CLOSE,
+    FAIL,
+    NO_LIMIT,
+    NOT_CHECKED,
+    PASS,
+    LimitRow,
+    relative_margin,
+)
+from flipflow.studies.operating_region import OperatingRegion, analysed_range, operating_region
+from flipflow.studies.quantities import QUANTITIES, Working
+from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
+from flipflow.studies.start_and_blows import Transients, transients
+
+TORNADO_SHARE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class CaseAssessment:
+    """One load case at working speed.
+
+    Parameters
+    ----------
+    name, load, screen
+        The case and the screen under it.
+    branch
+        Its motions over the analysed range.
+    working
+        The motion reached from below at working speed, None without a speed.
+    orbits
+        All motions of the branch at working speed.
+    values
+        Quantities by name, SI; None where data are missing.
+    energy
+        Mean powers in W: "input" and what isolation, shear springs, stop and the normal
+        direction's isolation take.
+    """
+
+    name: str
+    load: Load
+    screen: FlipFlowScreen
+    branch: Branch
+    working: Working | None
+    orbits: tuple[Orbit, ...]
+    values: Mapping[str, float | None]
+    energy: Mapping[str, float]
+
+    @property
+    def orbit(self) -> Orbit | None:
+        """The motion at working speed."""
+        return None if self.working is None else self.working.orbit
+
+    @property
+    def normal(self) -> NormalMotion | None:
+        """The motion normal to the surface at working speed."""
+        return None if self.working is None else self.working.normal
+
+    @property
+    def stop_reached(self) -> bool:
+        """Whether a stop is touched at working speed."""
+        return self.orbit is not None and self.orbit.touches
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """A project judged: what ``flipflow analyze`` shows.
+
+    Parameters
+    ----------
+    project
+        The machine file.
+    region
+        Operating region and feasible window.
+    cases
+        Every load case at working speed.
+    omega
+        Working speed in rad/s, None where the file gives none.
+    limits_table
+        Every limit with its worst case.
+    verdict
+        One sentence.
+    tornado
+        The empty machine's relative amplitude with one field at a time 5 % lower and higher; None
+        without a working speed.
+    transients
+        Start, coast-down and jump risk of the empty machine; None without a working speed.
+    notes
+        What was not checked or not finished.
+    method, version, input_hash
+        How, by which version, from which input.
+    """
+
+    project: Project
+    region: OperatingRegion
+    cases: tuple[CaseAssessment, ...]
+    omega: float | None
+    limits_table: tuple[LimitRow, ...]
+    verdict: str
+    tornado: OneAtATime | None
+    transients: Transients | None
+    notes: tuple[str, ...]
+    method: Method
+    version: str
+    input_hash: str
+
+    def __repr__(self) -> str:
+        name = self.project.document.name or self.project.name
+        return f"Assessment({name}: {self.verdict})"
+
+
+def assess(
+    project: Project,
+    monitor: Monitor | None = None,
+    *,
+    omega: tuple[float, float] | None = None,
+    method: Method | None = None,
+) -> Assessment:
+    """Judge a project: operating region, feasible window, every case against every limit.
+
+    Parameters
+    ----------
+    project
+        What :func:`flipflow.load_project` returns.
+    monitor
+        Called with a sentence and the share done, 0 to 1.
+    omega, method
+        As for :func:`~flipflow.operating_region`.
+
+    Raises
+    ------
+    InputError
+        For anything but a project.
+    """
+    if not isinstance(project, Project):
+        remedy = "give a project, such as ff.load_project('ffs0827')"
+        raise InputError("project", type(project).__name__, remedy)
+    region = operating_region(
+        project.screen,
+        project.limits,
+        project.load_cases,
+        monitor,
+        omega=omega or analysed_range(project.screen, project.speed),
+        method=method,
+    )
+    cases = tuple(
+        assess_case(project.screen.loaded(load), load, branch, project.speed)
+        for load, branch in zip(project.load_cases, region.branches, strict=True)
+    )
+    rows = tuple(limit_row(project, cases, name) for name in LIMIT_FIELD)
+    return Assessment(
+        project=project,
+        region=region,
+        cases=cases,
+        omega=project.speed,
+        limits_table=rows,
+        verdict=verdict(project.speed, rows, cases, region),
+        tornado=None if project.speed is None else tornado(project.screen, project.speed),
+        transients=None if project.speed is None else transients(project, project.speed),
+        notes=(*project.warnings, *region.notes, *coexisting(cases)),
+        method=method or PiecewiseExact(),
+        version=__version__,
+        input_hash=input_hash(project),
+    )
+
+
+def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:
+    """The relative amplitude with each value of the machine alone 5 % lower and higher.
+
+    5 % is the spread of Table 1 of the paper; what is zero, infinite or not given does not vary.
+    """
+    present = {name: getattr(screen, name) or 0.0 for name in MOTION_FIELDS}
+    vary = {
+        name: ((1.0 - TORNADO_SHARE) * value, (1.0 + TORNADO_SHARE) * value)
+        for name, value in present.items()
+        if 0.0 < value < math.inf
+    }
+    return one_at_a_time(screen, vary, "relative_amplitude", omega)
+
+
+def assess_case(
+    screen: FlipFlowScreen, load: Load, branch: Branch, omega: float | None
+) -> CaseAssessment:
+    """One load case at working speed."""
+    working = None if omega is None else working_motion(screen, branch, omega)
+    values: dict[str, float | None] = {}
+    if working is not None:
+        values = {name: quantity.evaluate(working) for name, quantity in QUANTITIES.items()}
+    return CaseAssessment(
+        name=load.name or "empty",
+        load=load,
+        screen=screen,
+        branch=branch,
+        working=working,
+        orbits=() if working is None else branch.orbits_at(working.omega),
+        values=values,
+        energy={} if working is None else energy_balance(working),
+    )
+
+
+def energy_balance(working: Working) -> dict[str, float]:
+    """Mean powers in W; "input" along the surface equals isolation + shear + stop.
+
+    The stop's is what its damping takes and what it still holds when a clipped one lets go.
+    """
+    screen, orbit = working.screen, working.orbit
+    powers = {
+        "input": orbit.input_power(),
+        "isolation": screen.isolation_damping * orbit.mean_square_velocity("main"),
+        "shear": screen.shear_damping * orbit.mean_square_velocity("relative"),
+        "stop": 0.0,
+    }
+    if screen.has_stop:
+        contact = None if screen.stop().bonded else 0
+        powers["stop"] = screen.stop_damping * orbit.mean_square_velocity("relative", contact)
+        powers["stop"] += _let_go_power(screen, orbit)
+    if working.normal is not None:
+        powers["normal"] = working.normal.power
+    return powers
+
+
+def _let_go_power(screen: FlipFlowScreen, orbit: Orbit) -> float:
+    """Mean power in W of the energy that clipped stops still hold when they let go.
+
+    The paper's law lets go at the gap, where the spring holds none.
+    """
+    gaps = screen.stop().gaps
+    lost = 0.0
+    for touch in orbit.contact_intervals:
+        ends = touch.side * orbit.displacement("relative", [touch.start, touch.end])
+        taken, left = (ends - gaps[0 if touch.side > 0 else 1]) ** 2
+        lost += 0.5 * screen.stop_stiffness * float(left - taken)
+    return lost / orbit.period
+
+
+def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) -> LimitRow:
+    """The worst case of one limit."""
+    quantity = QUANTITIES.get(name)
+    label = "speed" if quantity is None else quantity.label
+    unit = LIMIT_FIELD[name].unit
+    shown = LIMIT_FIELD[name].file_unit
+    if getattr(project.limits, name) is None:
+        return LimitRow(name, label, unit, shown, NO_LIMIT, reason="no limit in the machine file")
+    low, high = limit_bounds(project.limits, name)
+    row = LimitRow(name, label, unit, shown, (low, high))
+    missing = missing_for(project.screen, name)
+    if missing:
+        return dataclasses.replace(row, reason=missing_words(missing))
+    if project.speed is None:
+        return dataclasses.replace(row, reason="no operating speed in the machine file")
+    judged = [
+        (relative_margin(value, low, high), value, case.name)
+        for case in cases
+        if (value := project.speed if quantity is None else case.values.get(name)) is not None
+    ]
+    if not judged:
+        return dataclasses.replace(row, reason="no motion found at working speed")
+    margin, worst, case_name = min(judged, key=lambda one: one[0])
+    state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
+    return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
+
+
+def verdict(
+    omega: float | None,
+    rows: tuple[LimitRow, ...],
+    cases: tuple[CaseAssessment, ...],
+    region: OperatingRegion,
+) -> str:
+    """One sentence for the top of the report."""
+    if omega is None:
+        return "No operating speed is given: the allowed speed range stands below."
+    speed = f"{omega * RPM:.4g} rpm"
+    unknown = [case for case in cases if case.orbit is None]
+    if unknown:
+        return f"{speed}: not judged, for {_why_unknown(omega, unknown)}."
+    lost = [case.name for case in cases if case.orbit is not None and not case.orbit.stable]
+    if lost:
+        where = "; ".join(lost) if len(lost) < len(cases) else "every load case"
+        return f"{speed}: the motion is not sure to return after a disturbance in {where}."
+    judged = [row for row in rows if row.margin is not None]
+    unchecked = [row for row in rows if row.state == NOT_CHECKED and row.limit != NO_LIMIT]
+    if not judged:
+        return f"{speed}: no limit could be checked."
+    tightest = min(judged, key=lambda row: row.margin if row.margin is not None else math.inf)
+    broken = [row for row in judged if row.state == FAIL]
+    where = "in all cases" if len(cases) > 1 else "for the machine"
+    head = f"all limits met {where}; tightest"
+    if broken:
+        head = f"{len(broken)} of {len(judged)} limits broken; worst"
+    elif unchecked:
+        head = f"all limits that could be checked are met {where}; tightest"
+    outside = "" if broken else _outside(omega, region)
+    return f"{speed}: {head}: {_against(tightest)}{outside}."
+
+
+def _why_unknown(omega: float, cases: list[CaseAssessment]) -> str:
+    """Why no motion is known in these cases at working speed, in words."""
+    names = ", ".join(case.name for case in cases)
+    speeds = [case.branch.omega for case in cases]
+    if all(one.min() <= omega <= one.max() for one in speeds):
+        return f"raised from below it meets no stable motion in {names}"
+    return f"the speeds analysed do not hold it in {names}"
+
+
+def _outside(omega: float, region: OperatingRegion) -> str:
+    """Which end of the region the speed lies beyond, in words; empty where it may run."""
+    if any(low <= omega <= high for low, high in region.feasible):
+        return ""
+    if region.lower <= omega <= region.upper:
+        return ", but outside the allowed speed range"
+    below = omega < region.lower
+    end, words = (region.lower, region.ends[0]) if below else (region.upper, region.ends[1])
+    side = "below" if below else "above"
+    return f", but {side} the operating region: {words} at {end * RPM:.4g} rpm"
+
+
+def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
+    """A sentence that names the cases in which another motion is possible at working speed."""
+    names = [case.name for case in cases if sum(orbit.stable for orbit in case.orbits) > 1]
+    if not names:
+        return ()
+    sentence = (
+        f"{'Case' if len(names) == 1 else 'Cases'} {'; '.join(names)}: another motion is possible "
+        "at this speed; shown is the one reached when the speed is raised from below."
+    )
+    return (sentence,)
+
+
+def _against(row: LimitRow) -> str:
+    """Words such as: relative amplitude, full, 5.12 mm of 5 mm least."""
+    scale = {"mm": 1e3, "kN": 1e-3, "kW": 1e-3, "%": 100.0, "g": 1.0 / GRAVITY, "rpm": RPM}
+    factor = scale.get(row.shown_unit, 1.0)
+    low, high = row.limit
+    worst = row.worst if row.worst is not None else math.nan
+    at_low = relative_margin(worst, low, math.inf) <= relative_margin(worst, -math.inf, high)
+    end, word = (low, "least") if at_low else (high, "most")
+    case = f", {row.case}" if row.name != "speed" else ""
+    unit = row.shown_unit
+    return f"{row.label}{case}, {worst * factor:.3g} {unit} of {end * factor:.3g} {unit} {word}"
+
+
+def input_hash(project: Project) -> str:
+    """Digest of all values that decide the result."""
+    inputs = {
+        "screen": dataclasses.asdict(project.screen),
+        "limits": dataclasses.asdict(project.limits),
+        "cases": [dataclasses.asdict(load) for load in project.load_cases],
+        "speed": project.speed,
+        "drive": None if project.drive is None else dataclasses.asdict(project.drive),
+        "version": __version__,
+    }
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:16]

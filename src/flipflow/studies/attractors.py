@@ -1,0 +1,149 @@
+"""The motions that attract at one frequency, and which of them many states go to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.batch.lanes import Capture, Lanes, Run
+from flipflow.compiled import status
+from flipflow.model.arguments import checked_generator
+from flipflow.model.system import Machine, system_of
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.solver import Point, Real
+from flipflow.periodic.turns import NOT_SETTLED
+from flipflow.studies.capture import capture_of
+from flipflow.studies.periodic_orbits import MOST_PERIODS, attracting_orbits
+from flipflow.transient.settle import Settling, is_stable
+
+TRIED_STATES = 16
+FIRST_SHARE = 64
+
+
+class Attractors:
+    """Stable motions with a neighbourhood each; further ones are found as states run to them.
+
+    Parameters
+    ----------
+    machine
+        A screen or a system.
+    omega
+        Forcing frequency in rad/s.
+    rng
+        Seed or generator of the search and of the trial of the neighbourhoods.
+    threads
+        See :class:`~flipflow.batch.lanes.Lanes`.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        omega: float,
+        rng: int | np.random.Generator = 0,
+        threads: int | None = None,
+    ) -> None:
+        self.machine = machine
+        self.system = system_of(machine)
+        self._rng = checked_generator(rng)
+        found = attracting_orbits(machine, omega, self._rng)
+        self.lanes = Lanes(self.system, omega, threads)
+        self.capture = Capture.nothing(2 * self.system.size)
+        self.orbits: list[Orbit] = []
+        self._settling = Settling(self.system, MOST_PERIODS)
+        for orbit in found:
+            self.add(orbit.point)
+
+    def add(self, point: Point) -> int | None:
+        """Label of a stable motion, known or not; None where no neighbourhood of it is found."""
+        known = self.label_of(point.u)
+        if known is not None:
+            return known
+        label = len(self.orbits)
+        phases = self._settling.phases(point)
+        capture = capture_of(self.lanes, point, phases, label, self._rng)
+        if capture is None:
+            return None
+        self.capture = self.capture.joined(capture)
+        self.orbits.append(Orbit(self.machine, point))
+        return label
+
+    def label_of(self, z: Real) -> int | None:
+        """Label of the motion that passes through the state z at the start of a turn."""
+        for label, orbit in enumerate(self.orbits):
+            phases = self._settling.phases(orbit.point)
+            if any(self._settling.same(z, phase, orbit.omega) for phase in phases):
+                return label
+        return None
+
+    def run(
+        self,
+        states: Real,
+        most: int,
+        begin: Real | None = None,
+        tick: Callable[[float], None] | None = None,
+    ) -> Run:
+        """Run states until they settle; those that do not are searched for further motions.
+
+        A few states go first, so that a motion unknown so far costs few lanes all their turns.
+        """
+        count = states.shape[0]
+        starts = np.zeros(count) if begin is None else begin
+        whole = Run(
+            states.copy(), np.full(count, NOT_SETTLED), np.full(count, -1),
+            np.zeros(count, np.int64), cancelled=False,
+        )  # fmt: skip
+        first = np.arange(0, count, max(count // FIRST_SHARE, 1))
+        rest = np.setdiff1d(np.arange(count), first)
+        done = 0
+        for wave in (first, rest):
+            base, share = done / count, wave.size / count
+
+            def say(part: float, base: float = base, share: float = share) -> None:
+                if tick is not None:
+                    tick(base + share * part)
+
+            run = self.lanes.settle(states[wave], starts[wave], self.capture, most, say)
+            _write(whole, wave, run)
+            while not run.cancelled and self._found_further(run):
+                run = self._again(run, most)
+                _write(whole, wave, run)
+            if run.cancelled:
+                return Run(whole.states, whole.label, whole.turns, whole.code, cancelled=True)
+            done += wave.size
+        return whole
+
+    def _again(self, run: Run, most: int) -> Run:
+        """Lanes that nothing caught, run on from where they ended."""
+        open_ = np.flatnonzero(_unsettled(run))
+        more = self.lanes.settle(run.states[open_], np.zeros(open_.size), self.capture, most)
+        more.turns[:] += run.turns[open_]
+        _write(run, open_, more)
+        return run
+
+    def _found_further(self, run: Run) -> bool:
+        """Solve for motions from the ends of lanes that did not settle; whether one is new."""
+        ends = run.states[_unsettled(run)]
+        before = len(self.orbits)
+        for z in ends[:: max(ends.shape[0] // TRIED_STATES, 1)]:
+            # Newton over one turn may reach a motion far from z that is known: all are tried.
+            for point in self._stable_near(z):
+                self.add(point)
+        return len(self.orbits) > before
+
+    def _stable_near(self, z: Real) -> Iterator[Point]:
+        """Stable motions of one and more forcing periods that Newton reaches from z."""
+        for periods in range(1, MOST_PERIODS + 1):
+            point = self._settling.solver_of(periods).solve(z, self.lanes.omega)
+            if point is not None and is_stable(point):
+                yield self._settling.shortest(point)
+
+
+def _unsettled(run: Run) -> NDArray[np.bool_]:
+    return np.asarray((run.label == NOT_SETTLED) & (run.code == status.OK) & (run.turns >= 0))
+
+
+def _write(whole: Run, lanes: NDArray[np.int64], part: Run) -> None:
+    whole.states[lanes], whole.label[lanes] = part.states, part.label
+    whole.turns[lanes], whole.code[lanes] = part.turns, part.code

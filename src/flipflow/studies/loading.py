@@ -1,0 +1,289 @@
+"""How much a load changes the relative amplitude over the operating region, stop or no stop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from flipflow.continuation.branch import Branch
+from flipflow.continuation.frequency_response import frequency_response
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.periodic.options import Method
+from flipflow.studies.operating_region import Landmarks, analysed_range, landmarks
+
+Real = NDArray[np.float64]
+Start = Literal["unloaded", "loaded"]
+SAMPLES = 121
+
+
+@dataclass(frozen=True)
+class Change:
+    """Relative amplitude in m at one speed in rad/s, unloaded and loaded."""
+
+    omega: float
+    unloaded: float
+    loaded: float
+
+    @property
+    def change(self) -> float:
+        """Loaded minus unloaded in m; negative for a reduction."""
+        return self.loaded - self.unloaded
+
+    @property
+    def share(self) -> float:
+        """Change as a share of the unloaded amplitude."""
+        return self.change / self.unloaded
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """Change over the region as intercept + slope (omega - lower): m, and m per rad/s."""
+
+    intercept: float
+    slope: float
+
+
+@dataclass(frozen=True, eq=False)
+class RegionChange:
+    """Change of the relative amplitude over one operating region, as the speed rises slowly.
+
+    Parameters
+    ----------
+    start
+        Whose lower end the region has: that of the "unloaded" machine or of the "loaded" one.
+        The upper end is the unloaded machine's.
+    omega
+        Speeds in rad/s, (n,), both ends of the region included.
+    unloaded, loaded
+        Relative amplitude in m, (n,), each solved for; NaN where a motion was not found.
+    least, greatest
+        Where the change is least and greatest in size, searched between the speeds.
+    """
+
+    start: Start
+    omega: Real
+    unloaded: Real
+    loaded: Real
+    least: Change
+    greatest: Change
+
+    @property
+    def lower(self) -> float:
+        """Lower end of the region in rad/s."""
+        return float(self.omega[0])
+
+    @property
+    def upper(self) -> float:
+        """Upper end of the region in rad/s."""
+        return float(self.omega[-1])
+
+    @property
+    def change(self) -> Real:
+        """Loaded minus unloaded in m, (n,)."""
+        return np.asarray(self.loaded - self.unloaded)
+
+    @property
+    def share(self) -> Real:
+        """Change as a share of the unloaded amplitude, (n,)."""
+        return np.asarray(self.change / self.unloaded)
+
+    @property
+    def at_lower(self) -> Change:
+        """The lower end of the region."""
+        return Change(self.lower, float(self.unloaded[0]), float(self.loaded[0]))
+
+    @property
+    def at_upper(self) -> Change:
+        """The upper end of the region."""
+        return Change(self.upper, float(self.unloaded[-1]), float(self.loaded[-1]))
+
+    @property
+    def line_through_ends(self) -> StraightLine:
+        """The paper's line: intercept the change at the lower end, slope change per bandwidth."""
+        first, last = self.at_lower.change, self.at_upper.change
+        return StraightLine(first, (last - first) / (self.upper - self.lower))
+
+    @property
+    def line_of_least_squares(self) -> StraightLine:
+        """The line that fits all speeds best."""
+        known = np.isfinite(self.change)
+        slope, intercept = np.polyfit(self.omega[known] - self.lower, self.change[known], 1)
+        return StraightLine(float(intercept), float(slope))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMachine:
+    """One machine, with stop or without, empty and under the load.
+
+    Parameters
+    ----------
+    unloaded, loaded
+        Motions over speed.
+    unloaded_marks, loaded_marks
+        Characteristic frequencies and operating region of both.
+    region
+        Change over the unloaded machine's region.
+    from_loaded
+        The same from where the loaded machine's region starts; None where nothing is left.
+    """
+
+    unloaded: Branch
+    loaded: Branch
+    unloaded_marks: Landmarks
+    loaded_marks: Landmarks
+    region: RegionChange
+    from_loaded: RegionChange | None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What could not be settled."""
+        sentences = []
+        for name, branch in (("empty", self.unloaded), ("loaded", self.loaded)):
+            texts = (*branch.notes, *(() if branch.complete else (branch.status.value,)))
+            sentences += [f"{name}: {text}" for text in texts]
+        return tuple(sentences)
+
+
+@dataclass(frozen=True, eq=False)
+class Loading:
+    """What a load does to a screen; returned by :func:`flipflow.loading`.
+
+    Parameters
+    ----------
+    screen, load
+        The empty machine and its load.
+    with_stop
+        The machine as it is; None for a machine without stop.
+    without_stop
+        The same machine with its stops taken out.
+    """
+
+    screen: FlipFlowScreen
+    load: Load
+    with_stop: LoadedMachine | None
+    without_stop: LoadedMachine
+
+    def __repr__(self) -> str:
+        stop = "without stop" if self.with_stop is None else "with and without stop"
+        return f"Loading({self.load.name or 'load'}, {stop})"
+
+
+def loading(
+    screen: FlipFlowScreen,
+    load: Load,
+    *,
+    omega: tuple[float, float] | None = None,
+    method: Method | None = None,
+) -> Loading:
+    """Compare the empty and the loaded machine over the operating region, with and without stop.
+
+    The region of the machine with stop is [w_cs, w_lb], without [w_ea, w_ar]. A load moves the
+    lower end; the change is therefore given over the region of the empty machine and also from
+    where the region of the loaded one begins. Amplitudes are those met as the speed rises slowly.
+
+    Parameters
+    ----------
+    screen
+        The empty machine.
+    load
+        Factors on the shear springs, carried masses, temperature.
+    omega
+        Speeds (low, high) in rad/s that are followed; None: wide enough for both.
+    method
+        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`.
+
+    Raises
+    ------
+    InputError
+        For anything but a screen and a load, an interval beside the operating region, or a load
+        that the screen has no data for.
+    IncompleteError
+        When no branch could be started, none reaches the operating region, or there is none.
+    """
+    if not isinstance(screen, FlipFlowScreen):
+        raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
+    if not isinstance(load, Load):
+        raise InputError("load", load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
+    bare = screen.replace(clearance=math.inf, clearance_minus=None)
+    stopped = _compared(screen, load, omega, method) if screen.has_stop else None
+    return Loading(screen, load, stopped, _compared(bare, load, omega, method))
+
+
+def _compared(
+    screen: FlipFlowScreen,
+    load: Load,
+    omega: tuple[float, float] | None,
+    method: Method | None,
+) -> LoadedMachine:
+    heavy = screen.loaded(load)
+    spans = [analysed_range(one) for one in (screen, heavy)]
+    wide = (min(low for low, _ in spans), max(high for _, high in spans))
+    branches = [frequency_response(one, omega or wide, method) for one in (screen, heavy)]
+    unloaded, loaded = branches
+    marks, heavy_marks = landmarks(screen, unloaded), landmarks(heavy, loaded)
+    if omega is not None and not (omega[0] < marks.upper and marks.lower < omega[1]):
+        ends = f"{marks.lower:.6g} to {marks.upper:.6g} rad/s"
+        raise InputError("omega", omega, f"the operating region is {ends}; give speeds around it")
+    late = None
+    if heavy_marks.lower < marks.upper:
+        late = _region(unloaded, loaded, (heavy_marks.lower, marks.upper), "loaded")
+    region = _region(unloaded, loaded, (marks.lower, marks.upper), "unloaded")
+    return LoadedMachine(unloaded, loaded, marks, heavy_marks, region, late)
+
+
+def _region(
+    unloaded: Branch, loaded: Branch, ends: tuple[float, float], start: Start
+) -> RegionChange:
+    if not ends[0] < ends[1]:
+        words = f"it would begin at {ends[0]:.6g} and end at {ends[1]:.6g} rad/s"
+        raise IncompleteError(f"The machine has no operating region: {words}.")
+    omega = np.linspace(*ends, SAMPLES)
+    amplitudes = [
+        np.array([relative_from_below(branch, float(w)) for w in omega])
+        for branch in (unloaded, loaded)
+    ]
+    before, after = amplitudes
+    size = np.abs(after - before)
+    if not np.isfinite(size).any():
+        why = " ".join(one.status.value for one in (unloaded, loaded) if not one.complete)
+        raise IncompleteError(
+            "No motion of both the empty and the loaded machine is known in the operating region, "
+            f"{ends[0]:.6g} to {ends[1]:.6g} rad/s. {why}".strip()
+        )
+
+    def found(index: int, sign: float) -> Change:
+        return _refined(unloaded, loaded, omega, size, index, sign)
+
+    least, greatest = found(int(np.nanargmin(size)), 1.0), found(int(np.nanargmax(size)), -1.0)
+    return RegionChange(start, omega, before, after, least, greatest)
+
+
+def _refined(
+    unloaded: Branch, loaded: Branch, omega: Real, size: Real, index: int, sign: float
+) -> Change:
+    """The least (sign 1) or greatest (-1) change between the neighbours of a sample."""
+
+    def at(w: float) -> Change:
+        return Change(w, relative_from_below(unloaded, w), relative_from_below(loaded, w))
+
+    low, high = omega[max(index - 1, 0)], omega[min(index + 1, omega.size - 1)]
+    best = minimize_scalar(
+        lambda w: sign * abs(at(float(w)).change), bounds=(low, high), method="bounded",
+        options={"xatol": 1e-6},
+    )  # fmt: skip
+    sampled = at(float(omega[index]))
+    between = at(float(best.x))
+    inside = sign * abs(between.change) < sign * float(size[index])
+    return between if inside else sampled
+
+
+def relative_from_below(branch: Branch, omega: float) -> float:
+    """Relative amplitude in m at a speed in rad/s as it rises slowly; NaN without a motion."""
+    orbit = branch.orbit_from_below(omega)
+    return math.nan if orbit is None else orbit.amplitude("relative")

@@ -1,0 +1,249 @@
+"""Every periodic motion found at one frequency, mirror images too."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.continuation import arclength
+from flipflow.continuation.frequency_response import first_unknowns
+from flipflow.errors import IncompleteError
+from flipflow.model.arguments import checked_count, checked_generator, checked_speed
+from flipflow.model.monitor import Monitor
+from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.solver import STEP_SHARE, Point, Real
+from flipflow.periodic.two_event_starts import TwoEventProblem
+from flipflow.transient.settle import Settling
+
+STARTS = 64
+SETTLING_TURNS = 60
+MOST_PERIODS = 6
+SWEEP_RATIO, SWEEP_STEPS = 1.3, 12
+BRANCH_RATIOS, BRANCH_STEPS = (1.15, 2.5), 60
+
+logger = logging.getLogger("flipflow")
+
+
+def periodic_orbits(
+    machine: Machine,
+    omega: float,
+    max_periods: int = 1,
+    rng: int | np.random.Generator = 0,
+    monitor: Monitor | None = None,
+) -> tuple[Orbit, ...]:
+    """Periodic motions at ``omega`` that repeat after up to ``max_periods`` forcing periods.
+
+    Starts: the motions of the branch reached from below, between its folds too; for one symmetric
+    stop, every zero of the scalar problem of two-touch motions; rest; what is reached by stepping
+    the speed up and down to ``omega``; and a low-discrepancy cloud of states as large as the linear
+    motion or the gaps. Each is tried as it is (unstable motions are found so) and after some turns
+    of settling. Newton on the exact flow over 1, 2, ... turns, so that motions need not be
+    symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
+    A start whose flow does not end is left out; the monitor and the log hear how many were.
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        Forcing frequency in rad/s.
+    max_periods
+        Most forcing periods after which a motion may repeat, 1 to 6.
+    rng
+        Seed or generator for the cloud of starts.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
+
+    Returns
+    -------
+    tuple of Orbit
+        Stable and unstable, each once whatever its phase, largest relative motion at the first gap
+        first. A search, not a proof: a motion with a small basin and weak instability can be
+        missed.
+
+    Raises
+    ------
+    InputError
+        For a frequency that is not finite or not above 0, periods outside 1 to 6, or no seed.
+    IncompleteError
+        When no start at all could be followed.
+    """
+    checked_count("max_periods", max_periods, MOST_PERIODS)
+    search = _Search(machine, checked_speed(omega), max_periods)
+    starts = search.starts(checked_generator(rng))
+    if TwoEventProblem.applies(search.settling.solver.builder):
+        starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
+    for k, start in enumerate(starts):
+        search.try_from(start)
+        if monitor is not None:
+            monitor(search.progress(), (k + 1) / len(starts))
+    return search.orbits()
+
+
+def attracting_orbits(
+    machine: Machine, omega: float, rng: int | np.random.Generator = 0
+) -> tuple[Orbit, ...]:
+    """Stable motions of one forcing period to which a cloud of states settles.
+
+    Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
+    """
+    search = _Search(machine, checked_speed(omega), 1)
+    for start in search.starts(checked_generator(rng)):
+        search.try_settled(start)
+    return tuple(orbit for orbit in search.orbits() if orbit.stable)
+
+
+class _Search:
+    """The motions found so far at one frequency."""
+
+    def __init__(self, machine: Machine, omega: float, max_periods: int) -> None:
+        self.machine = machine
+        self.settling = Settling(system_of(machine), max_periods)
+        self.omega, self.max_periods = omega, max_periods
+        self.found: list[Point] = []
+        self.flown = self.lost = 0
+
+    def starts(self, rng: np.random.Generator) -> list[Real]:
+        """Rest, the branch from below, a cloud of states, and stepped speeds."""
+        solver = self.settling.solver
+        n = solver.system.size
+        X = np.abs(solver.builder.contact_free(np.array([self.omega]))[0])
+        gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
+        size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
+        box = np.concatenate([size, self.omega * size])
+        cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
+        stepped = (self._stepped(ratio) for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO))
+        return [
+            np.zeros(2 * n),
+            first_unknowns(solver, self.omega),
+            *(z for ratio in BRANCH_RATIOS for z in _on_branch(solver.system, self.omega, ratio)),
+            *((2.0 * cloud - 1.0) * box),
+            *(z for z in stepped if z is not None),
+        ]
+
+    def try_from(self, start: Real) -> None:
+        """Newton from a state and from where it settles to, for every number of periods."""
+        settled = self._flown(start, self.omega)
+        if settled is not None:
+            self._try(start)
+            self._try(settled)
+
+    def try_settled(self, start: Real) -> None:
+        """Newton from where a state settles to."""
+        settled = self._flown(start, self.omega)
+        if settled is not None:
+            self._try(settled)
+
+    def progress(self) -> str:
+        """What was found and what was left out, in words."""
+        lost = f", starts left out for too many contacts a turn: {self.lost}" if self.lost else ""
+        return f"{len(self.found)} motions found{lost}"
+
+    def orbits(self) -> tuple[Orbit, ...]:
+        """What was found, largest motion at the first gap first."""
+        if self.lost and not self.flown:
+            raise IncompleteError(
+                f"No start could be carried over a turn at {self.omega:.6g} rad/s: its contacts "
+                "are too many. Give more damping, or a higher speed."
+            )
+        if self.lost:
+            logger.warning("at %.6g rad/s: %s", self.omega, self.progress())
+        which = _first_gap(self.settling.solver.system)
+        found = [Orbit(self.machine, point) for point in self.found]
+        return tuple(sorted(found, key=lambda o: (-_reach(o, which), -o.state @ which)))
+
+    def _flown(self, z: Real, omega: float) -> Real | None:
+        """Where a state is after some turns; None where a flow does not end, which is counted."""
+        try:
+            states = self.settling.solver.section(z, omega, SETTLING_TURNS)
+        except IncompleteError:
+            self.lost += 1
+            return None
+        self.flown += 1
+        return np.asarray(states[-1])
+
+    def _stepped(self, ratio: float) -> Real | None:
+        """Where the machine settles from rest while the speed is stepped to the one asked for."""
+        z: Real | None = np.zeros(2 * self.settling.solver.system.size)
+        for speed in np.geomspace(ratio * self.omega, self.omega, SWEEP_STEPS):
+            z = None if z is None else self._flown(z, float(speed))
+        return z
+
+    def _try(self, z: Real) -> None:
+        for periods in range(1, self.max_periods + 1):
+            point = self.settling.solver_of(periods).solve(z, self.omega)
+            if point is not None and self.settling.shortest(point) is point:
+                self._keep(point)
+                if self.settling.solver.system.symmetric:
+                    self._keep(self._mirrored(point))
+
+    def _keep(self, point: Point) -> None:
+        """Add a motion unless it is known, in whatever phase."""
+        for known in self.found:
+            if known.solver.turns == point.solver.turns and any(
+                self.settling.same(point.u, phase, self.omega)
+                for phase in self.settling.phases(known)
+            ):
+                return
+        self.found.append(point)
+
+    def _mirrored(self, point: Point) -> Point:
+        """The mirror image: minus the state half a turn later."""
+        solver = self.settling.solver_of(point.solver.turns)
+        motion = solver.motion(point.u, self.omega)
+        t = math.pi / self.omega
+        state = -np.concatenate([motion.derivative(t, 0), motion.derivative(t, 1)])
+        mirrored = solver.solve(state, self.omega)
+        return point if mirrored is None else mirrored
+
+
+def _on_branch(system: MechanicalSystem, omega: float, ratio: float) -> list[Real]:
+    """States at ``omega`` of the branch reached from below, wherever it passes that speed.
+
+    It is followed from ``omega / ratio`` until it has left ``omega * ratio``.
+    """
+    solver = ExactSolver(system, half_turn=system.symmetric)
+    low, high = omega / ratio, omega * ratio
+    course = arclength.Course(
+        low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, arclength.QUICK
+    )
+    traced = solver.trace(first_unknowns(solver, low), low, course)
+    ahead = traced.omega - omega
+    states = []
+    for p in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
+        share = ahead[p] / ((ahead[p] - ahead[p + 1]) or 1.0)
+        guess = (1.0 - share) * traced.u[p] + share * traced.u[p + 1]
+        point = solver.solve(guess, omega)
+        states.append(guess if point is None else point.u)
+    return states
+
+
+def _spread(count: int, size: int, rng: np.random.Generator) -> Real:
+    """A Kronecker sequence from a random point on: (count, size) in [0, 1), evenly spread.
+
+    Its steps are powers of 1 / g with g^(size + 1) = g + 1, after Roberts.
+    """
+    # Kept apart from scipy.stats, whose import takes half a second of every report.
+    g = float(max(np.roots([1.0, *[0.0] * (size - 1), -1.0, -1.0]).real))
+    step = g ** -np.arange(1.0, size + 1.0)
+    return np.mod(rng.random(size) + np.outer(np.arange(count), step), 1.0)
+
+
+def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:
+    n = system.size
+    direction = system.springs[0].direction if system.springs else np.eye(n)[0]
+    return np.concatenate([direction, np.zeros(n)])
+
+
+def _reach(orbit: Orbit, which: Real) -> float:
+    """Half peak-to-peak at the first gap, in m, in steps that hide rounding between mirrors."""
+    vector = which[: orbit.system.size]
+    low, high, _ = orbit.point.solver.extremes(
+        orbit.unknowns[None], np.array([orbit.omega]), vector[None]
+    )
+    return round(float(high[0, 0] - low[0, 0]) / 2.0, 9)

@@ -1,0 +1,166 @@
+"""Poincare section and spectrum of a motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_count, checked_speed
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.transient.history import History
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """States of a motion once a forcing period, when the unbalance points along +x.
+
+    Parameters
+    ----------
+    system
+        The machine.
+    omega
+        Forcing frequency in rad/s.
+    states
+        (x, x') in m and m/s, one row a period, (T, 2 N).
+    """
+
+    system: MechanicalSystem
+    omega: float
+    states: Real
+
+    def __repr__(self) -> str:
+        return f"Section({self.states.shape[0]} turns at {self.omega:.6g} rad/s)"
+
+    def displacement(self, which: Coordinate) -> Real:
+        """Displacement of a coordinate in m, (T,)."""
+        return np.asarray(self.states[:, : self.system.size] @ self.system.coordinate(which))
+
+    def velocity(self, which: Coordinate) -> Real:
+        """Velocity of a coordinate in m/s, (T,)."""
+        return np.asarray(self.states[:, self.system.size :] @ self.system.coordinate(which))
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Amplitudes of the harmonic parts of a motion.
+
+    Parameters
+    ----------
+    omega
+        Forcing frequency in rad/s.
+    frequencies
+        In rad/s, rising from 0, (n,).
+    amplitudes
+        In m, (n,): a part a cos(w t + phi) that fits the time counts a; the mean counts once.
+    which
+        The coordinate.
+    """
+
+    omega: float
+    frequencies: Real
+    amplitudes: Real
+    which: Coordinate
+
+    def __repr__(self) -> str:
+        highest = f"{self.frequencies[-1]:.6g} rad/s"
+        return f"Spectrum({self.which!r}, {self.frequencies.size} lines up to {highest})"
+
+
+MOST_TURNS = 10_000_000
+SAMPLES_A_TURN = 512
+UNEVEN = 1e-9
+
+
+def poincare_section(
+    machine: Machine,
+    omega: float,
+    turns: int = 1000,
+    *,
+    initial: str | Orbit | ArrayLike = "rest",
+    skip: int = 500,
+) -> Section:
+    """States of a motion at the beginning of each forcing period, by the exact flow.
+
+    A periodic motion of n periods shows n points, a quasi-periodic one closed curves.
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        Speed in rad/s.
+    turns
+        Points wanted.
+    initial
+        "rest", an :class:`~flipflow.periodic.orbit.Orbit`, or a state (x, x'), (2 N,).
+    skip
+        Forcing periods that pass first.
+
+    Raises
+    ------
+    InputError
+        For a speed, count or state that makes no sense, and for a machine without damping.
+    IncompleteError
+        Where a turn has too many contacts to be recorded.
+    """
+    speed = checked_speed(omega)
+    checked_count("turns", turns, MOST_TURNS)
+    checked_count("skip", skip, MOST_TURNS, least=0)
+    solver = ExactSolver(system_of(machine), half_turn=False)
+    z = initial_state(solver.system.size, initial)
+    if skip:
+        z = solver.section(z, speed, skip)[-1]
+    return Section(solver.system, speed, solver.section(z, speed, turns))
+
+
+def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = None) -> Spectrum:
+    """Amplitude spectrum of a coordinate.
+
+    Of a periodic motion the harmonics of its own period; of a motion over time that of its last
+    whole forcing periods under a Hann window, with lines a ``periods``-th of the forcing frequency
+    apart.
+
+    Parameters
+    ----------
+    motion
+        An orbit, or a history at constant speed sampled evenly.
+    which
+        The coordinate.
+    periods
+        Forcing periods of a history to look at; half of them when left out.
+
+    Raises
+    ------
+    InputError
+        For a history that is sampled unevenly, or shorter than the periods asked for.
+    """
+    if isinstance(motion, Orbit):
+        count = SAMPLES_A_TURN * motion.periods
+        t = motion.period * np.arange(count) / count
+        amplitudes = 2.0 * np.abs(np.fft.rfft(motion.displacement(which, t))) / count
+        amplitudes[0] /= 2.0
+        lines = np.arange(amplitudes.size) * motion.omega / motion.periods
+        return Spectrum(motion.omega, lines, amplitudes, which)
+    step = np.diff(motion.t)
+    if motion.t.size < 3 or np.ptp(step) > UNEVEN * float(motion.t[-1]):
+        raise InputError("motion", "times", "give a history sampled at even times")
+    omega = float(motion.omega[-1])
+    turn = 2.0 * math.pi / omega / float(step.mean())
+    whole = int((motion.t.size - 1) / turn)
+    wanted = max(whole // 2, 1) if periods is None else periods
+    checked_count("periods", wanted, max(whole, 1))
+    count = round(wanted * turn)
+    x = motion.displacement(which)[-count - 1 : -1]
+    window = np.hanning(count + 1)[:-1]
+    amplitudes = 2.0 * np.abs(np.fft.rfft(window * x)) / window.sum()
+    amplitudes[0] /= 2.0
+    spaced = 2.0 * math.pi * np.fft.rfftfreq(count, float(step.mean()))
+    return Spectrum(omega, np.asarray(spaced, float), amplitudes, which)

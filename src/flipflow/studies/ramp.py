@@ -1,0 +1,192 @@
+"""A sweep that does not wait: the speed glides, and the jump comes late."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.frequency_response import frequency_response
+from flipflow.dynamics.normal import normal_motion
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_positive, checked_speeds
+from flipflow.model.drive import SpeedProfile
+from flipflow.model.monitor import Monitor
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Coordinate, Machine
+from flipflow.periodic.orbit import Orbit
+from flipflow.studies.periodic_orbits import attracting_orbits
+from flipflow.transient.history import History
+from flipflow.transient.speed_run import Start, normal_direction, run_history, swings
+
+Real = NDArray[np.float64]
+BEYOND = 1e-4
+WIDER = 0.15
+LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)
+
+
+@dataclass(frozen=True)
+class LateJump:
+    """A jump met on the way.
+
+    Parameters
+    ----------
+    fold
+        Speed in rad/s at which the motion ceases to exist.
+    omega
+        Speed in rad/s at which the amplitude has gone half the way to that of the other motion.
+    """
+
+    fold: float
+    omega: float
+
+    @property
+    def late(self) -> float:
+        """How far beyond the fold the jump comes, in rad/s."""
+        return abs(self.omega - self.fold)
+
+
+@dataclass(frozen=True, eq=False)
+class Ramp:
+    """A motion while the speed glides at a constant rate.
+
+    Parameters
+    ----------
+    machine
+        What moves.
+    rate
+        In rad/s^2, negative where the speed falls.
+    history
+        The motion over time.
+    branch
+        The periodic motions over the same speeds.
+    jumps
+        Jumps with how late they come.
+    """
+
+    machine: Machine
+    rate: float
+    history: History
+    branch: Branch
+    jumps: tuple[LateJump, ...]
+
+    def __repr__(self) -> str:
+        first, last = self.history.omega[0], self.history.omega[-1]
+        ends = f"{first:.6g} to {last:.6g} rad/s"
+        return f"Ramp({ends} at {self.rate:.4g} rad/s^2, {len(self.jumps)} jumps)"
+
+    def amplitude(self, which: Coordinate) -> tuple[Real, Real]:
+        """Speed in rad/s and amplitude in m at every turning point of a coordinate."""
+        h = self.history
+        t, size = swings(h.t, h.displacement(which), h.velocity(which))
+        return np.interp(t, h.t, h.omega), size
+
+
+def ramp(
+    machine: Machine, omega: tuple[float, float], rate: float, monitor: Monitor | None = None
+) -> Ramp:
+    """Let the speed glide from one value to another at a constant rate.
+
+    The motion starts from the periodic one at the first speed that is reached from the side away
+    from the last: from below where the speed rises, from above where it falls. Where that one is
+    not stable it is the largest, or the smallest, of the stable motions found by a search. It is
+    carried by the event-located Runge-Kutta pair 5(4).
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        First and last speed in rad/s; the last may be the lower.
+    rate
+        Size of the rate in rad/s^2; 1 rpm/s is 0.1047 rad/s^2.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
+
+    Raises
+    ------
+    InputError
+        For speeds or a rate that make no sense.
+    """
+    speeds = checked_speeds(omega)
+    if speeds.size != 2 or speeds[0] == speeds[1]:
+        raise InputError(
+            "omega", omega, "give two different speeds in rad/s, the first and the last"
+        )
+    (first, last), (low, high) = speeds.tolist(), np.sort(speeds).tolist()
+    rate = checked_positive("rate", rate, "rad/s^2")
+    branch = _branch_over(machine, low, high)
+    ends = branch.omega
+    held = ends.size > 0 and ends.min() <= first <= ends.max()
+    orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable] if held else []
+    orbits = orbits or list(attracting_orbits(machine, first))
+    if not orbits:
+        raise InputError("omega", omega, "no stable motion is known at the first speed")
+    orbit = orbits[0] if last > first else orbits[-1]
+    duration = abs(last - first) / rate
+    state = _with_normal(machine, first, orbit.state)
+    history = run_history(
+        machine, SpeedProfile((0.0, duration), (first, last)), Start(state, 0.0, first), duration,
+        fastest=high, monitor=monitor,
+    )  # fmt: skip
+    which = orbit.system.named[-1]
+    jumps = _jumps(branch, history, which, rising=last > first)
+    return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
+
+
+def _branch_over(machine: Machine, low: float, high: float) -> Branch:
+    """The motions from below over the speeds, begun low enough to come back from every fold."""
+    for share in LOWER_SHARES:
+        branch = frequency_response(machine, (share * low, (1.0 + WIDER) * high))
+        if branch.status is not BranchStatus.TURNED_BACK:
+            break
+    return branch
+
+
+def _with_normal(machine: Machine, omega: float, state: Real) -> Real:
+    """The state with the steady motion normal to the surface last in each half."""
+    if normal_direction(machine) is None or not isinstance(machine, FlipFlowScreen):
+        return state
+    steady = normal_motion(machine, omega)
+    if steady is None:
+        return state
+    x, v = np.split(state, 2)
+    return np.concatenate([x, steady.displacement([0.0]), v, steady.velocity([0.0])])
+
+
+def _jumps(
+    branch: Branch, history: History, which: Coordinate, *, rising: bool
+) -> tuple[LateJump, ...]:
+    t, size = swings(history.t, history.displacement(which), history.velocity(which))
+    speed = np.interp(t, history.t, history.omega)
+    found = []
+    for fold in branch.folds:
+        other = _beyond(branch, fold, rising=rising)
+        past = speed > fold.omega if rising else speed < fold.omega
+        if other is None or not past.any() or past.all():
+            continue
+        lost = np.abs(size - fold.amplitude(which)) > np.abs(size - other.amplitude(which))
+        rows = np.flatnonzero(past & lost)
+        if rows.size:
+            found.append(LateJump(fold.omega, float(speed[rows[0]])))
+    return tuple(found)
+
+
+def _beyond(branch: Branch, fold: SpecialPoint, *, rising: bool) -> Orbit | None:
+    """The stable motion just past a fold at which a gliding speed loses its motion.
+
+    None for a fold that opens towards the way the speed goes: nothing is lost there.
+    """
+    sign = 1.0 if rising else -1.0
+    k = int(fold.position)
+    neighbours = branch.omega[max(k - 1, 0) : k + 3]
+    if np.mean(sign * (neighbours - fold.omega)) > 0.0:
+        return None
+    past = (1.0 + sign * BEYOND) * fold.omega
+    if not branch.omega.min() <= past <= branch.omega.max():
+        return None
+    return next((orbit for orbit in branch.orbits_at(past) if orbit.stable), None)

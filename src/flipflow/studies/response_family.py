@@ -1,0 +1,239 @@
+"""How the response changes with one field of the machine: curves, peaks, region."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.frequency_response import frequency_response
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.arguments import check_interval
+from flipflow.model.fields import FIELD
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.periodic.options import Method
+from flipflow.studies.loading import relative_from_below
+from flipflow.studies.operating_region import Landmarks, analysed_range, landmarks
+
+Real = NDArray[np.float64]
+FREQUENCIES = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One machine of a family.
+
+    Parameters
+    ----------
+    value
+        The field's value, SI.
+    branch
+        Motions over speed, with their special points.
+    marks
+        Characteristic frequencies and operating region; None for a failed row.
+    failure
+        Why the row failed; empty where it did not.
+    """
+
+    value: float
+    screen: FlipFlowScreen
+    branch: Branch
+    marks: Landmarks | None
+    failure: str = ""
+
+    @cached_property
+    def main_peaks(self) -> tuple[SpecialPoint, ...]:
+        """Resonances of the main frame, rising in speed: w01 and w02 as its amplitude shows."""
+        return () if self.failure else self.branch.peaks("main")
+
+    @cached_property
+    def relative_peak(self) -> SpecialPoint | None:
+        """The largest relative motion."""
+        return None if self.failure else self.branch.peak("relative")
+
+    @cached_property
+    def antiresonance(self) -> SpecialPoint | None:
+        """Where the main frame moves least between its first and its last resonance."""
+        if len(self.main_peaks) < 2:
+            return None
+        first, last = self.main_peaks[0].position, self.main_peaks[-1].position
+        feet = [t for t in self.branch.troughs("main") if first < t.position < last]
+        return min(feet, key=lambda t: t.amplitude("main"), default=None)
+
+    def relative_amplitude(self, omega: float) -> float:
+        """Relative amplitude in m as the speed rises slowly; NaN where no motion is known."""
+        return math.nan if self.failure else relative_from_below(self.branch, omega)
+
+    @property
+    def zone(self) -> float:
+        """Width in rad/s of the zone of several solutions, w_ub - w_lb.
+
+        0 without folds; NaN for a failed row.
+        """
+        if self.marks is None:
+            return math.nan
+        if self.marks.omega_lb is None or self.marks.omega_ub is None:
+            return 0.0
+        return self.marks.omega_ub - self.marks.omega_lb
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseFamily:
+    """Responses of machines that differ in one field; returned by ``response_family``.
+
+    Parameters
+    ----------
+    screen
+        The machine they come from.
+    field
+        Name of the field.
+    members
+        One for each value, in the order given.
+    """
+
+    screen: FlipFlowScreen
+    field: str
+    members: tuple[Member, ...]
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{member.value:.6g}" for member in self.members)
+        return f"ResponseFamily({self.field}: {values})"
+
+    @property
+    def values(self) -> Real:
+        """The field's values, SI, (n,)."""
+        return np.array([member.value for member in self.members])
+
+    @cached_property
+    def common_region(self) -> tuple[float, float] | None:
+        """Speeds in rad/s in the operating region of every member that did not fail, or None."""
+        marks = [member.marks for member in self.members if member.marks is not None]
+        if not marks:
+            return None
+        low, high = max(one.lower for one in marks), min(one.upper for one in marks)
+        return (low, high) if low < high else None
+
+    @cached_property
+    def common_frequencies(self) -> Real:
+        """Equally spaced speeds of the common region in rad/s, ends included, (n_omega,)."""
+        if self.common_region is None:
+            return np.zeros(0)
+        return np.linspace(*self.common_region, FREQUENCIES)
+
+    @cached_property
+    def relative_amplitude(self) -> Real:
+        """Relative amplitude in m at the common frequencies, (n, n_omega); NaN where not known."""
+        return np.array(
+            [
+                [member.relative_amplitude(float(w)) for w in self.common_frequencies]
+                for member in self.members
+            ]
+        )
+
+    def table(self) -> dict[str, list[float | str | None]]:
+        """Peaks, folds, region and amplitude against the field, SI, one entry for each member.
+
+        Columns: the field; ``first_peak_omega``, ``first_peak_main``, ``second_peak_omega``,
+        ``second_peak_main`` of the main frame; ``relative_peak_omega``, ``relative_peak``;
+        ``omega_cs``, ``omega_lb``, ``omega_ub``, ``zone``; ``lower``, ``upper`` of the operating
+        region; ``relative_at_lower``, ``relative_at_middle``, ``relative_at_upper`` at the ends
+        and the middle of the common region; ``failure``.
+        """
+        rows = [self._row(k, member) for k, member in enumerate(self.members)]
+        return {name: [row[name] for row in rows] for name in rows[0]}
+
+    def _row(self, k: int, member: Member) -> dict[str, float | str | None]:
+        marks, peaks = member.marks, member.main_peaks
+        first = peaks[0] if len(peaks) > 1 else None
+        last = peaks[-1] if len(peaks) > 1 else None
+        names = ("omega_cs", "omega_lb", "omega_ub", "lower", "upper")
+        row: dict[str, float | str | None] = {
+            self.field: member.value,
+            "first_peak_omega": None if first is None else first.omega,
+            "first_peak_main": None if first is None else first.amplitude("main"),
+            "second_peak_omega": None if last is None else last.omega,
+            "second_peak_main": None if last is None else last.amplitude("main"),
+        }
+        top = member.relative_peak
+        row["relative_peak_omega"] = None if top is None else top.omega
+        row["relative_peak"] = None if top is None else top.amplitude("relative")
+        row |= {name: None if marks is None else getattr(marks, name) for name in names}
+        row["zone"] = member.zone
+        for place, at in (("lower", 0), ("middle", FREQUENCIES // 2), ("upper", -1)):
+            known = self.common_frequencies.size > 0
+            row[f"relative_at_{place}"] = float(self.relative_amplitude[k, at]) if known else None
+        return row | {"failure": member.failure}
+
+
+def response_family(
+    screen: FlipFlowScreen,
+    vary: Mapping[str, ArrayLike],
+    *,
+    omega: tuple[float, float] | None = None,
+    method: Method | None = None,
+) -> ResponseFamily:
+    """Follow the response over speed for several values of one field.
+
+    Parameters
+    ----------
+    screen
+        The machine whose other fields are kept.
+    vary
+        One field and its values, SI: ``{"clearance": [2e-3, 4e-3]}``.
+    omega
+        Speeds (low, high) in rad/s; None: wide enough for every member.
+    method
+        :class:`~flipflow.PiecewiseExact` (default) or :class:`~flipflow.HarmonicBalance`.
+
+    Returns
+    -------
+    ResponseFamily
+        One member for each value; one whose branch could not be finished is marked as failed.
+
+    Raises
+    ------
+    InputError
+        For anything but a screen, for other than one field, and for a value that physics forbids.
+    """
+    if not isinstance(screen, FlipFlowScreen):
+        raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
+    field, values = _one_field(vary)
+    screens = [screen.replace(**{field: float(value)}) for value in values]
+    spans = [analysed_range(one) for one in screens]
+    wide = (min(low for low, _ in spans), max(high for _, high in spans))
+    interval = wide if omega is None else check_interval(omega)
+    members = tuple(
+        _member(float(value), one, frequency_response(one, interval, method))
+        for value, one in zip(values, screens, strict=True)
+    )
+    return ResponseFamily(screen, field, members)
+
+
+def _one_field(vary: Mapping[str, ArrayLike]) -> tuple[str, Real]:
+    if not isinstance(vary, Mapping) or len(vary) != 1:
+        remedy = 'name one field and its values, as {"clearance": [5e-3, 6e-3]}'
+        raise InputError("vary", vary, remedy)
+    ((field, values),) = vary.items()
+    if field not in FIELD:
+        raise InputError("vary", field, f"choose one of {', '.join(FIELD)}")
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"vary[{field!r}]", values, "give numbers in SI") from None
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(f"vary[{field!r}]", values, "give a list of values")
+    return field, array
+
+
+def _member(value: float, screen: FlipFlowScreen, branch: Branch) -> Member:
+    if not branch.complete:
+        return Member(value, screen, branch, None, branch.status.value)
+    try:
+        return Member(value, screen, branch, landmarks(screen, branch))
+    except IncompleteError as error:
+        return Member(value, screen, branch, None, str(error))

@@ -1,0 +1,201 @@
+"""One quantity of many machines: in closed form where no stop acts, else motion by motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.continuation.branch import Branch
+from flipflow.continuation.frequency_response import first_unknowns, solver_for
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.fields import FIELD
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import system_of
+from flipflow.periodic.options import PiecewiseExact
+from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.stability import UNSTABLE
+from flipflow.studies.feasible import working_motion
+from flipflow.studies.linear_motions import LINEAR, LinearMotions
+from flipflow.studies.quantities import Quantity, Working
+from flipflow.studies.response_quantities import Response, ResponseQuantity
+
+Real = NDArray[np.float64]
+Columns = Mapping[str, NDArray[Any]]
+BranchWord = Literal["from-below", "upper", "lower"]
+STOP_FIELDS = {"stop_stiffness", "stop_damping", "clearance", "clearance_minus", "stop_law"}
+NEEDS_FOLDS = "jump_margin"
+CHUNK_ROWS = 16
+# Complex numbers in a chunk of the closed form: its temporaries stay in the cache.
+CHUNK_VALUES = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked of every sample.
+
+    Parameters
+    ----------
+    screen
+        The machine whose fields are changed.
+    quantity
+        What is read off.
+    omega
+        Frequencies in rad/s, (K,); K = 1 for a quantity of the whole response.
+    span
+        Frequencies analysed where the whole response is needed, rad/s.
+    branch
+        Which motion is meant.
+    """
+
+    screen: FlipFlowScreen
+    quantity: Quantity[Working] | ResponseQuantity
+    omega: Real
+    span: tuple[float, float]
+    branch: BranchWord
+
+    def in_closed_form(self, names: Sequence[str]) -> bool:
+        """Whether no sample can touch a stop and the quantity has a formula."""
+        free = not self.screen.has_stop and not STOP_FIELDS & set(names)
+        return free and self.quantity.name in LINEAR
+
+
+def closed_form_values(question: Question, columns: Columns, omega: Real) -> Real:
+    """The quantity of S samples at frequencies (K,), (S, K); NaN where physics forbids a value."""
+    names = ("normal_stiffness", "normal_damping", "shear_height")
+    nominal = {f.name: getattr(question.screen, f.name) for f in FIELD.values()}
+    fields: dict[str, Any] = {
+        name: np.asarray(value, dtype=float)
+        for name, value in nominal.items()
+        if value is not None or name in names
+    }
+    rows = len(next(iter(columns.values())))
+    values = np.empty((rows, omega.size))
+    step = max(CHUNK_VALUES // omega.size, 1)
+    for begin in range(0, rows, step):
+        part = slice(begin, begin + step)
+        own = {name: np.asarray(column[part], float)[:, None] for name, column in columns.items()}
+        motions = LinearMotions(fields | own, omega)
+        values[part] = LINEAR[question.quantity.name](motions)
+    for name, column in columns.items():
+        values[~_allowed(name, np.asarray(column, dtype=float))] = np.nan
+    return values
+
+
+def motion_values(
+    question: Question, columns: Columns, threads: int, tell: Callable[[float], None]
+) -> Real:
+    """The quantity of S samples at the frequencies asked, (S, K); NaN where there is none.
+
+    Chunks of samples go to ``threads`` threads; what ``tell`` raises ends the work.
+    """
+    names = tuple(columns)
+    rows = [tuple(map(_plain, row)) for row in zip(*columns.values(), strict=True)]
+    values = np.full((len(rows), question.omega.size), np.nan)
+
+    def chunk(begin: int) -> None:
+        for k in range(begin, min(begin + CHUNK_ROWS, len(rows))):
+            values[k] = _sample(question, names, rows[k])
+
+    for done in _each(chunk, range(0, len(rows), CHUNK_ROWS), threads):
+        tell(done)
+    return values
+
+
+def _each(work: Callable[[int], None], items: range, threads: int) -> Iterator[float]:
+    """Do all items and yield the share done after each."""
+    if threads == 1:
+        for k, item in enumerate(items):
+            work(item)
+            yield (k + 1) / len(items)
+        return
+    pool = ThreadPoolExecutor(threads)
+    try:
+        waiting = [pool.submit(work, item) for item in items]
+        for k, done in enumerate(as_completed(waiting)):
+            done.result()
+            yield (k + 1) / len(items)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _sample(question: Question, names: tuple[str, ...], row: tuple[object, ...]) -> Real:
+    try:
+        screen = question.screen.replace(**dict(zip(names, row, strict=True)))
+        return np.array([_number(value) for value in values_of(question, screen)])
+    except (InputError, IncompleteError):
+        return np.full(question.omega.size, np.nan)
+
+
+def values_of(question: Question, screen: FlipFlowScreen) -> Iterator[float | None]:
+    """The quantity of one screen at each frequency, None where there is none.
+
+    Raises
+    ------
+    InputError
+        For a machine without any damping.
+    IncompleteError
+        When a branch could not be followed.
+    """
+    quantity = question.quantity
+    if isinstance(quantity, ResponseQuantity):
+        yield quantity.evaluate(Response(screen, question.span))
+        return
+    for working in _workings(question, screen):
+        yield None if working is None else quantity.evaluate(working)
+
+
+def _workings(question: Question, screen: FlipFlowScreen) -> Iterator[Working | None]:
+    """The motion that is meant at each frequency."""
+    omega = question.omega.tolist()
+    below = question.branch == "from-below"
+    if below and question.quantity.name != NEEDS_FOLDS and len(omega) == 1:
+        yield _reached(screen, omega[0])
+        return
+    narrow = below and question.quantity.name != NEEDS_FOLDS
+    branch = Response(screen, (min(omega), max(omega)) if narrow else question.span).branch
+    for one in omega:
+        if below:
+            yield working_motion(screen, branch, one)
+        else:
+            yield _outermost(question, screen, branch, one)
+
+
+def _reached(screen: FlipFlowScreen, omega: float) -> Working | None:
+    """The motion reached from below at one frequency, without a branch around it."""
+    solver = solver_for(system_of(screen), PiecewiseExact())
+    solver.system.require_damping()
+    point = solver.solve(first_unknowns(solver, omega), omega)
+    return None if point is None else Working(screen, Orbit(screen, point))
+
+
+def _outermost(
+    question: Question, screen: FlipFlowScreen, branch: Branch, omega: float
+) -> Working | None:
+    """The largest or the smallest of the motions that are not unstable."""
+    found = [orbit for orbit in branch.orbits_at(omega) if orbit.stability != UNSTABLE]
+    if not found:
+        return None
+    pick = max if question.branch == "upper" else min
+    orbit = pick(found, key=lambda one: one.amplitude("relative"))
+    return Working(screen, orbit, tuple(fold.omega for fold in branch.folds))
+
+
+def _allowed(name: str, column: Real) -> NDArray[np.bool_]:
+    """Where physics allows the values of a field."""
+    field = FIELD[name]
+    low = column > field.lower if field.lower_open else column >= field.lower
+    return np.asarray(low & (column <= field.upper))
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _plain(value: Any) -> object:
+    return value.item() if isinstance(value, np.generic) else value

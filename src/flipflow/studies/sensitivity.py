@@ -1,0 +1,511 @@
+"""Which field of a machine matters most to a quantity."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow import __version__
+from flipflow.errors import IncompleteError, InputError, StoreError
+from flipflow.model.arguments import check_interval, checked_count, checked_generator
+from flipflow.model.monitor import Monitor
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.vary import Choice, Distribution, Interval, Normal, Variation, Vary, variations
+from flipflow.results.codec import array, plain
+from flipflow.studies.documents import Document, machine_document, screen_from
+from flipflow.studies.feasible import missing_words
+from flipflow.studies.operating_region import analysed_range
+from flipflow.studies.quantities import Quantity, Working
+from flipflow.studies.response_quantities import ResponseQuantity, quantity_named
+from flipflow.studies.samples import (
+    BranchWord,
+    Columns,
+    Question,
+    closed_form_values,
+    motion_values,
+    values_of,
+)
+from flipflow.studies.sobol import LEAST_GROUPS, SobolIndices, saltelli_sample, sobol_indices
+
+Real = NDArray[np.float64]
+KINDS: Mapping[str, type[Interval | Normal | Choice]] = {
+    "Interval": Interval,
+    "Normal": Normal,
+    "Choice": Choice,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Sobol indices of a quantity; it is what :func:`flipflow.sensitivity` returns.
+
+    Arrays over the D fields are (D,) where ``omega`` is one frequency or None, and (n_omega, D)
+    where it is an array; arrays over frequency are then numbers, or (n_omega,).
+
+    Parameters
+    ----------
+    screen
+        The machine about which the fields vary.
+    quantity
+        Name of the quantity, a key of the registry.
+    branch
+        Which motion is meant where several exist.
+    names, distributions
+        The fields in the order given, and how each varies.
+    omega
+        Frequencies in rad/s; the interval analysed where the quantity is one of a whole response.
+    n
+        Groups drawn; n (D + 2) samples were evaluated.
+    first_order, total
+        First-order and total indices S_i and S_Ti. 0 where the quantity does not vary; NaN where
+        too few samples were left.
+    first_order_confidence, total_confidence
+        Half widths of their 95 % confidence intervals.
+    mean, variance
+        Of the quantity over all independent samples, SI.
+    failed
+        Share of samples without a value. The whole group of D + 2 samples around a failed one is
+        left out, so that all pairs still differ in one field alone.
+    nominal
+        The quantity of the machine itself, SI.
+    at_low, at_high
+        The quantity with one field at the low or the high end of its range, SI.
+    notes
+        A sentence for each thing to keep in mind.
+    version
+        Version of flipflow.
+    """
+
+    screen: FlipFlowScreen
+    quantity: str
+    branch: str
+    names: tuple[str, ...]
+    distributions: tuple[Distribution, ...]
+    omega: float | Real | tuple[float, float]
+    n: int
+    first_order: Real
+    total: Real
+    first_order_confidence: Real
+    total_confidence: Real
+    mean: float | Real
+    variance: float | Real
+    failed: float | Real
+    nominal: float | Real
+    at_low: Real
+    at_high: Real
+    notes: tuple[str, ...]
+    version: str
+
+    def __repr__(self) -> str:
+        fields = ", ".join(self.names)
+        return f"Sensitivity({self.quantity} on {fields}; {self.n} groups)"
+
+    @property
+    def over_frequency(self) -> bool:
+        """Whether the indices are given over an array of frequencies."""
+        return self.total.ndim == 2
+
+    @property
+    def ends(self) -> tuple[tuple[object, object], ...]:
+        """Low and high end of each field's range, for which ``at_low`` and ``at_high`` stand."""
+        return tuple(distribution.ends for distribution in self.distributions)
+
+
+@dataclass(frozen=True, eq=False)
+class OneAtATime:
+    """A quantity with one field at a time at the ends of its range, all else as it is.
+
+    Parameters
+    ----------
+    screen, quantity, names, distributions, omega, nominal, at_low, at_high
+        As in :class:`Sensitivity`, at one frequency in rad/s.
+    """
+
+    screen: FlipFlowScreen
+    quantity: str
+    names: tuple[str, ...]
+    distributions: tuple[Distribution, ...]
+    omega: float
+    nominal: float
+    at_low: Real
+    at_high: Real
+
+    @property
+    def over_frequency(self) -> bool:
+        """Whether there is more than one frequency: there is not."""
+        return False
+
+    @property
+    def ends(self) -> tuple[tuple[object, object], ...]:
+        """Low and high end of each field's range."""
+        return tuple(distribution.ends for distribution in self.distributions)
+
+
+ARRAYS = (
+    "first_order", "total", "first_order_confidence", "total_confidence", "mean", "variance",
+    "failed", "nominal", "at_low", "at_high",
+)  # fmt: skip
+
+
+def sensitivity_document(result: Sensitivity) -> Document:
+    """A sensitivity with all it takes to open it again."""
+    return {
+        "version": result.version,
+        "machine": machine_document(result.screen),
+        "quantity": result.quantity,
+        "branch": result.branch,
+        "names": list(result.names),
+        "vary": [distribution_document(one) for one in result.distributions],
+        "omega": plain(result.omega),
+        "interval": isinstance(result.omega, tuple),
+        "n": result.n,
+        **{name: plain(getattr(result, name)) for name in ARRAYS},
+        "notes": list(result.notes),
+    }
+
+
+def sensitivity_from(document: Mapping[str, Any]) -> Sensitivity:
+    """The sensitivity that :func:`sensitivity_document` wrote.
+
+    Raises
+    ------
+    StoreError
+        When the document holds something this version does not know.
+    """
+    arrays = {name: _numbers(document[name]) for name in ARRAYS}
+    omega = document["omega"]
+    return Sensitivity(
+        screen=screen_from(document["machine"]),
+        quantity=document["quantity"],
+        branch=document["branch"],
+        names=tuple(document["names"]),
+        distributions=tuple(distribution_from(one) for one in document["vary"]),
+        omega=(float(omega[0]), float(omega[1])) if document["interval"] else _numbers(omega),
+        n=int(document["n"]),
+        notes=tuple(document["notes"]),
+        version=document["version"],
+        **arrays,
+    )
+
+
+def distribution_document(distribution: Distribution) -> Document:
+    """How a field varies, by name and numbers."""
+    fields = dataclasses.asdict(distribution)  # type: ignore[call-overload]
+    return {"kind": type(distribution).__name__, **plain(fields)}
+
+
+def distribution_from(document: Mapping[str, Any]) -> Distribution:
+    """The distribution of a document.
+
+    Raises
+    ------
+    StoreError
+        For a distribution that this version does not know.
+    """
+    if document["kind"] not in KINDS:
+        raise StoreError(f"the distribution {document['kind']!r} is not known; update flipflow")
+    values = {key: value for key, value in document.items() if key != "kind"}
+    if "values" in values:
+        values["values"] = tuple(values["values"])
+    return KINDS[document["kind"]](**values)
+
+
+def _numbers(values: object) -> Any:
+    """An array, or the number where it is one."""
+    found = array(values)
+    return float(found) if found.ndim == 0 else found
+
+
+N_MOST = 2**20
+# Values held at once: all samples at as many frequencies as fit.
+BLOCK_VALUES = 2_000_000
+
+
+def sensitivity(
+    machine: FlipFlowScreen,
+    vary: Vary,
+    quantity: str,
+    omega: ArrayLike | None = None,
+    *,
+    n: int = 4096,
+    rng: int | np.random.Generator = 0,
+    threads: int | None = None,
+    monitor: Monitor | None = None,
+    branch: BranchWord = "from-below",
+) -> Sensitivity:
+    r"""Sobol indices of a quantity on fields of a screen that vary independently.
+
+    The first-order index :math:`S_i = \mathrm{Var}(E(y | x_i)) / \mathrm{Var}(y)` is the share of
+    the variance that goes away when field i is known; the total index
+    :math:`S_{Ti} = 1 - \mathrm{Var}(E(y | x_{\sim i})) / \mathrm{Var}(y)` is what remains when all
+    others are. n (D + 2) samples are drawn from Sobol's scrambled sequence in Saltelli's scheme.
+    A screen without stop is evaluated in closed form; otherwise a motion is solved for in every
+    sample. A sample without a value does not end the work: its group of D + 2 is left out, and
+    ``failed`` says how many there were.
+
+    Parameters
+    ----------
+    machine
+        The screen about which the fields vary.
+    vary
+        Fields of the screen, each with an interval (low, high), an array that is sampled as it
+        stands, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
+    quantity
+        A quantity of a motion, such as ``"relative_amplitude"`` or ``"main_frame_acceleration"``,
+        or one of the whole response: ``"peak_amplitude"``, ``"peak_frequency"``, ``"omega_ea"``,
+        ``"omega_ar"``, ``"omega_cs"``, ``"omega_lb"``, ``"omega_ub"``.
+    omega
+        Frequency in rad/s, one or (n_omega,). For a quantity of the whole response the interval
+        (low, high) analysed; None: from well below the first natural frequency of the machine to
+        well above the last with the stop engaged.
+    n
+        Groups; best a power of two.
+    rng
+        Seed or generator.
+    threads
+        Threads over chunks of samples where motions are solved for; None: one, because most of
+        the work around a motion is not free to run beside itself.
+    monitor
+        Called with a sentence and the share done, 0 to 1. What it raises ends the work.
+    branch
+        The motion that is meant where several exist: ``"from-below"`` is met when the speed is
+        raised slowly, ``"upper"`` and ``"lower"`` are the largest and the smallest relative
+        amplitude of those motions of the branch that are not unstable.
+
+    Returns
+    -------
+    Sensitivity
+        Indices (D,) for one frequency, (n_omega, D) for several, with confidence intervals.
+
+    Raises
+    ------
+    InputError
+        For an unknown field or quantity, a range that physics forbids, and data that the quantity
+        needs and the screen does not have.
+    MissingExtra
+        When SALib is not installed.
+
+    References
+    ----------
+    Saltelli and others, Computer Physics Communications 181 (2010) 259-270, for the estimators.
+    """
+    question = _question(machine, quantity, omega, branch)
+    varied = variations(vary, machine)
+    workers = checked_count("threads", 1 if threads is None else threads, 256)
+    groups = checked_count("n", n, N_MOST, least=LEAST_GROUPS)
+    generator = checked_generator(rng)
+    nominal = _nominal(question)
+    points = saltelli_sample(len(varied), groups, generator)
+    u = points.reshape(-1, len(varied))
+    columns = {one.name: one.distribution.quantile(u[:, i]) for i, one in enumerate(varied)}
+    draws = np.random.default_rng(generator.integers(2**63)).bit_generator.state
+    blocks = [
+        _analysed(values.reshape(*points.shape[:2], -1), draws)
+        for values in _values(question, columns, nominal, workers, monitor)
+    ]
+    found, failed = _joined(blocks)
+    rows = _ends(machine, varied)
+    ends = np.concatenate(list(_values(question, rows, nominal, workers, None)), axis=1)
+    return _result(question, varied, groups, found, failed, nominal, ends, omega)
+
+
+def one_at_a_time(
+    machine: FlipFlowScreen,
+    vary: Vary,
+    quantity: str,
+    omega: float,
+    *,
+    branch: BranchWord = "from-below",
+) -> OneAtATime:
+    """Move each field alone to the ends of its range: what a tornado chart shows.
+
+    Parameters
+    ----------
+    machine, vary, quantity, branch
+        As for :func:`sensitivity`.
+    omega
+        One frequency in rad/s.
+
+    Raises
+    ------
+    InputError
+        As for :func:`sensitivity`.
+    """
+    question = _question(machine, quantity, omega, branch)
+    varied = variations(vary, machine)
+    nominal = _nominal(question)
+    rows = _ends(machine, varied)
+    ends = np.concatenate(list(_values(question, rows, nominal, 1, None)), axis=1)[:, 0]
+    return OneAtATime(
+        screen=machine,
+        quantity=quantity,
+        names=tuple(variation.name for variation in varied),
+        distributions=tuple(variation.distribution for variation in varied),
+        omega=float(omega),
+        nominal=float(nominal[0, 0]),
+        at_low=ends[: len(varied)],
+        at_high=ends[len(varied) :],
+    )
+
+
+def _question(machine: object, name: str, omega: object, branch: BranchWord) -> Question:
+    if not isinstance(machine, FlipFlowScreen):
+        raise InputError("machine", type(machine).__name__, "give a FlipFlowScreen")
+    quantity = quantity_named(name)
+    if branch not in get_args(BranchWord):
+        raise InputError("branch", branch, f"choose one of {', '.join(get_args(BranchWord))}")
+    span = analysed_range(machine)
+    if isinstance(quantity, ResponseQuantity):
+        wanted = span if omega is None else check_interval(omega)
+        return Question(machine, quantity, np.array([np.nan]), wanted, branch)
+    _require_data(machine, quantity)
+    frequencies = _frequencies(omega, name)
+    low, high = float(frequencies.min()), float(frequencies.max())
+    wide = min(span[0], 0.9 * low), max(span[1], 1.1 * high)
+    return Question(machine, quantity, frequencies, wide, branch)
+
+
+def _nominal(question: Question) -> Real:
+    """The quantity of the machine itself, (1, K); a machine that cannot be solved at all raises."""
+    try:
+        values = [list(values_of(question, question.screen))]
+    except IncompleteError:
+        values = [[None] * question.omega.size]
+    return np.array(values, dtype=float)
+
+
+def _require_data(machine: FlipFlowScreen, quantity: Quantity[Working]) -> None:
+    absent = tuple(need for need in quantity.needs if getattr(machine, need) is None)
+    if absent:
+        raise InputError("quantity", quantity.name, missing_words(absent))
+
+
+def _frequencies(omega: object, name: str) -> Real:
+    """Frequencies in rad/s, (K,)."""
+    remedy = f"give frequencies above 0 rad/s at which {name} is meant, one or (n_omega,)"
+    try:
+        found = np.atleast_1d(np.asarray(omega, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("omega", omega, remedy) from None
+    if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found) & (found > 0.0)):
+        raise InputError("omega", omega, remedy)
+    return found
+
+
+def _values(
+    question: Question,
+    columns: Columns,
+    nominal: Real,
+    threads: int,
+    monitor: Monitor | None,
+) -> Iterator[Real]:
+    """Values (S, K) of all samples, a block of frequencies after the other."""
+    rows = len(next(iter(columns.values())))
+
+    def tell(share: float) -> None:
+        if monitor is not None:
+            monitor(f"{question.quantity.label}: {rows} samples", share)
+
+    if not question.in_closed_form(tuple(columns)):
+        yield _near(question, motion_values(question, columns, threads, tell), nominal)
+        return
+    step = max(BLOCK_VALUES // rows, 1)
+    for begin in range(0, question.omega.size, step):
+        part = slice(begin, begin + step)
+        values = closed_form_values(question, columns, question.omega[part])
+        yield _near(question, values, nominal[:, part])
+        tell(min((begin + step) / question.omega.size, 1.0))
+
+
+def _near(question: Question, values: Real, nominal: Real) -> Real:
+    """Angles within half a turn of the machine's own, so that +pi and -pi are no distance."""
+    if question.quantity.unit != "rad":
+        return values
+    about = np.where(np.isfinite(nominal), nominal, 0.0)
+    return np.asarray(about + np.angle(np.exp(1j * (values - about))))
+
+
+def _analysed(values: Real, draws: Any) -> tuple[SobolIndices, Real]:
+    """Indices and share of failed samples of a block; all blocks draw the same resamples."""
+    generator = np.random.default_rng()
+    generator.bit_generator.state = draws
+    return sobol_indices(values, generator), 1.0 - np.isfinite(values).mean(axis=(0, 1))
+
+
+def _joined(blocks: Sequence[tuple[SobolIndices, Real]]) -> tuple[SobolIndices, Real]:
+    names = SobolIndices.__dataclass_fields__
+    tables = [np.concatenate([getattr(one, name) for one, _ in blocks]) for name in names]
+    return SobolIndices(*tables), np.concatenate([failed for _, failed in blocks])
+
+
+def _ends(machine: FlipFlowScreen, varied: Sequence[Variation]) -> Columns:
+    """Rows that change one field at a time: all low ends, then all high ends."""
+    count = len(varied)
+    columns: dict[str, NDArray[Any]] = {}
+    for i, one in enumerate(varied):
+        column = np.full(2 * count, getattr(machine, one.name), dtype=object)
+        column[i], column[count + i] = one.distribution.ends
+        columns[one.name] = column
+    return columns
+
+
+def _result(
+    question: Question,
+    varied: Sequence[Variation],
+    n: int,
+    found: SobolIndices,
+    failed: Real,
+    nominal: Real,
+    ends: Real,
+    omega: object,
+) -> Sensitivity:
+    response = isinstance(question.quantity, ResponseQuantity)
+    one = response or np.ndim(omega) == 0  # type: ignore[arg-type]
+
+    def over(table: Real) -> Any:
+        picked = table[0] if one else table
+        return float(picked) if np.ndim(picked) == 0 else picked
+
+    count = len(varied)
+    return Sensitivity(
+        screen=question.screen,
+        quantity=question.quantity.name,
+        branch=question.branch,
+        names=tuple(variation.name for variation in varied),
+        distributions=tuple(variation.distribution for variation in varied),
+        omega=question.span if response else over(question.omega),
+        n=n,
+        first_order=over(found.first_order),
+        total=over(found.total),
+        first_order_confidence=over(found.first_order_confidence),
+        total_confidence=over(found.total_confidence),
+        mean=over(found.mean),
+        variance=over(found.variance),
+        failed=over(failed),
+        nominal=over(nominal[0]),
+        at_low=over(ends[:count].T),
+        at_high=over(ends[count:].T),
+        notes=tuple(_notes(n, found, failed)),
+        version=__version__,
+    )
+
+
+def _notes(n: int, found: SobolIndices, failed: Real) -> Iterator[str]:
+    if n & (n - 1):
+        yield f"n = {n} is no power of two: the samples cover the ranges less evenly."
+    if np.any(failed > 0.0):
+        least = int(found.groups.min())
+        yield (
+            f"Up to {100.0 * failed.max():.3g} % of the samples have no finite value; the whole "
+            f"group around each is left out, and at least {least} of {n} groups remain."
+        )
+    if np.any(found.groups < LEAST_GROUPS):
+        yield "Where fewer than two groups remain no index is given."
+    if np.any(found.constant):
+        at = "" if found.constant.size == 1 else f" at {found.constant.sum()} of the frequencies"
+        yield f"The quantity does not vary{at}: its indices are zero there."

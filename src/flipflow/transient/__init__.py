@@ -1,0 +1,1 @@
+"""Motion in time: simulation, sweeps, varying speed, start and stop."""

@@ -1,0 +1,114 @@
+"""A machine carried through time at constant speed by the exact flow, stretch by stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled import status
+from flipflow.errors import IncompleteError
+from flipflow.model.system import MechanicalSystem
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.scratch import MOST_SEGMENTS
+from flipflow.transient.sampling import Budget, Changes, Table, sample_motion
+
+Real = NDArray[np.float64]
+GAUSS_NODES = 16
+TURNS_A_CALL = 32
+SHORTEST = 2.0**-12  # share of a turn
+
+
+class Recording:
+    """Samples, changes of contact and energies of a motion; the machine may change on the way.
+
+    Parameters
+    ----------
+    t
+        Times at which the motion is wanted, rising, (K,).
+    size, springs
+        Degrees of freedom N and springs m.
+    """
+
+    def __init__(self, t: Real, size: int, springs: int) -> None:
+        k = t.size
+        self.table = Table(
+            t, np.empty((k, size)), np.empty((k, size)), np.empty((k, size)), np.empty((k, springs))
+        )
+        self.row = 0
+        self.changes: list[tuple[float, int, int]] = []
+        self.work = {"input": 0.0, "dampers": 0.0, "stops": 0.0}
+
+    def carry(
+        self,
+        system: MechanicalSystem,
+        z: Real,
+        omega: float,
+        begin: float,
+        end: float,
+        tell: Callable[[float], None],
+    ) -> Real:
+        """State at ``end`` from z at ``begin``; ``tell`` hears the time reached.
+
+        Raises
+        ------
+        IncompleteError
+            When the flow does not end even over a short part of a turn, as where stops chatter.
+        """
+        solver = ExactSolver(system, half_turn=False)
+        node, weight = np.polynomial.legendre.leggauss(GAUSS_NODES)
+        budget = Budget(
+            solver.system.C.copy(), solver.system.excitation.vector.astype(np.complex128),
+            node, weight, np.zeros(3),
+        )  # fmt: skip
+        turn = 2.0 * np.pi / omega
+        stretch = TURNS_A_CALL * turn
+        t = begin
+        while t < end:
+            until = min(t + stretch, end)
+            reached = self._stretch(solver, z, omega, t, until, budget)
+            if reached is None:
+                # A turn has more contacts than are recorded at once: go on by parts of it.
+                stretch = min(stretch, turn) / 2.0
+                if stretch < turn * SHORTEST:
+                    raise IncompleteError(f"the motion could not be carried on beyond {t:.6g} s")
+                continue
+            z, t = reached, until
+            tell(t)
+        for name, work in zip(self.work, budget.work, strict=True):
+            self.work[name] += float(work)
+        return z
+
+    def _stretch(
+        self, solver: ExactSolver, z: Real, omega: float, t: float, until: float, budget: Budget
+    ) -> Real | None:
+        """State at ``until``; None, and nothing recorded, where the flow does not end."""
+        capacity = (TURNS_A_CALL + 2) * MOST_SEGMENTS
+        kept = budget.work.copy()
+        while True:
+            changes = Changes(
+                np.empty(capacity), np.empty(capacity, np.int64), np.empty(capacity, np.int64),
+                np.zeros(1, np.int64),
+            )  # fmt: skip
+            problem = solver.turn
+            problem.flow.z[:] = z
+            code, row = sample_motion(
+                problem, omega, t, until, self.row, self.table, changes, budget
+            )
+            if code != status.MISSING_CONFIGURATION:
+                break
+            budget.work[:] = kept
+            solver.add_configuration(problem.flow)
+        if code != status.OK:
+            budget.work[:] = kept
+            return None
+        self.row = row
+        count = int(changes.used[0])
+        self.changes += zip(
+            changes.t[:count].tolist(),
+            changes.spring[:count].tolist(),
+            changes.state[:count].tolist(),
+            strict=True,
+        )
+        return problem.flow.z.copy()

@@ -1,0 +1,202 @@
+"""Letting a machine run until it has settled on a periodic motion, and knowing how far off it is.
+
+Differences between turns say little: just past a fold a motion lingers where none exists, and
+slow multipliers creep. The periodic motion that is approached is therefore solved for; its distance
+is known in metres, and its leading multiplier tells how many turns are still to go.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled import status
+from flipflow.continuation import arclength
+from flipflow.errors import IncompleteError
+from flipflow.model.system import MechanicalSystem
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.solver import STEP_SHARE, Point, Real
+from flipflow.periodic.stability import STABLE, stability_words
+
+MOST_TURNS = 4000
+TOLERANCE = 1e-9
+FIRST_CHUNK, LONGEST_CHUNK = 16, 256
+NEAR = 0.1
+SAME_PERIOD = 3.0
+RECENT = 64
+SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Where a machine is after running on.
+
+    Parameters
+    ----------
+    state
+        State (x, x') at a whole number of forcing periods, (2 N,).
+    turns
+        Forcing periods run.
+    point
+        The stable periodic motion that is approached, None where there is none near.
+    distance
+        Distance from it in m; infinite without one.
+    settled
+        Whether the distance is below the tolerance.
+    recent
+        States of the last turns, (up to 64, 2 N).
+    """
+
+    state: Real
+    turns: int
+    point: Point | None
+    distance: float
+    settled: bool
+    recent: Real
+
+
+class Settling:
+    """Runs one machine until it settles.
+
+    Parameters
+    ----------
+    system
+        The machine.
+    max_periods
+        Longest period looked for, in forcing periods.
+    """
+
+    def __init__(self, system: MechanicalSystem, max_periods: int) -> None:
+        self.solver = ExactSolver(system, half_turn=False)
+        self.max_periods = max_periods
+        self._solvers = {1: self.solver}
+
+    def solver_of(self, periods: int) -> ExactSolver:
+        """The solver of motions that repeat after ``periods`` forcing periods."""
+        if periods not in self._solvers:
+            self._solvers[periods] = self.solver.with_turns(periods)
+        return self._solvers[periods]
+
+    def settle(
+        self, z: Real, omega: float, *, most: int = MOST_TURNS, tolerance: float = TOLERANCE
+    ) -> Settled:
+        """Run from z until the distance falls below ``tolerance`` times the motion's size.
+
+        Not settled is, too, where the flow over a turn does not end.
+        """
+        turns, chunk = 0, FIRST_CHUNK
+        recent = np.array(z, float)[None]
+        while True:
+            point = self.approached(recent, omega)
+            distance = math.inf if point is None else self.distance(recent[-1], point.u, omega)
+            done = distance <= tolerance * (self.size(recent, omega) + self.solver.length)
+            if done or turns >= most:
+                return Settled(recent[-1].copy(), turns, point, distance, done, recent)
+            chunk = min(2 * chunk, LONGEST_CHUNK)
+            if point is not None:
+                chunk = self._turns_to_go(point, distance, tolerance * self.size(recent, omega))
+            run = self._run(recent[-1], omega, min(chunk, most - turns))
+            if run is None:
+                return Settled(recent[-1].copy(), turns, None, math.inf, False, recent)
+            recent = np.concatenate([recent, run])[-RECENT:]
+            turns += run.shape[0]
+
+    def _run(self, z: Real, omega: float, turns: int) -> Real | None:
+        """States after 1, 2, ... turns, (turns, 2 N); None where a flow does not end."""
+        try:
+            return self.solver.section(z, omega, turns)
+        except IncompleteError:
+            return None
+
+    def approached(self, recent: Real, omega: float) -> Point | None:
+        """The stable periodic motion near the last of the recent states (K, 2 N)."""
+        last = recent[-1]
+        size = self.size(recent, omega)
+        steps = [
+            self.distance(last, recent[-1 - n], omega)
+            for n in range(1, min(self.max_periods, recent.shape[0] - 1) + 1)
+        ]
+        if not steps or min(steps) > NEAR * size:
+            return None
+        least = SAME_PERIOD * min(steps) + 1e-12 * size
+        periods = 1 + next(k for k, step in enumerate(steps) if step <= least)
+        point = self.solver_of(periods).solve(last, omega)
+        if point is None or self.distance(last, point.u, omega) > NEAR * size:
+            return None
+        # A spiral may come closer to itself after some turns than after one.
+        point = self.shortest(point)
+        return point if is_stable(point) else None
+
+    def phases(self, point: Point) -> Real:
+        """States of a motion after 1, 2, ... all of its forcing periods, the last its own."""
+        return self.solver.section(point.u, point.omega, point.solver.turns)
+
+    def same(self, z: Real, other: Real, omega: float) -> bool:
+        """Whether two states differ by less than 1e-6 of the motion's size."""
+        size = self.size(other[None], omega) + self.solver.length
+        return self.distance(z, other, omega) < SAME * size
+
+    def shortest(self, point: Point) -> Point:
+        """The same motion with the least number of forcing periods after which it repeats."""
+        phases = self.phases(point)
+        repeats = (n for n, z in enumerate(phases, 1) if self.same(point.u, z, point.omega))
+        periods = next(repeats, point.solver.turns)
+        if periods == point.solver.turns:
+            return point
+        return self.solver_of(periods).solve(point.u, point.omega) or point
+
+    def distance_ahead(self, z: Real, omega: float) -> float | None:
+        """Distance in m of the state z from the periodic motion ahead; None where none is near."""
+        ahead = self._run(z, omega, 2 * self.max_periods)
+        if ahead is None:
+            return None
+        point = self.approached(np.concatenate([z[None], ahead]), omega)
+        if point is None:
+            return None
+        return min(self.distance(z, phase, omega) for phase in self.phases(point))
+
+    def continued(self, point: Point, omega: float) -> Point | None:
+        """The motion followed along its branch to another frequency; None where it turns back."""
+        if omega == point.omega:
+            return point
+        low, high = sorted((point.omega, omega))
+        course = arclength.Course(
+            low, high, high - low, STEP_SHARE, math.copysign(1.0, omega - point.omega),
+            arclength.QUICK,
+        )  # fmt: skip
+        solver = self.solver_of(point.solver.turns)
+        traced = solver.trace(point.u, point.omega, course)
+        reached = traced.code in (status.REACHED_UPPER, status.REACHED_LOWER)
+        if not reached or traced.omega[-1] != omega:
+            return None
+        return solver.solve(traced.u[-1], omega)
+
+    def size(self, states: Real, omega: float) -> float:
+        """Largest displacement, or velocity over omega, of states (K, 2 N)."""
+        return float(np.abs(self._lengths(states, omega)).max())
+
+    def distance(self, z: Real, other: Real, omega: float) -> float:
+        """Largest difference of two states in displacement, or velocity over omega, in m."""
+        return float(np.abs(self._lengths(z - other, omega)).max())
+
+    def _lengths(self, z: Real, omega: float) -> NDArray[np.float64]:
+        n = self.solver.system.size
+        scale = np.concatenate([np.ones(n), np.full(n, omega)])
+        return np.asarray(z / scale)
+
+    @staticmethod
+    def _turns_to_go(point: Point, distance: float, aim: float) -> int:
+        """Turns after which the leading multiplier has brought the distance down to ``aim``."""
+        rho = float(np.abs(point.eigenvalues).max())
+        periods = point.solver.turns
+        if rho == 0.0 or distance <= aim:
+            return periods
+        return min(periods * (1 + math.ceil(math.log(aim / distance) / math.log(rho))), 4 * RECENT)
+
+
+def is_stable(point: Point) -> bool:
+    """Whether all multipliers of a motion lie within the unit circle."""
+    return str(stability_words(point.eigenvalues[None], None)[0]) == STABLE

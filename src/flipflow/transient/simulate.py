@@ -1,0 +1,273 @@
+"""What a machine does over time at constant speed, from rest or any state, disturbed or not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow.dynamics.normal import normal_motion
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_count, checked_speed
+from flipflow.model.disturbance import Disturbance, Impulse, LoadStep
+from flipflow.model.elements import Unbalance
+from flipflow.model.monitor import Monitor
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.transient.history import ContactChange, History
+from flipflow.transient.recording import Recording
+from flipflow.transient.settle import Settling
+from flipflow.transient.sweep import MAX_PERIODS
+
+Real = NDArray[np.float64]
+SAMPLES_A_TURN = 128
+MOST_PERIODS = 1_000_000
+MOST_SAMPLES = 20_000_000
+SETTLED = 1e-6
+ROUNDING = 1e-12
+
+
+def simulate(
+    machine: Machine,
+    omega: float,
+    periods: int = 200,
+    initial: str | Orbit | ArrayLike = "rest",
+    disturbances: Sequence[Disturbance] = (),
+    *,
+    t: ArrayLike | None = None,
+    monitor: Monitor | None = None,
+) -> History:
+    """Carry a machine through time at constant speed by the exact flow.
+
+    Between contacts the motion is closed form, contacts are found by the certified search:
+    the result is exact up to rounding, whatever the times asked for. Energies are integrated
+    along the way by Gauss panels.
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        Speed in rad/s; the unbalance points along +x at t = 0.
+    periods
+        Forcing periods to carry on for.
+    initial
+        "rest", an :class:`~flipflow.periodic.orbit.Orbit`, or a state (x, x'), (2 N,).
+    disturbances
+        Each an :class:`~flipflow.Impulse`, :class:`~flipflow.LoadStep` or
+        :class:`~flipflow.Lump` at its time; the last two need a screen.
+    t
+        Times in s at which the motion is wanted; 128 a period when left out.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
+
+    Returns
+    -------
+    History
+        Motion, stop forces, energies, whether the motion is periodic at the end and how far
+        from the periodic motion it still is. A motion is called settled within 1e-6 of its size.
+
+    Raises
+    ------
+    InputError
+        For a speed, count, state or disturbance that makes no sense, and for a machine without
+        any damping, which never settles.
+    IncompleteError
+        Where stops chatter: too many contacts even in a small part of a turn.
+    """
+    speed = checked_speed(omega)
+    checked_count("periods", periods, MOST_PERIODS)
+    turn = 2.0 * math.pi / speed
+    end = periods * turn
+    system = system_of(machine)
+    times = _times(t, periods, turn)
+    for one in disturbances:
+        if not isinstance(one, Disturbance):
+            raise InputError("disturbances", one, "give ff.Impulse, ff.LoadStep or ff.Lump")
+    blows = sorted(disturbances, key=lambda one: one.t)
+    if blows and blows[-1].t >= end:
+        raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
+    z = initial_state(system.size, initial)
+    run = _Run(machine, system_of, speed, end, monitor)
+    run.carry(Recording(times, system.size, len(run.kept)), z, blows)
+    settling = Settling(system_of(run.machine), MAX_PERIODS)
+    distance = settling.distance_ahead(run.z, speed)
+    near = distance is not None and distance <= SETTLED * settling.size(run.z[None], speed)
+    return History(
+        system=system,
+        t=times,
+        x=run.recording.table.x,
+        v=run.recording.table.v,
+        a=run.recording.table.a,
+        force=run.forces(),
+        omega=np.full(times.size, speed),
+        angle=speed * times,
+        normal=_normal(machine, speed, times, initial, blows, end),
+        energy=run.energy(),
+        settled=near,
+        distance=distance,
+        events=run.events(),
+        status="The motion was carried to its end.",
+        method="exact flow",
+        counters={"events": len(run.recording.changes)},
+    )
+
+
+def _times(t: ArrayLike | None, periods: int, turn: float) -> Real:
+    if t is None:
+        count = periods * SAMPLES_A_TURN
+        if count > MOST_SAMPLES:
+            raise InputError("periods", periods, "give the times t wanted for so long a run")
+        return np.linspace(0.0, periods * turn, count + 1)
+    times = np.atleast_1d(np.asarray(t, float)).copy()
+    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
+        raise InputError("t", t, "give finite times in one row")
+    end = periods * turn
+    if times[0] < 0.0 or times[-1] > end * (1.0 + ROUNDING) or (np.diff(times) < 0.0).any():
+        raise InputError("t", t, f"give rising times from 0 to {end:.6g} s")
+    return np.asarray(np.minimum(times, end))
+
+
+class _Run:
+    """One machine carried from blow to blow; ``build`` makes its equations of motion."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        build: Callable[[Machine], MechanicalSystem],
+        omega: float,
+        end: float,
+        monitor: Monitor | None,
+    ) -> None:
+        self.machine, self.build, self.omega, self.end = machine, build, omega, end
+        self.monitor = monitor
+        self.springs = build(machine).springs
+        # The flow knows only springs that can open and close.
+        self.kept = [k for k, one in enumerate(self.springs) if one.acts and not one.bonded]
+        self.blown = {"impulses": 0.0, "loads": 0.0}
+
+    def carry(self, recording: Recording, z: Real, blows: Sequence[Disturbance]) -> None:
+        """Fill ``recording`` from the state z to the end."""
+        self.recording, self.z = recording, z
+        self.begin = self.stored(), self.held()
+        at = 0.0
+        for blow in (*blows, None):
+            until = self.end if blow is None else blow.t
+            self.z = recording.carry(
+                self.build(self.machine), self.z, self.omega, at, until, self._tell
+            )
+            at = until
+            if blow is not None:
+                before = self.moving()
+                kind = "impulses" if isinstance(blow, Impulse) else "loads"
+                self._strike(blow)
+                # A blow that makes a clipped stop take hold, or let go, gives it no energy.
+                self.blown[kind] += self.moving() - before
+
+    def moving(self) -> float:
+        """What masses hold and springs that always act, J."""
+        system = self.build(self.machine).with_bonded()
+        x, v = np.split(self.z, 2)
+        return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x)
+
+    def stored(self) -> float:
+        """What masses and all springs hold, J."""
+        return self.moving() + self.held()
+
+    def held(self) -> float:
+        """What the touched stops hold, J."""
+        system = self.build(self.machine)
+        x, v = np.split(self.z, 2)
+        total = 0.0
+        for spring in (system.springs[k] for k in self.kept):
+            y, rate = float(spring.direction @ x), float(spring.direction @ v)
+            if spring.force(y, rate) != 0.0:
+                gap = spring.gaps[0] if y > 0.0 else -spring.gaps[1]
+                total += 0.5 * spring.stiffness * (y - gap) ** 2
+        return total
+
+    def energy(self) -> dict[str, float]:
+        """The balance over the whole time, J."""
+        work = self.recording.work
+        stored, held = self.stored() - self.begin[0], self.held() - self.begin[1]
+        dissipated = work["dampers"] + work["stops"] - held
+        return {"input": work["input"], **self.blown, "dissipated": dissipated, "stored": stored}
+
+    def forces(self) -> Real:
+        """Force of every spring of the machine as it was given, (K, m)."""
+        table = self.recording.table
+        forces = np.zeros((table.t.size, len(self.springs)))
+        forces[:, self.kept] = table.force
+        for k, spring in enumerate(self.springs):
+            if spring.bonded:
+                y, rate = table.x @ spring.direction, table.v @ spring.direction
+                forces[:, k] = spring.stiffness * y + spring.damping * rate
+        return forces
+
+    def events(self) -> tuple[ContactChange, ...]:
+        """Every change of contact."""
+        return tuple(
+            ContactChange(t, self.kept[spring], state if abs(state) == 1 else 0)
+            for t, spring, state in self.recording.changes
+        )
+
+    def _strike(self, blow: Disturbance) -> None:
+        system = self.build(self.machine)
+        n = system.size
+        self.z = self.z.copy()
+        if isinstance(blow, Impulse):
+            push = np.linalg.solve(system.M, system.coordinate(blow.which))
+            self.z[n:] += push * blow.impulse
+            return
+        if not isinstance(self.machine, FlipFlowScreen):
+            raise InputError("disturbances", blow, "only a screen has frames that can be loaded")
+        if isinstance(blow, LoadStep):
+            self.machine = self.machine.loaded(blow.load)
+            return
+        frame = 0 if blow.frame == "main" or n == 1 else 1
+        mass, velocity = system.M[frame, frame], blow.velocity if n > 1 else 0.0
+        self.z[n + frame] = (mass * self.z[n + frame] + blow.mass * velocity) / (mass + blow.mass)
+        main = blow.mass if blow.frame == "main" else 0.0
+        self.machine = self.machine.loaded(Load(main_mass=main, floating_mass=blow.mass - main))
+
+    def _tell(self, t: float) -> None:
+        if self.monitor is not None:
+            self.monitor(f"{t:.4g} s of {self.end:.4g} s", t / self.end)
+
+
+def _normal(
+    machine: Machine,
+    omega: float,
+    times: Real,
+    initial: str | Orbit | ArrayLike,
+    blows: Sequence[Disturbance],
+    end: float,
+) -> Real | None:
+    """y, y', y'' normal to the surface (K, 3): from rest, else from its steady motion."""
+    steady = normal_motion(machine, omega) if isinstance(machine, FlipFlowScreen) else None
+    if steady is None:
+        return None
+    z = np.zeros(2)
+    if not isinstance(initial, str):
+        z = np.array([float(steady.displacement(0.0)), float(steady.velocity(0.0))])
+    run = _Run(machine, _normal_system, omega, end, None)
+    along = [blow for blow in blows if not isinstance(blow, Impulse)]
+    run.carry(Recording(times, 1, 0), z, along)
+    table = run.recording.table
+    return np.column_stack([table.x, table.v, table.a])
+
+
+def _normal_system(machine: Machine) -> MechanicalSystem:
+    """Both frames as one mass on the isolation, under m0r w^2 sin(w t)."""
+    screen = cast("FlipFlowScreen", machine)
+    return MechanicalSystem(
+        [[screen.main_mass + screen.floating_mass]],
+        [[cast("float", screen.normal_damping)]],
+        [[cast("float", screen.normal_stiffness)]],
+        (),
+        Unbalance([-1j * screen.eccentric_moment]),
+    )

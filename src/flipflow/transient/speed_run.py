@@ -1,0 +1,221 @@
+"""One run at varying speed as a history, and what is read off it: swings, means, forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled import status
+from flipflow.model.drive import Drive, SpeedProfile
+from flipflow.model.monitor import Monitor
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.transient.history import ContactChange, History, stop_forces
+from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper, Stretch
+
+Real = NDArray[np.float64]
+MOST_ROWS = 400_000
+SETTLED, MOST_TURNS, TURNS_AT_ONCE, MOST_PERIODS = 1e-7, 2000, 20, 6
+
+STATUS = {
+    status.OK: "The whole time was calculated.",
+    status.POINT_LIMIT: f"The run ended early, at {MOST_ROWS} steps; shorten its duration.",
+    status.REACHED_LOWER: "The run ended when the shaft had come down to its last speed.",
+    status.REACHED_UPPER: "The run ended when the shaft had reached its last speed.",
+    status.NOT_FINITE: "The motion grew beyond all bounds; check damping and stiffness.",
+    status.STEP_TOO_SMALL: "The step became too small; check damping and stiffness of the stops.",
+    status.TOO_MANY_EVENTS: "A stop chattered without end; give it some damping or a gap.",
+}
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a run begins: (x, x') with the normal direction last in each, angle in rad, rad/s.
+
+    ``settled`` is False where it was meant to be a settled motion and is none.
+    """
+
+    state: Real
+    angle: float
+    speed: float
+    settled: bool = True
+
+
+def normal_direction(machine: Machine) -> NormalDirection | None:
+    """The direction normal to the surface, None where its data are missing."""
+    if not isinstance(machine, FlipFlowScreen):
+        return None
+    k, c = machine.normal_stiffness, machine.normal_damping
+    if k is None or c is None:
+        return None
+    return NormalDirection(machine.main_mass + machine.floating_mass, k, c)
+
+
+def movable(machine: Machine) -> MechanicalSystem:
+    """The machine as a system, refused without damping."""
+    system = system_of(machine)
+    system.with_bonded().require_damping()
+    return system
+
+
+def at_rest(machine: Machine) -> Start:
+    """Everything at rest, the unbalance along +x."""
+    count = system_of(machine).size + (normal_direction(machine) is not None)
+    return Start(np.zeros(2 * count), 0.0, 0.0)
+
+
+def run_history(
+    machine: Machine,
+    shaft: Drive | SpeedProfile,
+    start: Start,
+    duration: float,
+    *,
+    fastest: float,
+    slowest: float = -np.inf,
+    method: RungeKutta | None = None,
+    monitor: Monitor | None = None,
+    enough: Callable[[list[Stretch]], bool] | None = None,
+) -> History:
+    """Run a machine with its shaft and keep every step.
+
+    ``enough`` sees all that was calculated so far and may end the run; ``monitor`` hears of it.
+    """
+    system, normal = movable(machine), normal_direction(machine)
+    stepper = Stepper(
+        system, shaft, start.state, angle=start.angle, speed=start.speed, normal=normal,
+        method=method, fastest=fastest, end_speeds=(slowest, np.inf),
+    )  # fmt: skip
+    done: list[Stretch] = []
+    changes: list[tuple[float, int, int]] = []
+    rows, early = 0, False
+    for stretch in stepper.run(duration):
+        changes += stepper.changes()
+        if stretch.t.size:
+            done.append(stretch)
+        rows += stretch.t.size
+        if monitor is not None:
+            monitor(f"{stepper.time:.4g} s of {duration:.4g} s", min(stepper.time / duration, 1.0))
+        early = stepper.code in (status.OK, status.POINT_LIMIT) and bool(enough and enough(done))
+        if early or rows >= MOST_ROWS:
+            break
+    code = status.OK if early else stepper.code
+    return _history(system, stepper, shaft, done, changes, STATUS[code])
+
+
+def settled_start(machine: Machine, speed: float, method: RungeKutta | None = None) -> Start:
+    """The state into which the machine settles from rest at constant speed, at angle 0.
+
+    The motion may repeat after up to six turns. Where it has not settled after 2000 turns, the
+    state then, marked so.
+    """
+    movable(machine)
+    state = at_rest(machine).state
+    for _ in range(MOST_TURNS // TURNS_AT_ONCE):
+        state = _carried(machine, speed, state, TURNS_AT_ONCE - MOST_PERIODS, method)
+        before = []
+        for _ in range(MOST_PERIODS):
+            before.append(state)
+            state = _carried(machine, speed, state, 1, method)
+        if np.abs(state - before).max(axis=1).min() <= SETTLED * np.abs(state).max():
+            return Start(state, 0.0, speed)
+    return Start(state, 0.0, speed, settled=False)
+
+
+def _carried(
+    machine: Machine, speed: float, state: Real, turns: int, method: RungeKutta | None
+) -> Real:
+    """The state after some turns at constant speed."""
+    stepper = Stepper(
+        system_of(machine), SpeedProfile((0.0, 1.0), (speed, speed)), state,
+        normal=normal_direction(machine), method=method, fastest=speed,
+    )  # fmt: skip
+    for _stretch in stepper.run(turns * 2.0 * np.pi / speed):
+        pass
+    return stepper.walk.s[: state.size].copy()
+
+
+def steady_power(
+    machine: Machine, speed: float, method: RungeKutta | None = None
+) -> tuple[float, bool]:
+    """Mean power in W that the dampers take at constant speed, and whether the motion has settled.
+
+    Both directions together, over twenty turns.
+    """
+    start = settled_start(machine, speed, method)
+    duration = TURNS_AT_ONCE * 2.0 * np.pi / speed
+    profile = SpeedProfile((0.0, 1.0), (speed, speed))
+    run = run_history(machine, profile, start, duration, fastest=speed, method=method)
+    return run.energy["dissipated"] / duration, start.settled
+
+
+def swings(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
+    """Times of the turning points of x(t), and half the way from each to the one before.
+
+    A start at rest is a turning point; one in the midst of a motion is none.
+    """
+    turning = np.flatnonzero(v[:-1] * v[1:] < 0.0)
+    h = t[turning + 1] - t[turning]
+    share = v[turning] / (v[turning] - v[turning + 1])
+    # The velocity is close to a straight line at a turning point, its area is the way there.
+    ends = x[turning] + 0.5 * share * h * v[turning]
+    times = t[turning] + share * h
+    if v[0] == 0.0:
+        times, ends = np.append(t[0], times), np.append(x[0], ends)
+    return times[1:], np.abs(np.diff(ends)) / 2.0
+
+
+def turn_means(history: History, values: Real, turns: int) -> float:
+    """Mean rate of a running total over the last whole turns; NaN with fewer turns than that."""
+    end = float(history.angle[-1])
+    begin = end - 2.0 * np.pi * turns
+    if begin <= history.angle[0]:
+        return float("nan")
+    row = int(np.searchsorted(history.angle, begin))
+    t, total = (
+        float(np.interp(begin, history.angle[row - 1 : row + 1], y[row - 1 : row + 1]))
+        for y in (history.t, values)
+    )
+    return float((values[-1] - total) / (history.t[-1] - t))
+
+
+def _history(
+    system: MechanicalSystem,
+    stepper: Stepper,
+    shaft: Drive | SpeedProfile,
+    done: list[Stretch],
+    changes: list[tuple[float, int, int]],
+    ended: str,
+) -> History:
+    t, s, slope = (np.concatenate([getattr(one, k) for one in done]) for k in _PARTS)
+    contacts = np.concatenate([one.contacts for one in done])
+    n, size = system.size, stepper.size
+    x, v = s[:, :n], s[:, size : size + n]
+    speed = s[:, 2 * size + 1]
+    across = [s[:, n], s[:, size + n], slope[:, size + n]] if size > n else None
+    columns = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
+    stored = [stepper.stored_energy(s[k], contacts[k]) for k in (0, -1)]
+    worked, damped, rubbed = s[:, 2 * size + 2 :].T
+    return History(
+        system, t, x, v, slope[:, size : size + n], stop_forces(system, x, v, contacts),
+        speed, s[:, 2 * size],
+        torque=shaft.torque(speed) if isinstance(shaft, Drive) else None,
+        normal=None if across is None else np.column_stack(across),
+        energy={
+            "input": float(worked[-1]), "dissipated": float(damped[-1] + rubbed[-1]),
+            "impulses": 0.0, "loads": 0.0, "stored": float(stored[1] - stored[0]),
+            "friction": float(rubbed[-1]),
+        },
+        events=tuple(
+            ContactChange(time, columns[j], state if abs(state) == 1 else 0)
+            for time, j, state in changes
+        ),
+        status=ended, notes=(), method=f"event-located Runge-Kutta, {stepper.method.formula}",
+        counters=stepper.counters,
+        works={"input": worked, "dissipated": damped + rubbed, "friction": rubbed},
+    )  # fmt: skip
+
+
+_PARTS = ("t", "states", "slopes")

@@ -1,0 +1,502 @@
+"""Start and coast-down: does the drive carry the machine through its resonance, and how hard."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled import status
+from flipflow.dynamics.linear_response import linear_response
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_positive
+from flipflow.model.constants import GRAVITY, RPM
+from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
+from flipflow.model.elements import Unbalance
+from flipflow.model.monitor import Monitor
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine
+from flipflow.transient.history import History
+from flipflow.transient.speed_run import (
+    MOST_TURNS,
+    STATUS,
+    at_rest,
+    movable,
+    normal_direction,
+    run_history,
+    settled_start,
+    steady_power,
+    swings,
+    turn_means,
+)
+from flipflow.transient.time_stepping import RungeKutta, Stretch
+from flipflow.transient.unsteady import SHAFT_STATES
+
+Outcome = Literal[
+    "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
+]
+AT_SPEED = 0.95  # of the working speed: a motor's slip differs with its load
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The greatest value of a quantity on the way, in SI, with the speed in rad/s and time in s."""
+
+    value: float
+    omega: float
+    t: float
+
+
+class NaturalFrequency(NamedTuple):
+    """A natural frequency: its name, as w01, and its value in rad/s."""
+
+    name: str
+    omega: float
+
+
+@dataclass(frozen=True, eq=False)
+class RunUp:
+    """A start or a coast-down, and what it does to the machine.
+
+    Parameters
+    ----------
+    machine, drive
+        What was run, and by what.
+    speed
+        Working speed in rad/s: where a start shall end, or where a coast-down began.
+    history
+        The motion in time.
+    outcome
+        "reached", "captured" (the speed stays near a natural frequency), "short" (it stays below
+        the working speed elsewhere), "not started", "unfinished" (still changing when the time was
+        up), "stopped" (coast-down), "followed" (a given speed over time).
+    final_speed
+        Speed at the end in rad/s; with a motor the mean over the last turns.
+    near
+        The natural frequency at which it is captured, else None.
+    first_frequency
+        w01 in rad/s; 0 for a machine that nothing holds.
+    passing
+        Time in s between 0.8 and 1.25 times w01; None where it is not passed.
+    peaks
+        ``"main_amplitude"``, ``"relative_amplitude"`` (half the way from one turning point to the
+        next, m), ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has
+        them.
+    power
+        Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
+        the speed is given or changes.
+    notes
+        What was assumed or left out.
+    """
+
+    machine: Machine
+    drive: Drive | SpeedProfile
+    speed: float
+    history: History
+    outcome: Outcome
+    final_speed: float
+    near: NaturalFrequency | None
+    first_frequency: float
+    passing: float | None
+    peaks: Mapping[str, Peak]
+    power: Mapping[str, float]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"RunUp({self.outcome}, {self.final_speed:.6g} rad/s after {self.duration:.4g} s)"
+
+    @property
+    def duration(self) -> float:
+        """Time calculated in s."""
+        return float(self.history.t[-1])
+
+    @property
+    def time_to_speed(self) -> float | None:
+        """Time in s at which the shaft first has the working speed, within five per cent."""
+        reached = np.flatnonzero(self.history.omega >= AT_SPEED * self.speed)
+        if self.outcome == "stopped" or reached.size == 0:
+            return None
+        return float(self.history.t[reached[0]])
+
+    @property
+    def verdict(self) -> str:
+        """The outcome as a sentence, rpm first."""
+        now, wanted = f"{self.final_speed * RPM:.0f} rpm", f"{self.speed * RPM:.0f} rpm"
+        seconds = f"{self.duration:.3g} s"
+        if self.outcome == "captured" and self.near is not None:
+            held = f"{self.near.name} = {self.near.omega * RPM:.0f} rpm"
+            return f"captured at {now}, near the natural frequency {held}"
+        sentences = {
+            "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
+            "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",
+            "not started": "does not start: the torque at rest does not turn the shaft",
+            "unfinished": f"at {now} after {seconds}, still changing; calculate a longer time",
+            "stopped": f"comes down from {wanted} in {seconds}",
+            "followed": f"follows the given speed for {seconds}, ending at {now}",
+        }
+        return sentences[self.outcome]
+
+
+Real = NDArray[np.float64]
+POWER_FACTOR = 4.0
+START_SECONDS, COAST_SECONDS = 60.0, 600.0
+MOST_SECONDS = 3600.0
+LAST_TURNS, STEADY = 20, 1e-5
+RECENT = 8  # stretches of the record that hold twice as many turns
+AT_REST, STOPPED = 0.02, 0.02
+NEAR = (0.8, 1.1)
+PASSING = (0.8, 1.25)
+FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
+NOT_SETTLED = f"had not settled after {MOST_TURNS} turns from rest"
+UNSETTLED = (
+    f"The motion in which the coast-down begins {NOT_SETTLED}: begun a turn later, it would have "
+    "other peaks."
+)
+
+
+def start_up(
+    machine: Machine,
+    drive: Drive | SpeedProfile | None = None,
+    *,
+    speed: float | None = None,
+    duration: float | None = None,
+    method: RungeKutta | None = None,
+    monitor: Monitor | None = None,
+) -> RunUp:
+    r"""Start a machine from rest.
+
+    With the shaft's angle phi, inertia J, motor torque T and friction T_f,
+
+    .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
+              - \ddot y_1 \cos\varphi) .
+
+    Gravity on the unbalance, a torque of up to m0 r g, is left out; a note says so.
+
+    Parameters
+    ----------
+    machine
+        A screen, or a :class:`~flipflow.MechanicalSystem` under an unbalance.
+    drive
+        A :class:`~flipflow.Drive`, a :class:`~flipflow.SpeedProfile`, or None for a drive that is
+        assumed from the power the screen takes at working speed.
+    speed
+        Working speed in rad/s; None: the drive's rated speed, or the profile's highest.
+    duration
+        Longest time in s; None: 60 s or the profile's; a run ends when nothing changes any more.
+    method
+        How it is stepped.
+    monitor
+        Called with a sentence and the share done, 0 to 1; raise from it to cancel.
+
+    Returns
+    -------
+    RunUp
+        Whether the machine reaches its speed or is captured on the way, and the peaks.
+
+    Raises
+    ------
+    InputError
+        Without damping, for a bad speed or duration, and for a drive that cannot be.
+    """
+    movable(machine)
+    given = None if speed is None else checked_positive("speed", speed, "rad/s")
+    shaft = _shaft(machine, drive, given, method)
+    wanted = given or _working_speed(shaft)
+    history = run_history(
+        machine, shaft, at_rest(machine), _longest(shaft, duration, START_SECONDS),
+        fastest=_fastest(shaft, wanted), method=method, monitor=monitor,
+        enough=None if isinstance(shaft, SpeedProfile) else _steady,
+    )  # fmt: skip
+    return _judged(machine, shaft, wanted, history)
+
+
+def coast_down(
+    machine: Machine,
+    speed: float,
+    drive: Drive | SpeedProfile | None = None,
+    *,
+    duration: float | None = None,
+    method: RungeKutta | None = None,
+    monitor: Monitor | None = None,
+) -> RunUp:
+    """Let a machine come down from its settled motion at ``speed``, the motor switched off.
+
+    Gravity on the unbalance is left out, so that the last turns come out longer than they are; a
+    note tells the speed below which the shaft would swing.
+
+    Parameters
+    ----------
+    machine
+        A screen, or a :class:`~flipflow.MechanicalSystem` under an unbalance.
+    speed
+        Speed in rad/s at which it runs.
+    drive
+        Its inertia and friction count; a :class:`~flipflow.SpeedProfile` lays the speed down;
+        None: the drive that :func:`start_up` assumes.
+    duration
+        Longest time in s; None: 600 s or the profile's. A free run ends at 2 % of ``speed``.
+    method, monitor
+        As for :func:`start_up`.
+
+    Returns
+    -------
+    RunUp
+        The peaks on the way down, and how long it takes.
+
+    Raises
+    ------
+    InputError
+        Without damping, for a bad speed or duration, and for a drive that cannot be.
+    """
+    movable(machine)
+    omega = checked_positive("speed", speed, "rad/s")
+    shaft, slowest = _shaft(machine, drive, omega, method), -math.inf
+    if isinstance(shaft, Drive):
+        shaft, slowest = shaft.switched_off(), STOPPED * omega
+    elif shaft.speeds[0] != omega:
+        raise InputError("speeds", shaft.speeds[0], f"begin the profile at {omega:.6g} rad/s")
+    start = settled_start(machine, omega, method)
+    history = run_history(
+        machine, shaft, start, _longest(shaft, duration, COAST_SECONDS),
+        fastest=_fastest(shaft, omega), slowest=slowest, method=method, monitor=monitor,
+    )  # fmt: skip
+    unsettled = () if start.settled else (UNSETTLED,)
+    return _judged(machine, shaft, omega, history, unsettled)
+
+
+def default_drive(machine: Machine, speed: float | None, method: RungeKutta | None = None) -> Drive:
+    """A plausible drive for a screen whose drive is not known; what it assumes stands in it.
+
+    The rated power is four times what the dampers take at working speed: starting asks for more
+    than running. The rest is as in :func:`flipflow.model.drive.assumed_drive`.
+    """
+    if not isinstance(machine, FlipFlowScreen):
+        raise InputError("drive", None, "give a Drive or a SpeedProfile for this machine")
+    if speed is None:
+        raise InputError("speed", None, "give the working speed, or a drive")
+    steady, settled = steady_power(machine, speed, method)
+    power = POWER_FACTOR * steady
+    drive = assumed_drive(machine.eccentric_moment, speed, power)
+    rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
+    word = f"rated power {rated}, four times what the dampers take at working speed"
+    word += "" if settled else f", in the mean over 20 turns of a motion that {NOT_SETTLED}"
+    return replace(drive, assumed=(word, *drive.assumed))
+
+
+def _shaft(
+    machine: Machine,
+    drive: Drive | SpeedProfile | None,
+    speed: float | None,
+    method: RungeKutta | None,
+) -> Drive | SpeedProfile:
+    """What turns the shaft, as given or assumed."""
+    if method is not None and not isinstance(method, RungeKutta):
+        raise InputError("method", method, "leave it out, or give a RungeKutta")
+    if drive is None:
+        return default_drive(machine, speed, method)
+    if not isinstance(drive, (Drive, SpeedProfile)):
+        raise InputError("drive", drive, "give an ff.Drive or an ff.SpeedProfile")
+    return drive
+
+
+def _longest(shaft: Drive | SpeedProfile, duration: float | None, usual: float) -> float:
+    """Longest time in s: as asked for, else that of the profile, else the usual one."""
+    if duration is None:
+        return shaft.duration if isinstance(shaft, SpeedProfile) else usual
+    seconds = checked_positive("duration", duration, "s")
+    if seconds > MOST_SECONDS:
+        raise InputError("duration", duration, f"give at most {MOST_SECONDS:g} s")
+    return seconds
+
+
+def _working_speed(drive: Drive | SpeedProfile) -> float:
+    if isinstance(drive, SpeedProfile):
+        return max(drive.speeds)
+    rated = drive.rated_speed
+    if rated is None:
+        raise InputError("motor", None, "give the drive a Motor to start with")
+    return rated
+
+
+def _fastest(drive: Drive | SpeedProfile, speed: float) -> float:
+    if isinstance(drive, SpeedProfile):
+        return max(*drive.speeds, speed)
+    return max(drive.synchronous_speed or 0.0, speed)
+
+
+def _steady(done: list[Stretch]) -> bool:
+    """Whether the mean speed is the same over the last turns and over those before."""
+    recent = done[-RECENT:]
+    t = np.concatenate([one.t for one in recent])
+    angle = np.concatenate([one.states[:, -SHAFT_STATES] for one in recent])
+    marks = angle[-1] - 2.0 * np.pi * LAST_TURNS * np.array([0.0, 1.0, 2.0])
+    if marks[-1] < angle[0]:
+        return False
+    times = np.interp(marks, angle, t)
+    spans = times[:-1] - times[1:]
+    return bool(abs(spans[0] / spans[1] - 1.0) < STEADY)
+
+
+def _judged(
+    machine: Machine,
+    drive: Drive | SpeedProfile,
+    speed: float,
+    history: History,
+    notes: tuple[str, ...] = (),
+) -> RunUp:
+    frequencies = _natural_frequencies(machine)
+    final = turn_means(history, history.angle, LAST_TURNS)
+    if math.isnan(final) or isinstance(drive, SpeedProfile) or drive.motor is None:
+        final = float(history.omega[-1])
+    outcome, near = _outcome(drive, speed, final, history, frequencies)
+    first = frequencies.get("w01", 0.0)
+    steady = outcome in {"reached", "captured", "short"}
+    return RunUp(
+        machine, drive, speed, history, outcome, final, near, first,
+        _passing(history, first), _peaks(machine, history),
+        _power(history) if steady and isinstance(drive, Drive) else {},
+        (*_ended_early(history), *notes, *_notes(machine, drive)),
+    )  # fmt: skip
+
+
+def _ended_early(history: History) -> tuple[str, ...]:
+    usual = (STATUS[status.OK], STATUS[status.REACHED_LOWER])
+    return () if history.status in usual else (history.status,)
+
+
+def _outcome(
+    drive: Drive | SpeedProfile,
+    speed: float,
+    final: float,
+    history: History,
+    frequencies: Mapping[str, float],
+) -> tuple[Outcome, NaturalFrequency | None]:
+    """What became of the run, and the natural frequency that holds it."""
+    if isinstance(drive, SpeedProfile):
+        return "followed", None
+    if drive.motor is None:
+        down = history.omega[-1] <= 1.001 * STOPPED * speed
+        return ("stopped" if down else "unfinished"), None
+    if final < AT_REST * speed and float(drive.torque(0.0)) <= drive.friction:
+        return "not started", None
+    if not _is_steady(history):
+        return "unfinished", None
+    return _steady_outcome(speed, final, frequencies)
+
+
+def _steady_outcome(
+    speed: float, final: float, frequencies: Mapping[str, float]
+) -> tuple[Outcome, NaturalFrequency | None]:
+    if final >= AT_SPEED * speed:
+        return "reached", None
+    if not frequencies:
+        return "short", None
+    name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
+    if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
+        return "captured", NaturalFrequency(name, frequencies[name])
+    return "short", None
+
+
+def _is_steady(history: History) -> bool:
+    one, two = (turn_means(history, history.angle, k * LAST_TURNS) for k in (1, 2))
+    return abs(one / two - 1.0) < STEADY
+
+
+def _natural_frequencies(machine: Machine) -> dict[str, float]:
+    """Those of the open machine, w01 first, and w0n normal to the surface; none of a free body."""
+    found = linear_response(machine, 1.0).natural_frequencies
+    vibrating = found[found > FREE * found[-1]]
+    named = {f"w0{k + 1}": float(omega) for k, omega in enumerate(vibrating)}
+    normal = normal_direction(machine)
+    if normal is not None:
+        named["w0n"] = math.sqrt(normal.stiffness / normal.mass)
+    return named
+
+
+def _passing(history: History, omega: float) -> float | None:
+    """Time in s between both sides of a natural frequency, up or down; None if not passed."""
+    inside = (history.omega > PASSING[0] * omega) & (history.omega < PASSING[1] * omega)
+    within = np.flatnonzero(inside)
+    if within.size == 0 or within[0] == 0 or within[-1] == inside.size - 1:
+        return None
+    sides = history.omega[[within[0] - 1, within[-1] + 1]] > omega
+    if sides[0] == sides[1]:
+        return None
+    return float(history.t[within[-1]] - history.t[within[0]])
+
+
+def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
+    found = {}
+    names = ("main", "relative") if isinstance(machine, FlipFlowScreen) else history.system.named
+    for which in names:
+        times, sizes = swings(history.t, history.displacement(which), history.velocity(which))
+        if sizes.size:
+            found[f"{which}_amplitude"] = _peak(history, times, sizes)
+    if isinstance(machine, FlipFlowScreen):
+        found["foundation_force"] = _peak(history, history.t, foundation_force(machine, history))
+    for j in range(history.force.shape[1]):
+        name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"
+        found[name] = _peak(history, history.t, np.abs(history.stop_force(j)))
+    return found
+
+
+def _peak(history: History, t: Real, values: Real) -> Peak:
+    k = int(values.argmax())
+    omega = float(np.interp(t[k], history.t, history.omega))
+    return Peak(float(values[k]), omega, float(t[k]))
+
+
+def foundation_force(screen: FlipFlowScreen, history: History) -> Real:
+    """Force of the isolation on the foundation in N, both directions where both are known, (n,)."""
+    k, c = screen.isolation_stiffness, screen.isolation_damping
+    along = k * history.displacement("main") + c * history.velocity("main")
+    normal = normal_direction(screen)
+    if normal is None or history.normal is None:
+        return np.abs(along)
+    across = normal.stiffness * history.normal[:, 0] + normal.damping * history.normal[:, 1]
+    return np.asarray(np.hypot(along, across))
+
+
+def _power(history: History) -> dict[str, float]:
+    """Means over the last whole turns."""
+    means = {name: turn_means(history, total, LAST_TURNS) for name, total in history.works.items()}
+    return {
+        "motor": means["input"],
+        "friction": means["friction"],
+        "dampers": means["dissipated"] - means["friction"],
+    }
+
+
+def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
+    notes = []
+    if isinstance(machine, FlipFlowScreen) and normal_direction(machine) is None:
+        notes.append(
+            "Normal direction not checked, for want of isolation.normal_stiffness and "
+            "normal_damping: amplitudes and forces are those along the surface."
+        )
+    if isinstance(drive, Drive):
+        notes += [*_gravity(machine, drive), *(f"Assumed: {text}." for text in drive.assumed)]
+    return notes
+
+
+def _gravity(machine: Machine, drive: Drive) -> list[str]:
+    """What the weight of the unbalance, which the equations leave out, would change."""
+    excitation = machine.system().excitation
+    moment = float(np.abs(excitation.vector).max()) if isinstance(excitation, Unbalance) else 0.0
+    torque = moment * GRAVITY
+    if torque == 0.0:
+        return []
+    left_out = f"Gravity on the unbalance, up to {torque:.3g} N m at the shaft, is not calculated."
+    if drive.motor is None:
+        over = 2.0 * math.sqrt(torque / drive.inertia) * RPM
+        swings = f"Coasting below about {over:.0f} rpm, the shaft would swing instead of turning."
+        return [left_out, swings]
+    at_rest = float(drive.torque(0.0))
+    if at_rest < torque:
+        lift = f"The motor's torque at rest, {at_rest:.3g} N m, may not lift the unbalance."
+        return [left_out, lift]
+    return [left_out]

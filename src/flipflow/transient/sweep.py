@@ -1,0 +1,231 @@
+"""Which motion a machine settles to while its speed is changed in steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow import __version__
+from flipflow.errors import Cancelled
+from flipflow.model.arguments import checked_count, checked_speeds
+from flipflow.model.monitor import Monitor
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.transient.settle import MOST_TURNS, Settled, Settling
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A place in a sweep where the motion was lost and another one taken up.
+
+    Parameters
+    ----------
+    index
+        Row of the sweep in which the other motion is met.
+    omega_before, omega_after
+        The last frequency in rad/s with the old motion and the first with the other.
+    """
+
+    index: int
+    omega_before: float
+    omega_after: float
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What a machine settles to while its speed is changed in steps; arrays are (n,).
+
+    Parameters
+    ----------
+    machine
+        What was swept.
+    omega
+        Frequencies in rad/s, in the order in which they were passed.
+    rows
+        Where the machine was at the end of each step; ``recent`` holds one period of a motion that
+        repeats, else the last turns recorded (up to 64).
+    jumps
+        Where the motion jumped.
+    max_periods, most_turns
+        Longest period looked for, and most forcing periods waited at a step.
+    solver
+        The solver of motions of one forcing period.
+    version
+        Version of flipflow.
+    complete
+        Whether every frequency was passed; a cancelled sweep keeps those it has finished.
+    """
+
+    machine: Machine
+    omega: Real
+    rows: tuple[Settled, ...]
+    jumps: tuple[Jump, ...]
+    max_periods: int
+    most_turns: int
+    solver: ExactSolver
+    version: str
+    complete: bool = True
+
+    def __repr__(self) -> str:
+        ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s"
+        return f"Sweep({self.omega.size} speeds, {ends}, {len(self.jumps)} jumps)"
+
+    @property
+    def system(self) -> MechanicalSystem:
+        """The machine as it was solved."""
+        return self.solver.system
+
+    @property
+    def settled(self) -> NDArray[np.bool_]:
+        """Whether the motion is periodic within the tolerance."""
+        return np.array([row.settled for row in self.rows])
+
+    @property
+    def periods(self) -> NDArray[np.int64]:
+        """Forcing periods after which the motion repeats; 0 where it did not settle."""
+        return np.array(
+            [row.point.solver.turns if row.point is not None and row.settled else 0
+             for row in self.rows]
+        )  # fmt: skip
+
+    @property
+    def turns(self) -> NDArray[np.int64]:
+        """Forcing periods waited at each step."""
+        return np.array([row.turns for row in self.rows])
+
+    @property
+    def distance(self) -> Real:
+        """Distance from the periodic motion approached, in m; infinite where there is none."""
+        return np.array([row.distance for row in self.rows])
+
+    @property
+    def orbits(self) -> tuple[Orbit | None, ...]:
+        """The periodic motion approached at each step, None where there is none."""
+        return tuple(
+            None if row.point is None else Orbit(self.machine, row.point) for row in self.rows
+        )
+
+    def amplitude(self, which: Coordinate) -> Real:
+        """Half peak-to-peak of a coordinate in m, as it moves at the end of each step.
+
+        Where the motion did not settle, over the last turns recorded (up to 64).
+        """
+        low, high = self.extremes(which)
+        return np.asarray((high - low) / 2.0)
+
+    def extremes(self, which: Coordinate) -> tuple[Real, Real]:
+        """Least and greatest value of a coordinate in m at the end of each step."""
+        key = tuple(self.system.coordinate(which))
+        if key not in self._seen:
+            turns = [row.recent.shape[0] for row in self.rows]
+            states = np.concatenate([row.recent for row in self.rows])
+            low, high, _ = self.solver.extremes(
+                states, np.repeat(self.omega, turns), np.array([key])
+            )
+            starts = np.cumsum([0, *turns[:-1]])
+            self._seen[key] = (
+                np.minimum.reduceat(low[:, 0], starts), np.maximum.reduceat(high[:, 0], starts),
+            )  # fmt: skip
+        return self._seen[key]
+
+    @cached_property
+    def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real]]:
+        return {}
+
+
+MAX_PERIODS = 6
+JUMP_SHARE = 0.05
+
+
+def sweep(
+    machine: Machine,
+    omega: ArrayLike,
+    *,
+    initial: str | Orbit | ArrayLike = "rest",
+    max_periods: int = MAX_PERIODS,
+    most_turns: int = MOST_TURNS,
+    monitor: Monitor | None = None,
+) -> Sweep:
+    """Settle at one frequency after the other, each from where the one before ended.
+
+    The speed changes when the unbalance points along +x. At each frequency the exact flow runs
+    until the periodic motion it approaches is closer than 1e-9 of the motion's size. That motion
+    is solved for, so that lingering just past a fold is not taken for settling; its leading
+    multiplier says how many turns are still to go.
+
+    Parameters
+    ----------
+    machine
+        A screen or a :class:`~flipflow.MechanicalSystem`.
+    omega
+        Frequencies in rad/s in the order to pass, (n,).
+    initial
+        "rest", an :class:`~flipflow.periodic.orbit.Orbit`, or a state (x, x'), (2 N,).
+    max_periods
+        Longest period looked for, in forcing periods.
+    most_turns
+        Most forcing periods waited at a step; what has not settled then is marked so.
+    monitor
+        Called with a sentence and the share done. When it raises
+        :class:`~flipflow.errors.Cancelled`, the frequencies that are finished are kept and
+        returned, and ``complete`` is False.
+
+    Returns
+    -------
+    Sweep
+        Settled amplitudes, periods, jumps.
+
+    Raises
+    ------
+    InputError
+        For frequencies that are not finite and above 0, a count below 1, a state of wrong shape,
+        or a machine without damping, which never settles.
+    """
+    speeds = checked_speeds(omega)
+    checked_count("max_periods", max_periods, 12)
+    checked_count("most_turns", most_turns, 10_000_000)
+    settling = Settling(system_of(machine), max_periods)
+    z = initial_state(settling.solver.system.size, initial)
+    rows: list[Settled] = []
+    jumps: list[Jump] = []
+    for k, speed in enumerate(speeds):
+        row = settling.settle(z, float(speed), most=most_turns)
+        if rows and _jumped(settling, rows[-1], row, float(speed)):
+            jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
+        rows.append(_kept(row))
+        z = row.state
+        if monitor is not None:
+            try:
+                monitor(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
+            except Cancelled:
+                break
+    done = len(rows)
+    return Sweep(
+        machine, speeds[:done], tuple(rows), tuple(jumps), max_periods, most_turns,
+        settling.solver, __version__, complete=done == speeds.size,
+    )  # fmt: skip
+
+
+def _kept(row: Settled) -> Settled:
+    """A row with the states of one period only where the motion repeats."""
+    if row.point is None or not row.settled:
+        return row
+    return replace(row, recent=row.recent[-row.point.solver.turns :])
+
+
+def _jumped(settling: Settling, before: Settled, after: Settled, omega: float) -> bool:
+    """Whether the motion before cannot be followed to the motion after, or lies far from it."""
+    if before.point is None or after.point is None:
+        return (before.point is None) != (after.point is None)
+    followed = settling.continued(before.point, omega)
+    if followed is None:
+        return True
+    share = JUMP_SHARE * settling.size(after.recent, omega)
+    images = settling.phases(followed)
+    return all(settling.distance(image, after.state, omega) > share for image in images)

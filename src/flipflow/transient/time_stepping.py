@@ -1,0 +1,323 @@
+"""Motion at varying speed: event-located Runge-Kutta on the machine with its shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.compiled import status
+from flipflow.dynamics.contact_search import Contact
+from flipflow.errors import InputError
+from flipflow.model.drive import Drive, SpeedProfile
+from flipflow.model.elements import Unbalance
+from flipflow.model.system import MechanicalSystem
+from flipflow.transient import runge_kutta
+from flipflow.transient.runge_kutta import Walk
+from flipflow.transient.tableaux import DORMAND_PRINCE, RK4, Tableau
+from flipflow.transient.unsteady import SHAFT_STATES, Equations, Shaft
+
+Real = NDArray[np.float64]
+Formula = Literal["dopri5", "rk4"]
+TABLEAUX: dict[str, Tableau] = {"dopri5": DORMAND_PRINCE, "rk4": RK4}
+CHUNK = 2048
+STEPS_PER_TURN = 40
+CREEP = 0.1
+
+
+@dataclass(frozen=True)
+class RungeKutta:
+    """How a motion at varying speed is stepped.
+
+    Parameters
+    ----------
+    formula
+        ``"dopri5"`` (Dormand and Prince's 5(4) pair) or ``"rk4"`` (the classical method).
+    tolerance
+        Error allowed in one step, relative to the motion; "dopri5" only.
+    step
+        Length of a step in s; None: by the tolerance for "dopri5", a fortieth of the fastest turn
+        or vibration for "rk4".
+    """
+
+    formula: Formula = "dopri5"
+    tolerance: float = 1e-8
+    step: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.formula not in get_args(Formula):
+            raise InputError("formula", self.formula, "choose dopri5 or rk4")
+        if not 1e-13 <= self.tolerance <= 1e-2:
+            raise InputError("tolerance", self.tolerance, "choose between 1e-13 and 1e-2")
+        if self.step is not None and not 0.0 < self.step < math.inf:
+            raise InputError("step", self.step, "give a finite length above 0 s")
+
+
+@dataclass(frozen=True)
+class NormalDirection:
+    """Mass, stiffness and damping of the motion normal to the surface, in SI."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Rows of a record: times (n,), states and their slopes (n, 2 N + 5), contacts (n, m)."""
+
+    t: Real
+    states: Real
+    slopes: Real
+    contacts: NDArray[np.int64]
+
+
+class Stepper:
+    """One run of a machine with its shaft, carried on stretch by stretch.
+
+    Parameters
+    ----------
+    system
+        The machine, springs that always act included.
+    shaft
+        What turns it.
+    state
+        (x, x') at the start, (2 N,).
+    angle, speed
+        Shaft angle in rad and, for a drive, its speed in rad/s at the start.
+    normal
+        The direction normal to the surface as one more degree of freedom with its (y, y') at the
+        end of ``state``; the exciter is circular then.
+    method
+        Formula and tolerance.
+    fastest
+        Highest shaft speed in rad/s that is expected, for the longest step.
+    end_speeds
+        The run ends where the speed falls to the first or rises to the second.
+    """
+
+    def __init__(
+        self,
+        system: MechanicalSystem,
+        shaft: Drive | SpeedProfile,
+        state: Real,
+        *,
+        angle: float = 0.0,
+        speed: float = 0.0,
+        normal: NormalDirection | None = None,
+        method: RungeKutta | None = None,
+        fastest: float,
+        end_speeds: tuple[float, float] = (-math.inf, math.inf),
+    ) -> None:
+        self.method = method or RungeKutta()
+        self.profile = shaft if isinstance(shaft, SpeedProfile) else None
+        linear = system.with_bonded()
+        self.M, C, K, vector = extended(linear, normal)
+        self.size = self.M.shape[0]
+        self.springs = linear.springs
+        drive = shaft if isinstance(shaft, Drive) else None
+        unbalance = isinstance(system.excitation, Unbalance)
+        inverse = np.asarray(np.linalg.inv(self.M), dtype=np.float64)
+        if drive is not None:
+            _check_drive(drive, inverse, vector, unbalance=unbalance)
+        self.vector, self.unbalance, self.drive = vector, unbalance, drive
+        self.K = K
+        self._acceleration = np.zeros(1)
+        self.equations = Equations(
+            inverse_mass=inverse, damping=C, stiffness=K,
+            direction=self._directions(), contact=_contact(linear), vector=vector,
+            unbalance=int(unbalance), shaft=_shaft(drive, end_speeds, self._acceleration),
+            pull=np.zeros(self.size), lever=np.zeros(self.size), push=np.zeros(self.size),
+            answer=np.zeros(self.size),
+        )  # fmt: skip
+        start = speed if self.profile is None else self.profile.speeds[0]
+        s = np.concatenate([state, [angle, start], np.zeros(SHAFT_STATES - 2)])
+        self.walk = self._walk(s, fastest)
+        runge_kutta.begin(self.equations, self.walk)
+        self.code = status.OK
+
+    @property
+    def time(self) -> float:
+        """Time reached in s."""
+        return float(self.walk.time[0])
+
+    @property
+    def speed(self) -> float:
+        """Shaft speed reached in rad/s."""
+        return float(self.walk.s[2 * self.size + 1])
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Steps, events, rejected steps."""
+        count = self.walk.tally
+        return {
+            "steps": int(count[runge_kutta.STEPS]),
+            "events": int(count[runge_kutta.EVENTS]),
+            "rejected": int(count[runge_kutta.REJECTED]),
+        }
+
+    def run(self, until: float) -> Iterator[Stretch]:
+        """Step to time ``until`` in s, giving up the record whenever it is full."""
+        for end, acceleration in self._legs(until):
+            self._acceleration[0] = acceleration
+            while True:
+                self.code = runge_kutta.advance(self.equations, self.walk, end)
+                if self.code != status.POINT_LIMIT:
+                    break
+                yield self._emptied()
+            if self.code != status.OK:
+                break
+        yield self._emptied()
+
+    def changes(self) -> list[tuple[float, int, int]]:
+        """Changes of contact since the last call: time, spring, its state then."""
+        walk, count = self.walk, int(self.walk.tally[runge_kutta.CHANGES])
+        self.walk.tally[runge_kutta.CHANGES] = 0
+        rows = zip(walk.change_time[:count], walk.change[:count], strict=True)
+        return [(float(t), int(j), int(state)) for t, (j, state) in rows]
+
+    def stored_energy(self, state: Real, contacts: NDArray[np.int64]) -> float:
+        """Energy in J of masses, springs, engaged stops and, with a drive, the shaft."""
+        n = self.size
+        x, v, angle, speed = state[:n], state[n : 2 * n], state[2 * n], state[2 * n + 1]
+        energy = 0.5 * float(v @ self.M @ v + x @ self.K @ x)
+        for j, spring in enumerate(self.springs):
+            if abs(contacts[j]) == 1:
+                plus, minus = spring.gaps
+                gap = plus if contacts[j] > 0 else -minus
+                depth = spring.direction @ x[: spring.direction.size] - gap
+                energy += 0.5 * spring.stiffness * float(depth) ** 2
+        if self.drive is not None:
+            lever = (self.vector * np.exp(1j * angle)).imag if self.unbalance else np.zeros(n)
+            energy += 0.5 * self.drive.inertia * speed**2 - speed * float(lever @ v)
+        return energy
+
+    def _legs(self, until: float) -> Iterator[tuple[float, float]]:
+        """End and acceleration of each straight piece of the profile; one piece for a drive."""
+        if self.profile is not None:
+            times, speeds = self.profile.times, self.profile.speeds
+            for k in range(1, len(times)):
+                if self.time < times[k] and self.time < until:
+                    slope = (speeds[k] - speeds[k - 1]) / (times[k] - times[k - 1])
+                    yield min(times[k], until), slope
+        if self.time < until:
+            yield until, 0.0
+
+    def _emptied(self) -> Stretch:
+        walk, rows = self.walk, int(self.walk.tally[runge_kutta.ROWS])
+        walk.tally[runge_kutta.ROWS] = 0
+        return Stretch(
+            walk.t[:rows].copy(), walk.record[:rows].copy(), walk.rate[:rows].copy(),
+            walk.states[:rows].copy(),
+        )  # fmt: skip
+
+    def _directions(self) -> Real:
+        """Directions of the springs, (m, N); none acts normal to the surface."""
+        directions = np.zeros((len(self.springs), self.size))
+        for row, spring in zip(directions, self.springs, strict=True):
+            row[: spring.direction.size] = spring.direction
+        return directions
+
+    def _walk(self, s: Real, fastest: float) -> Walk:
+        method, tableau = self.method, TABLEAUX[self.method.formula]
+        stages, m = len(tableau.b), len(self.springs)
+        a = np.zeros((stages, stages))
+        for i, row in enumerate(tableau.a):
+            a[i, : len(row)] = [float(value) for value in row]
+        longest = _longest_step(self.M, self.K, fastest)
+        adaptive = method.formula == "dopri5" and method.step is None
+        rows = CHUNK + 2
+        return Walk(
+            a=a, b=np.array([float(value) for value in tableau.b]),
+            error=np.array([float(value) for value in tableau.error]), order=tableau.order,
+            relative=method.tolerance if adaptive else 0.0,
+            absolute=self._absolute(s, fastest), longest=longest,
+            step=np.array([method.step or longest]), time=np.zeros(1),
+            state=np.zeros(m, np.int64), s=s.copy(), end=np.zeros(s.size),
+            rows=np.zeros((stages + 1, s.size)), tally=np.zeros(7, np.int64), t=np.zeros(rows),
+            record=np.zeros((rows, s.size)), rate=np.zeros((rows, s.size)),
+            states=np.zeros((rows, m), np.int64), change_time=np.zeros(rows),
+            change=np.zeros((rows, 2), np.int64),
+        )  # fmt: skip
+
+    def _absolute(self, s: Real, fastest: float) -> Real:
+        """Absolute tolerances: the size of the motion, its speed, the shaft; works not watched."""
+        n = self.size
+        reach = np.abs(self.equations.inverse_mass @ np.abs(self.vector))
+        length = max(float(reach.max()) if self.unbalance else 0.0, float(np.abs(s[:n]).max()))
+        gaps = [gap for spring in self.springs for gap in spring.gaps if 0.0 < gap < math.inf]
+        length = max([length, *gaps]) or float(reach.max()) / fastest**2 or 1.0
+        sizes = [*[length] * n, *[length * fastest] * n, 1.0, fastest, *[math.inf] * 3]
+        return self.method.tolerance * np.array(sizes)
+
+
+def extended(
+    system: MechanicalSystem, normal: NormalDirection | None
+) -> tuple[Real, Real, Real, NDArray[np.complex128]]:
+    """M, C, K and the exciter's vector with the normal direction as one more degree of freedom.
+
+    Normal to the surface the unbalance acts a quarter of a turn later: its component is -i times
+    that along the surface.
+    """
+    vector = np.array(system.excitation.vector)
+    if normal is None:
+        return np.array(system.M), np.array(system.C), np.array(system.K), vector
+    pairs = ((system.M, normal.mass), (system.C, normal.damping), (system.K, normal.stiffness))
+    M, C, K = (np.block([[A, np.zeros((len(A), 1))], [np.zeros(len(A)), b]]) for A, b in pairs)
+    return M, C, K, np.append(vector, -1j * vector.sum())
+
+
+def _longest_step(M: Real, K: Real, fastest: float) -> float:
+    """A fortieth of the fastest turn or of the fastest vibration of the open machine."""
+    highest = math.sqrt(max(float(np.linalg.eigvals(np.linalg.solve(M, K)).real.max()), 0.0))
+    return 2.0 * math.pi / STEPS_PER_TURN / max(fastest, highest)
+
+
+def _contact(system: MechanicalSystem) -> Contact:
+    springs = system.springs
+    return Contact(
+        gap_plus=np.array([s.gaps[0] for s in springs]),
+        gap_minus=np.array([s.gaps[1] for s in springs]),
+        stiffness=np.array([s.stiffness for s in springs]),
+        damping=np.array([s.damping for s in springs]),
+        clipped=np.array([s.law == "compression-only" for s in springs], np.int64),
+    )
+
+
+def _shaft(drive: Drive | None, end_speeds: tuple[float, float], acceleration: Real) -> Shaft:
+    motor = None if drive is None else drive.motor
+    return Shaft(
+        free=int(drive is not None),
+        inertia=1.0 if drive is None else float(drive.inertia),
+        breakdown_torque=0.0 if not (drive and motor) else drive.ratio * motor.largest_torque,
+        breakdown_slip=1.0 if motor is None else float(motor.breakdown_slip),
+        synchronous_speed=1.0 if not (drive and motor) else motor.synchronous_speed / drive.ratio,
+        friction=0.0 if drive is None else float(drive.friction),
+        viscous=0.0 if drive is None else float(drive.viscous_friction),
+        creep=CREEP,
+        speed_low=float(end_speeds[0]),
+        speed_high=float(end_speeds[1]),
+        acceleration=acceleration,
+    )
+
+
+def _check_drive(
+    drive: Drive, inverse: Real, vector: NDArray[np.complex128], *, unbalance: bool
+) -> None:
+    """Refuse a force that no shaft makes, and an inertia less than that of the unbalance."""
+    if not unbalance:
+        raise InputError(
+            "excitation", "HarmonicForce", "a motor turns an Unbalance; give a SpeedProfile"
+        )
+    parts = np.array([vector.real, vector.imag])
+    least = float(np.linalg.eigvalsh(parts @ inverse @ parts.T)[-1])
+    if drive.inertia <= least:
+        raise InputError(
+            "inertia", drive.inertia,
+            f"it must exceed (m0r)^2 over the moving mass, {least:.4g} kg m^2, since the unbalance "
+            "is part of it",
+        )  # fmt: skip

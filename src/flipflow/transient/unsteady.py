@@ -1,0 +1,219 @@
+"""Equations of motion at varying shaft speed: masses, stops, and the shaft with its torques.
+
+The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction). It
+holds its own clock, so the equations do not name the time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_search import OPEN, Contact
+from flipflow.dynamics.plan import Complex, Int, Real
+
+SHAFT_STATES = 5  # phi, phi', work put in, work dissipated, work of friction
+
+
+class Shaft(NamedTuple):
+    """The shaft and what turns it, all at the shaft."""
+
+    free: int  # 1: the torques turn it; 0: its acceleration is given
+    inertia: float
+    breakdown_torque: float
+    breakdown_slip: float
+    synchronous_speed: float
+    friction: float  # constant torque against the motion
+    viscous: float
+    creep: float  # speed below which the constant torque fades
+    speed_low: float  # speeds at which the run ends, infinite for none
+    speed_high: float
+    acceleration: Real  # (1,) given one
+
+
+class Equations(NamedTuple):
+    """N degrees of freedom, m springs, one shaft."""
+
+    inverse_mass: Real  # (N, N)
+    damping: Real  # (N, N)
+    stiffness: Real  # (N, N)
+    direction: Real  # (m, N)
+    contact: Contact
+    vector: Complex  # (N,) unbalance in kg m, or force in N
+    unbalance: int  # 1: an unbalance, which reacts on the shaft; 0: a force of constant size
+    shaft: Shaft
+    pull: Real  # (N,) scratch: exciting force at no angular acceleration
+    lever: Real  # (N,) scratch: exciting force for one unit of it
+    push: Real  # (N,) scratch: force of exciter, springs and dampers
+    answer: Real  # (N,) scratch: M^-1 lever
+
+
+@kernel(inline=True)
+def motor_torque(shaft: Shaft, speed: float) -> float:
+    """T = 2 T_b s s_b / (s^2 + s_b^2), s = 1 - speed / synchronous speed (Kloss)."""
+    if shaft.breakdown_torque == 0.0:
+        return 0.0
+    slip = 1.0 - speed / shaft.synchronous_speed
+    s_b = shaft.breakdown_slip
+    return 2.0 * shaft.breakdown_torque * slip * s_b / (slip * slip + s_b * s_b)
+
+
+@kernel(inline=True)
+def friction_torque(shaft: Shaft, speed: float) -> float:
+    """Torque against the motion: constant, faded below the creep speed, plus viscous."""
+    return shaft.friction * math.tanh(speed / shaft.creep) + shaft.viscous * speed
+
+
+@kernel(inline=True)
+def slopes(eq: Equations, state: Int, point: Real, rows: Real, row: int) -> None:
+    """Write ds/dt at ``point`` to ``rows[row]``, with the contacts as ``state`` has them.
+
+    M a + C v + K x + sum d H = p phi'^2 + q phi'' with p + i q = vector exp(i phi), and
+    J phi'' - q a = T - T_friction: phi'' follows after eliminating a.
+    """
+    n = eq.vector.shape[0]
+    speed = point[2 * n + 1]
+    _excite(eq, point)
+    dissipated = _carry(eq, point) + _press(eq, state, point)
+    against = 0.0
+    reach = 0.0
+    for i in range(n):
+        a = 0.0
+        b = 0.0
+        for k in range(n):
+            a += eq.inverse_mass[i, k] * eq.push[k]
+            b += eq.inverse_mass[i, k] * eq.lever[k]
+        rows[row, n + i] = a
+        eq.answer[i] = b
+        against += eq.lever[i] * a
+        reach += eq.lever[i] * b
+    torque = motor_torque(eq.shaft, speed)
+    friction = friction_torque(eq.shaft, speed)
+    alpha = eq.shaft.acceleration[0]
+    if eq.shaft.free == 1:
+        alpha = (torque - friction + against) / (eq.shaft.inertia - reach)
+    work = torque * speed
+    for i in range(n):
+        rows[row, i] = point[n + i]
+        rows[row, n + i] += eq.answer[i] * alpha
+        if eq.shaft.free == 0:
+            work += (eq.pull[i] + eq.lever[i] * alpha) * point[n + i]
+    rows[row, 2 * n] = speed
+    rows[row, 2 * n + 1] = alpha
+    rows[row, 2 * n + 2] = work
+    rows[row, 2 * n + 3] = dissipated
+    rows[row, 2 * n + 4] = friction * speed
+
+
+@kernel(inline=True)
+def _excite(eq: Equations, point: Real) -> None:
+    """Write the exciting force without angular acceleration, and for one unit of it."""
+    n = eq.vector.shape[0]
+    angle, speed = point[2 * n], point[2 * n + 1]
+    cos, sin = math.cos(angle), math.sin(angle)
+    for i in range(n):
+        p = eq.vector[i].real * cos - eq.vector[i].imag * sin
+        q = eq.vector[i].real * sin + eq.vector[i].imag * cos
+        eq.pull[i] = p * speed * speed if eq.unbalance == 1 else p
+        eq.lever[i] = q if eq.unbalance == 1 else 0.0
+
+
+@kernel(inline=True)
+def _carry(eq: Equations, point: Real) -> float:
+    """Write the force of exciter, springs and dampers to ``eq.push``; the dampers' power."""
+    n = eq.vector.shape[0]
+    power = 0.0
+    for i in range(n):
+        drag = 0.0
+        spring = 0.0
+        for k in range(n):
+            drag += eq.damping[i, k] * point[n + k]
+            spring += eq.stiffness[i, k] * point[k]
+        power += drag * point[n + i]
+        eq.push[i] = eq.pull[i] - drag - spring
+    return power
+
+
+@kernel(inline=True)
+def _press(eq: Equations, state: Int, point: Real) -> float:
+    """Take the engaged stops' forces off ``eq.push``; returns the power of their dampers."""
+    n = eq.vector.shape[0]
+    contact = eq.contact
+    power = 0.0
+    for j in range(state.shape[0]):
+        if abs(state[j]) != 1:
+            continue
+        gap = contact.gap_plus[j] if state[j] > 0 else -contact.gap_minus[j]
+        y = 0.0
+        v = 0.0
+        for i in range(n):
+            y += eq.direction[j, i] * point[i]
+            v += eq.direction[j, i] * point[n + i]
+        force = contact.stiffness[j] * (y - gap) + contact.damping[j] * v
+        power += contact.damping[j] * v * v
+        for i in range(n):
+            eq.push[i] -= eq.direction[j, i] * force
+    return power
+
+
+@kernel(inline=True)
+def switching(
+    eq: Equations, state: Int, point: Real, rows: Real, row: int, j: int, which: int
+) -> tuple[float, float]:
+    """Value and rate of a switching function: something changes where it rises through zero.
+
+    Each spring has two; j beyond the springs names the shaft, whose speed may end the run.
+    """
+    n = eq.vector.shape[0]
+    if j == state.shape[0]:
+        speed, alpha = point[2 * n + 1], rows[row, 2 * n + 1]
+        if which == 0:
+            return speed - eq.shaft.speed_high, alpha
+        return eq.shaft.speed_low - speed, -alpha
+    y = 0.0
+    v = 0.0
+    a = 0.0
+    for i in range(n):
+        y += eq.direction[j, i] * point[i]
+        v += eq.direction[j, i] * point[n + i]
+        a += eq.direction[j, i] * rows[row, n + i]
+    plus, minus = eq.contact.gap_plus[j], eq.contact.gap_minus[j]
+    if state[j] == OPEN:
+        return (y - plus, v) if which == 0 else (-minus - y, -v)
+    side = 1.0 if state[j] > 0 else -1.0
+    gap = plus if state[j] > 0 else -minus
+    clipped = eq.contact.clipped[j] == 1
+    if which == 0 and not (clipped and abs(state[j]) == 1):
+        return side * (gap - y), -side * v
+    if which == 0 or not clipped:
+        return -math.inf, 0.0
+    k, c = eq.contact.stiffness[j], eq.contact.damping[j]
+    push, rate = side * (k * (y - gap) + c * v), side * (k * v + c * a)
+    return (-push, -rate) if abs(state[j]) == 1 else (push, rate)
+
+
+@kernel(inline=True)
+def switch(eq: Equations, state: Int, point: Real, j: int, which: int) -> None:
+    """Carry out the change of spring j that its switching function has called.
+
+    A clipped stop that lets go while compressed gives up what its spring holds, and gets it back
+    if it takes hold again.
+    """
+    n = eq.vector.shape[0]
+    before = state[j]
+    if before == OPEN:
+        state[j] = 1 if which == 0 else -1
+    elif which == 0:
+        state[j] = OPEN
+    elif abs(before) == 1:
+        state[j] = 2 * before if eq.contact.damping[j] > 0.0 else OPEN
+    else:
+        state[j] = before // 2
+    if which == 1 and before != OPEN:
+        gap = eq.contact.gap_plus[j] if before > 0 else -eq.contact.gap_minus[j]
+        depth = -gap
+        for i in range(n):
+            depth += eq.direction[j, i] * point[i]
+        sign = 1.0 if abs(before) == 1 else -1.0
+        point[2 * n + 3] += sign * 0.5 * eq.contact.stiffness[j] * depth * depth
