@@ -24,9 +24,9 @@ def solve(A, pivot, b):
 
 
 @kernel(entry=True)
-def change_after(motion, contact, state, horizon, fired):
+def change_after(motion, stops, regime, horizon, fired):
     """``next_change`` with all terms of the motion."""
-    return next_change(motion, contact, state, motion.rate.shape[0], horizon, fired)
+    return next_change(motion, stops, regime, motion.rate.shape[0], horizon, fired)
 
 
 @kernel(entry=True)
@@ -37,35 +37,35 @@ def range_of(motion, duration):
 
 
 @kernel(entry=True)
-def shoot(problem, z, omega, r, J):
+def shoot(problem, work, z, omega, r, J):
     """``shooting_residual``."""
-    return shooting_residual(problem, z, omega, r, J)
+    return shooting_residual(problem, work, z, omega, r, J)
 
 
 @kernel(entry=True)
-def balance(problem, u, omega, r, J):
+def balance(problem, work, u, omega, r, J):
     """``balance_residual``."""
-    return balance_residual(problem, u, omega, r, J)
+    return balance_residual(problem, work, u, omega, r, J)
 
 
 @kernel(entry=True)
-def sampled(problem, u, omega, r, J):
+def sampled(problem, work, u, omega, r, J):
     """``sampled_residual``."""
-    return sampled_residual(problem, u, omega, r, J)
+    return sampled_residual(problem, work, u, omega, r, J)
 
 
 @kernel(entry=True)
-def jump(plan, spring, sign, U):
+def jump(machine, spring, sign, U):
     """``saltation``."""
-    saltation(plan, spring, sign, U, U.shape[0])
+    saltation(machine, spring, sign, U, U.shape[0])
 
 
-def residual_of(call, problem, unknowns: int):
+def residual_of(call, problem, work, unknowns: int):
     """A Python function (u, omega) -> (r, J) of a residual kernel."""
 
     def evaluate(u: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray]:
         r, J = np.zeros(unknowns), np.zeros((unknowns, unknowns + 1))
-        code = call(problem, np.ascontiguousarray(u), float(omega), r, J)
+        code = call(problem, work, np.ascontiguousarray(u), float(omega), r, J)
         assert code == 0, f"status {code}"
         return r, J
 

@@ -87,7 +87,7 @@ def test_flow_of_the_chain(chain, branch, seed: int) -> None:
     z = np.concatenate([2e-3 * rng.normal(size=MASSES), 0.1 * rng.normal(size=MASSES)])
     end = turns * 2.0 * np.pi / omega
     path = integrate.flow(integrate.Machine.of(chain), z, omega, 0.0, end)
-    got = branch.solver.settled(z, omega, turns)
+    got = branch.formulation.solver().settled(z, omega, turns)
     size = np.abs(path(np.linspace(0.0, end, 101))[:, :MASSES]).max()
     close("displacements after three turns", got[:MASSES], path.final[:MASSES], abs=SHARE * size)
     assert len(path.ends) > 10, "the stops were met"
@@ -134,7 +134,7 @@ def test_compression_only_flow(screen, seed: int) -> None:
     rng = np.random.default_rng(seed)
     z = np.concatenate([rng.uniform(-8e-3, 8e-3, 2), rng.uniform(-1.0, 1.0, 2)])
     branch = ff.frequency_response(machine, (100.0, 120.0))
-    got = branch.solver.settled(z, 120.0, 5)
+    got = branch.formulation.solver().settled(z, 120.0, 5)
     end = 5 * 2.0 * np.pi / 120.0
     path = integrate.flow(integrate.Machine.of(machine.system()), z, 120.0, 0.0, end)
     close("displacements after five turns", got[:2], path.final[:2], abs=SHARE * 10e-3)

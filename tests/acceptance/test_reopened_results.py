@@ -23,7 +23,7 @@ from flipflow.io.assessment import assessment_document
 from flipflow.paper.claims import Claim
 from flipflow.paper.reproduce import Reproduction
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Point, Solver, Traced
+from flipflow.periodic.solver import Point, Traced
 from flipflow.plotting.parts import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
@@ -191,7 +191,7 @@ def parts(one: typing.Any, other: typing.Any, where: str) -> dict[str, tuple[obj
     if isinstance(other, tuple):
         assert len(one) == len(other), where
         return {f"[{k}]": pair for k, pair in enumerate(zip(one, other, strict=True))}
-    if isinstance(other, Solver) or (dataclasses.is_dataclass(other) and type(other) is not Claim):
+    if dataclasses.is_dataclass(other) and type(other) is not Claim:
         return {f".{name}": (getattr(one, name), getattr(other, name)) for name in told_by(other)}
     np.testing.assert_array_equal(one, other, err_msg=where)
     return {}
@@ -200,12 +200,16 @@ def parts(one: typing.Any, other: typing.Any, where: str) -> dict[str, tuple[obj
 def told_by(result: object) -> list[str]:
     """What is compared: the fields, and of points what is read off them."""
     if isinstance(result, Point):
-        return ["solver", "u", "omega", "return_map"]
-    if isinstance(result, Solver):
-        return ["half_turn", "turns", "unknowns", "system"]
+        return ["formulation", "u", "omega", "return_map"]
     # The depths at the gaps serve the search for special points alone, and are not kept.
-    left_out = {"record", "jacobian", "depth"} if isinstance(result, Traced) else {"word"}
-    also = {Orbit: ["stability", "error"], Branch: ["error"], Sweep: ["periods", "distance"]}
+    left_out = {"record"} if isinstance(result, Traced) else {"word"}
+    followed = ["u", "omega", "tangent", "signature"]
+    also = {
+        Traced: followed,
+        Orbit: ["stability", "error"],
+        Branch: ["error"],
+        Sweep: ["periods", "distance"],
+    }
     names = [field.name for field in dataclasses.fields(result)]
     return [name for name in names if name not in left_out] + also.get(type(result), [])
 

@@ -48,7 +48,7 @@ def test_row_20_every_start_settles_on_the_branch(exact, omega: float) -> None:
     rng = np.random.default_rng(int(omega))
     scale = np.array([20e-3, 20e-3, 20e-3 * omega, 20e-3 * omega])
     for _ in range(6):
-        state = exact.solver.settled(rng.uniform(-1.0, 1.0, 4) * scale, omega, 400)
+        state = exact.formulation.solver().settled(rng.uniform(-1.0, 1.0, 4) * scale, omega, 400)
         off = min(np.abs((state - one) / scale).max() for one in known)
         assert off < 1e-6, f"settled at {state}, known {known}"
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import flipflow as ff
+from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
 from flipflow.continuation import arclength
-from flipflow.periodic.scratch import new_branch, new_corrector
-from flipflow.periodic.solver import eigenvalues_of
+from flipflow.continuation.arclength import new_branch, new_corrector
 from flipflow.periodic.stability import determinant_minus, determinant_plus
 from kernel_calls import predicted
 
@@ -56,7 +56,7 @@ def test_order_of_the_predictor(signatures: tuple[int, int], order: float) -> No
 def test_two_newton_steps_are_enough_at_most_points(method) -> None:
     """Along the tangent alone it is two points in three or fewer."""
     branch = ff.frequency_response(ff.load("ffs0827"), (5.0, 250.0), method)
-    assert np.mean(branch.traced.iterations <= 2) > 0.9
+    assert np.mean(branch.traced.record.iterations <= 2) > 0.9
 
 
 @pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(9)], ids=repr)
@@ -67,8 +67,9 @@ def test_recorded_depths_are_those_of_the_motion(method, clearance_minus) -> Non
     if clearance_minus is not None:
         screen = screen.replace(clearance_minus=clearance_minus)
     branch = ff.frequency_response(screen, (60.0, 130.0), method)
-    low, high = branch.solver.gap_extremes(branch.traced.u, branch.omega)
-    plus, minus = branch.solver.builder.springs[0].gaps
+    solver = branch.formulation.solver()
+    low, high = solver.gap_extremes(branch.traced.u, branch.omega)
+    plus, minus = solver.springs[0].gaps
     depth = np.stack([high - plus, -low - minus], axis=2)
     assert (depth > 0.0).any()
     assert (depth < 0.0).any()
@@ -83,7 +84,8 @@ def test_multipliers_without_contact_are_those_of_the_return_map(symmetric: bool
     branch = ff.frequency_response(screen, (20.0, 100.0))
     free = (branch.traced.depth < 0.0).all(axis=(1, 2))
     assert 0 < free.sum() < free.size
-    closed = branch.solver.eigenvalues(branch.traced, branch.return_maps)
+    solver = branch.formulation.solver()
+    closed = solver.eigenvalues(branch.traced, branch.return_maps)
     for ours, expected in zip(closed, eigenvalues_of(branch.return_maps), strict=True):
         gaps = np.abs(ours[:, None] - expected[None, :])
         assert gaps.min(axis=0).max() < 1e-7

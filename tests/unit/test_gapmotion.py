@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flipflow.dynamics.contact_search import Contact, GapMotion
-from flipflow.periodic.scratch import new_gap_motion
+from flipflow.dynamics.contact_search import GapMotion, new_gap_motion
+from flipflow.dynamics.law import Stops
+from flipflow.model.contact_law import NUMBER
 from judge import close
 from kernel_calls import change_after, range_of
 
@@ -34,11 +35,10 @@ def motion(offset: float, amplitude, rate, spacing: int = 0) -> GapMotion:
 def contact(
     plus: float, minus: float = math.inf, stiffness: float = 1.0, damping: float = 0.0,
     *, clipped: bool = False,
-) -> Contact:  # fmt: skip
+) -> Stops:  # fmt: skip
+    law = NUMBER["compression-only" if clipped else "paper"]
     one = np.ones(1)
-    return Contact(
-        plus * one, minus * one, stiffness * one, damping * one, np.array([int(clipped)])
-    )
+    return Stops(np.array([law]), stiffness * one, damping * one, np.array([[plus, minus]]))
 
 
 def sampled(m: GapMotion, t: np.ndarray, order: int = 0) -> np.ndarray:
@@ -49,17 +49,17 @@ def sampled(m: GapMotion, t: np.ndarray, order: int = 0) -> np.ndarray:
     return y
 
 
-def first_sampled(m: GapMotion, c: Contact, horizon: float) -> tuple[float, int]:
+def first_sampled(m: GapMotion, c: Stops, horizon: float) -> tuple[float, int]:
     """First sample beyond a gap, and its side; (inf, 0) without one."""
     t = np.linspace(0.0, horizon, SAMPLES)
     y = sampled(m, t)
-    beyond = np.flatnonzero((y > c.gap_plus[0]) | (y < -c.gap_minus[0]))
+    beyond = np.flatnonzero((y > c.gap[0, 0]) | (y < -c.gap[0, 1]))
     if beyond.size == 0:
         return math.inf, 0
     return float(t[beyond[0]]), PLUS if y[beyond[0]] > 0.0 else MINUS
 
 
-def search(m: GapMotion, c: Contact, state: int, horizon: float, fired: int = -1):
+def search(m: GapMotion, c: Stops, state: int, horizon: float, fired: int = -1):
     t, spring, new = change_after(m, c, np.array([state]), horizon, fired)
     assert not math.isnan(t), "the search did not end"
     return t, (spring, new)

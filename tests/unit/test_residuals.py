@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.dynamics.assembly import PlanBuilder
-from flipflow.periodic.scratch import new_balance, new_sampled, new_shooting
+from flipflow.dynamics.machine import machine_arrays
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.sampled import new_sampled, new_sampled_work
+from flipflow.periodic.series import new_balance, new_balance_work
+from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from judge import close
 from kernel_calls import balance, central_differences, jump, residual_of, sampled, shoot
 from reference import integrate
@@ -43,12 +46,12 @@ def test_jacobian_of_shooting(screen, law: str, case: str, omega: float, z) -> N
 
     In metres and velocities over omega, so that all entries are of one size.
     """
-    plan = PlanBuilder(machine(screen, law, CASES[case])).plan
+    arrays = machine_arrays(machine(screen, law, CASES[case]))
     z = np.array(z)
     scale = np.array([1.0, 1.0, omega, omega])
     for half_turn in (True, False) if case == "symmetric" else (False,):
-        problem = new_shooting(plan, half_turn=half_turn, length=LENGTH)
-        evaluate = residual_of(shoot, problem, 4)
+        problem = new_shooting(arrays, half_turn=half_turn, length=LENGTH)
+        evaluate = residual_of(shoot, problem, new_shooting_work(arrays), 4)
         _, J = evaluate(z, omega)
         F = central_differences(evaluate, z, omega, np.append(1e-6 * scale, 1e-5 * omega))
         columns = np.append(scale, 1.0)
@@ -66,15 +69,16 @@ def test_jacobian_of_harmonic_balance(screen, law: str, case: str, order: int) -
     The limits move with the root of small changes, hence a digit less than for smooth functions.
     """
     symmetric = CASES[case] is None
-    plan = PlanBuilder(machine(screen, law, CASES[case])).plan
-    problem = new_balance(plan, order, half_turn=symmetric, length=LENGTH)
+    arrays = machine_arrays(machine(screen, law, CASES[case]))
+    problem = new_balance(arrays, order, half_turn=symmetric, length=LENGTH)
     unknowns = 2 * np.count_nonzero(problem.harmonics) + np.count_nonzero(problem.harmonics == 0)
     rng = np.random.default_rng(order)
     u = rng.normal(size=unknowns) * 1.0e-3
     u[0 if symmetric else 1] = 9e-3
-    evaluate = residual_of(balance, problem, unknowns)
+    work = new_balance_work(problem)
+    evaluate = residual_of(balance, problem, work, unknowns)
     _, J = evaluate(u, 120.0)
-    assert problem.flow.segments[0] > 1, "there is contact in this test"
+    assert work.flow.segments[0] > 1, "there is contact in this test"
     F = central_differences(evaluate, u, 120.0, np.append(np.full(unknowns, 1e-9), 1e-4))
     off = np.abs(F - J).max(axis=0) / np.abs(J).max(axis=0)
     assert np.all(off < 1e-5), f"relative differences {off}"
@@ -89,16 +93,17 @@ def test_jacobian_of_sampled_balance(screen, case: str, order: int, sharpness: f
     The switch has curvature sharpness^2, so that the differences step by 1e-4 of its layer.
     """
     symmetric = CASES[case] is None
-    plan = PlanBuilder(machine(screen, "paper", CASES[case])).plan
-    balanced = new_balance(plan, order, half_turn=symmetric, length=LENGTH)
+    arrays = machine_arrays(machine(screen, "paper", CASES[case]))
+    balanced = new_balance(arrays, order, half_turn=symmetric, length=LENGTH)
     problem = new_sampled(balanced, 256, sharpness)
     kept = balanced.harmonics
     unknowns = 2 * np.count_nonzero(kept) + np.count_nonzero(kept == 0)
     u = np.random.default_rng(order).normal(size=unknowns) * 1.0e-3
     u[0 if symmetric else 1] = 9e-3
-    evaluate = residual_of(sampled, problem, unknowns)
+    work = new_sampled_work(new_balance_work(balanced))
+    evaluate = residual_of(sampled, problem, work, unknowns)
     _, J = evaluate(u, 120.0)
-    assert problem.beyond[0] > 0, "there is contact in this test"
+    assert work.beyond[0] > 0, "there is contact in this test"
     step = min(1e-7, 1e-4 / sharpness)
     F = central_differences(evaluate, u, 120.0, np.append(np.full(unknowns, step), 1e-3))
     off = np.abs(F - J).max(axis=0) / np.abs(J).max(axis=0)
@@ -115,15 +120,16 @@ def test_jacobians_with_several_springs() -> None:
     system = ff.MechanicalSystem(
         np.eye(3), 0.1 * shape, shape, springs, ff.HarmonicForce([1.0, 0.0, 0.3j])
     )
-    plan = PlanBuilder(system).plan
-    problem = new_balance(plan, 4, half_turn=False, length=0.4)
+    arrays = machine_arrays(system)
+    problem = new_balance(arrays, 4, half_turn=False, length=0.4)
     u = np.random.default_rng(2).normal(size=18) * 0.3
     u[2:6] = [0.7, 0.2, -0.4, 0.9]
-    evaluate = residual_of(balance, problem, 18)
+    evaluate = residual_of(balance, problem, new_balance_work(problem), 18)
     _, J = evaluate(u, 1.1)
     F = central_differences(evaluate, u, 1.1, np.full(19, 1e-7))
     close("dr/d(u, omega)", F, J, abs=1e-5 * np.abs(J).max())
-    flow = residual_of(shoot, new_shooting(plan, half_turn=False, length=0.4), 6)
+    whole = new_shooting(arrays, half_turn=False, length=0.4)
+    flow = residual_of(shoot, whole, new_shooting_work(arrays), 6)
     z = np.array([0.5, -0.3, 0.4, 0.2, -0.6, 0.8])
     _, J = flow(z, 1.1)
     F = central_differences(flow, z, 1.1, np.full(7, 3e-5))
@@ -132,12 +138,12 @@ def test_jacobians_with_several_springs() -> None:
 
 def test_saltation_kernel(screen) -> None:
     """Row 12: in (x1, x2) the entries are -c3/m1, -c3 (1/m1 + 1/m2); at the exit with +."""
-    plan = PlanBuilder(screen.system()).plan
+    arrays = machine_arrays(screen.system())
     c3, m1, m2 = screen.stop_damping, screen.main_mass, screen.floating_mass
     to_relative = np.kron(np.eye(2), [[1.0, 0.0], [1.0, -1.0]])
     for sign in (-1.0, 1.0):
         U = np.eye(4)
-        jump(plan, 0, sign, U)
+        jump(arrays, 0, sign, U)
         S = to_relative @ U @ np.linalg.inv(to_relative)
         expected = np.eye(4)
         expected[2:, 1] = sign * c3 * np.array([1.0 / m1, 1.0 / m1 + 1.0 / m2])
@@ -161,7 +167,7 @@ def test_overdamped_and_critically_damped_flow(ratio: float) -> None:
     """
     system, omega = damped(ratio), 0.9
     z = np.array([0.5, -0.4, 0.3, -0.6])
-    solver = ff.frequency_response(system, (0.2, 2.0)).solver
+    solver = ExactSolver(system, half_turn=False)
     end = 2.0 * np.pi / omega
     expected = integrate.flow(integrate.Machine.of(system), z, omega, 0.0, end).final
     close("state after a turn", solver.settled(z, omega, 1), expected, abs=1e-8)

@@ -67,9 +67,10 @@ def test_what_cannot_be_opened_says_why(tmp_path):
 @pytest.mark.parametrize("ending", ["json", "nc", "csv"])
 def test_a_branch_that_could_not_be_started_is_saved(tmp_path, ending):
     branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 160.0))
-    record = branch.solver.new_branch(1)
+    solver = branch.formulation.solver()
+    record = solver.new_branch(1)
     nothing = Traced.recorded(record, 0, status.NO_CONVERGENCE, branch.traced.course)
-    empty = described(branch.machine, branch.method, branch.solver, nothing)
+    empty = described(branch.machine, branch.method, solver, nothing)
     with pytest.raises(IncompleteError, match=r"no points\. No periodic motion"):
         empty.orbits_at(155.0)
     ff.save(empty, tmp_path / f"branch.{ending}")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.dynamics.assembly import PlanBuilder
-from flipflow.periodic.two_event_starts import TwoEventProblem
+from flipflow.dynamics.machine import machine_arrays
+from flipflow.periodic.two_event import TwoEventProblem
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ def test_every_contact_point_of_the_branch_is_a_zero(changes):
     """f(s, omega) = |F| - 1 vanishes at the shares of all shooting points, stable or not."""
     screen = ff.load("ffs0827").replace(**changes)
     branch = ff.frequency_response(screen, (5.0, 250.0))
-    problem = TwoEventProblem(PlanBuilder(screen.system()))
+    problem = TwoEventProblem(machine_arrays(screen.system()))
     orbits = [branch.orbit(i) for i in range(0, branch.omega.size, 7)]
     touching = [orbit for orbit in orbits if len(orbit.contact_intervals) == 2]
     assert len(touching) > 20
@@ -33,7 +33,7 @@ def test_every_contact_point_of_the_branch_is_a_zero(changes):
 def test_all_touching_motions_are_found_without_a_guess(omega):
     screen = ff.load("ffs0827")
     branch = ff.frequency_response(screen, (5.0, 250.0))
-    states, shares = TwoEventProblem(PlanBuilder(screen.system())).states(omega)
+    states, shares = TwoEventProblem(machine_arrays(screen.system())).states(omega)
     known = [orbit for orbit in branch.orbits_at(omega) if orbit.contact_intervals]
     assert len(shares) == len(known)
     for orbit in known:
@@ -49,7 +49,7 @@ def test_shooting_has_the_last_word_where_motion_leans():
     unstable, and the two stable motions that lean to either side.
     """
     screen = ff.load("ffs0827").replace(clearance=2e-3)
-    states, _ = TwoEventProblem(PlanBuilder(screen.system())).states(57.7)
+    states, _ = TwoEventProblem(machine_arrays(screen.system())).states(57.7)
     motions = ff.periodic_orbits(screen, omega=57.7)
     assert sorted(motion.stability for motion in motions) == ["stable", "stable", "unstable"]
     true = [

@@ -7,7 +7,6 @@ chunk has finished is kept whatever happens to the others.
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -16,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.dynamics.assembly import PlanBuilder
+from flipflow.compiled.arrays import Real
+from flipflow.dynamics.machine import machine_arrays
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.system import MechanicalSystem
-from flipflow.periodic.scratch import new_shooting
-from flipflow.periodic.solver import Real
+from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from flipflow.periodic.turns import NOT_SETTLED, settle_lanes
 
 Int = NDArray[np.int64]
@@ -105,10 +104,9 @@ class Lanes:
         whole = isinstance(threads, (int, np.integer)) and not isinstance(threads, bool)
         if threads is not None and not (whole and 1 <= threads <= MOST_THREADS):
             raise InputError("threads", threads, f"give a whole number from 1 to {MOST_THREADS}")
-        self.builder = PlanBuilder(system)
+        self.machine = machine_arrays(system.with_bonded())
         self.omega = float(omega)
         self.threads = threads or _processors()
-        self._adding = threading.Lock()
 
     def settle(
         self,
@@ -159,24 +157,17 @@ class Lanes:
         return run.states
 
     def _chunk(self, run: Run, part: slice, begin: Real, capture: Capture, most: int) -> None:
-        """Run a part of the lanes; a configuration that is missing is prepared, and all run again.
+        """Run a part of the lanes with scratch of its own.
 
         Results are written when all lanes have ended, so that a part is either done or not begun.
         """
         label, turns, code = (np.zeros(part.stop - part.start, np.int64) for _ in range(3))
-        while True:
-            states = run.states[part].copy()
-            plan = self.builder.plan
-            problem = new_shooting(plan, half_turn=False, length=1.0)
-            settle_lanes(
-                problem, states, begin[part], self.omega, capture.centre, capture.form,
-                capture.owner, most, label, turns, code,
-            )  # fmt: skip
-            if not np.any(code == status.MISSING_CONFIGURATION):
-                break
-            with self._adding:
-                self.builder.add_contact_state(problem.flow.state)
-            code[:] = status.OK
+        states = run.states[part].copy()
+        problem = new_shooting(self.machine, half_turn=False, length=1.0)
+        settle_lanes(
+            problem, new_shooting_work(self.machine), states, begin[part], self.omega,
+            capture.centre, capture.form, capture.owner, most, label, turns, code,
+        )  # fmt: skip
         run.states[part], run.label[part] = states, label
         run.turns[part], run.code[part] = turns, code
 

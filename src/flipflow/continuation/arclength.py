@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.continuation.problem import depths, residual, signature, unknown_scale
-from flipflow.dynamics.plan import Int, Real
 
 NEWTON_MOST = 8
 NEWTON_FEW, NEWTON_MANY = 3, 4
@@ -113,7 +115,7 @@ def newton_update(work: Corrector) -> float:
 
 
 @kernel
-def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
+def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     """Newton from work.guess within the plane through it normal to work.border (scaled).
 
     The plane omega = constant has the border (0, ..., 0, 1). Returns status and iterations; the
@@ -126,7 +128,7 @@ def correct(problem: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
     for iteration in range(1, NEWTON_MOST + 1):
         if not work.w[n] > 0.0:
             return status.NO_CONVERGENCE, iteration
-        code = residual(problem, work.w, float(work.w[n]), work.r, work.J)
+        code = residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
         if code != status.OK:
             return code, iteration
         if not bordered(work):
@@ -161,7 +163,7 @@ def new_tangent(work: Corrector) -> float:
 
 
 @kernel
-def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
+def store(problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int) -> None:
     """Write point p of the branch from the corrector's scratch."""
     n = work.r.shape[0]
     for i in range(n):
@@ -172,9 +174,9 @@ def store(problem: Any, work: Corrector, branch: Branch, p: int) -> None:
     branch.omega[p] = work.w[n]
     for k in range(n + 1):
         branch.tangent[p, k] = work.tangent[k] * work.scale[k]
-    branch.signature[p] = signature(problem)
+    branch.signature[p] = signature(problem, scratch)
     branch.side[p] = work.side[0]
-    depths(problem, float(work.w[n]), branch.depth[p])
+    depths(problem, scratch, float(work.w[n]), branch.depth[p])
 
 
 @kernel
@@ -262,7 +264,8 @@ def astray(work: Corrector) -> float:
 
 @kernel
 def judge(
-    problem: Any, work: Corrector, branch: Branch, p: int, step: float, code: int, iterations: int,
+    problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int, step: float, code: int,
+    iterations: int,
     course: Course,
 ) -> int:  # fmt: skip
     """Why the corrected step from point p is refused, REASON_NONE when it is good.
@@ -288,7 +291,7 @@ def judge(
         return REASON_TURN
     if work.side[0] != branch.side[p] and step > STRAND_STEP:
         return REASON_STRAND
-    if signature(problem) != branch.signature[p] and step > CONTACT_STEP:
+    if signature(problem, scratch) != branch.signature[p] and step > CONTACT_STEP:
         return REASON_CONTACT
     return REASON_NONE
 
@@ -315,8 +318,9 @@ def arrival(branch: Branch, course: Course, p: int, ends: bool, back: bool) -> i
 
 @kernel
 def trace(
-    problem: Any, work: Corrector, branch: Branch, u: Real, omega: float, course: Course
-) -> tuple[int, int]:
+    problem: Any, scratch: Any, work: Corrector, branch: Branch, u: Real, omega: float,
+    course: Course,
+) -> tuple[int, int]:  # fmt: skip
     """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
 
     The first point is corrected at fixed omega, the last stands exactly on the bound; a branch
@@ -342,10 +346,12 @@ def trace(
             ends = predict(work, branch, p - 1, step, course)
         # A correction as long as the step itself would not tell one strand from the next.
         tolerance = course.tolerance if p == 0 else min(course.tolerance, TOLERATED * step)
-        code, iterations = correct(problem, work, tolerance)
-        if code == status.MISSING_CONFIGURATION or (p == 0 and code != status.OK):
+        code, iterations = correct(problem, scratch, work, tolerance)
+        if p == 0 and code != status.OK:
             return code, p
-        reason = judge(problem, work, branch, max(p - 1, 0), step, code, iterations, course)
+        reason = judge(
+            problem, scratch, work, branch, max(p - 1, 0), step, code, iterations, course
+        )
         if reason != REASON_NONE and p > 0:
             branch.reason[p] = reason
             branch.rejected[p] += 1
@@ -353,7 +359,7 @@ def trace(
             if length < SHORTEST:
                 return status.STEP_TOO_SMALL, p
             continue
-        store(problem, work, branch, p)
+        store(problem, scratch, work, branch, p)
         branch.iterations[p] = iterations
         distance = from_start(work, branch)
         travelled = max(travelled, distance)
@@ -370,3 +376,46 @@ def trace(
         recall(problem, work, branch, p, course)
         p += 1
     return status.POINT_LIMIT, p
+
+
+def new_corrector(unknowns: int, gaps: int) -> Corrector:
+    """Scratch of the bordered Newton solves."""
+    n = unknowns
+    return Corrector(
+        w=np.zeros(n + 1),
+        guess=np.zeros(n + 1),
+        border=np.zeros(n + 1),
+        before=np.zeros(n + 1),
+        tangent=np.zeros(n + 1),
+        scale=np.ones(n + 1),
+        side=np.zeros(1),
+        r=np.zeros(n),
+        J=np.zeros((n, n + 1)),
+        A=np.zeros((n + 1, n + 1)),
+        b=np.zeros(n + 1),
+        pivot=np.zeros(n + 1, np.int64),
+        depth=np.zeros((gaps, 2)),
+    )
+
+
+def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = True) -> Branch:
+    """Record of a branch of up to ``points`` points."""
+    n = unknowns
+    return Branch(
+        u=np.empty((points, n)),
+        omega=np.empty(points),
+        tangent=np.empty((points, n + 1)),
+        jacobian=np.empty((points, n, n) if with_jacobian else (points, 0, 0)),
+        side=np.empty(points),
+        signature=np.empty(points, np.int64),
+        depth=np.empty((points, gaps, 2)),
+        iterations=np.empty(points, np.int64),
+        rejected=np.zeros(points, np.int64),
+        reason=np.zeros(points, np.int64),
+    )
+
+
+def first_points(branch: Branch, points: int) -> Branch:
+    """A copy of the first points of a record."""
+    rows = {name: array[:points].copy() for name, array in branch._asdict().items()}
+    return Branch(**rows)

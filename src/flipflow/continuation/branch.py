@@ -18,7 +18,7 @@ from flipflow.errors import IncompleteError, InputError
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Point, Solver, Traced
+from flipflow.periodic.solver import Formulation, Point, Traced
 from flipflow.periodic.stability import STABLE, stability_words
 
 Real = NDArray[np.float64]
@@ -84,8 +84,8 @@ class Branch:
         What was analysed.
     method
         Options of the method used.
-    solver, traced
-        The solver and the points it left.
+    formulation, traced
+        What was solved, and the points.
     return_maps
         Linearised return maps over a turn, or over half a turn with sign, (n, 2 N, 2 N).
     saddle_side_at_start
@@ -106,7 +106,7 @@ class Branch:
 
     machine: Machine
     method: Method
-    solver: Solver
+    formulation: Formulation
     traced: Traced
     return_maps: Real
     saddle_side_at_start: bool
@@ -126,12 +126,12 @@ class Branch:
     @property
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
-        return self.solver.system
+        return self.formulation.system
 
     @property
     def periods(self) -> int:
         """Number of forcing periods after which the motions repeat."""
-        return self.solver.turns
+        return self.formulation.turns
 
     @property
     def omega(self) -> Real:
@@ -156,7 +156,7 @@ class Branch:
     @cached_property
     def error(self) -> Real:
         """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
-        return self.solver.errors(self.traced.u, self.omega)
+        return self.formulation.solver().errors(self.traced.u, self.omega)
 
     @property
     def shortened_steps(self) -> tuple[ShortenedStep, ...]:
@@ -186,7 +186,7 @@ class Branch:
         if not -self.omega.size <= i < self.omega.size:
             raise InputError("i", i, f"the branch has points 0 to {self.omega.size - 1}")
         u, omega = self.traced.u[i], float(self.omega[i])
-        point = Point(self.solver, u, omega, known_map=self.return_maps[i])
+        point = Point(self.formulation, u, omega, known_map=self.return_maps[i])
         return Orbit(self.machine, point, str(self.stability[i]))
 
     def orbits_at(self, omega: float) -> tuple[Orbit, ...]:
@@ -205,13 +205,14 @@ class Branch:
         if not isinstance(omega, numbers.Real) or not ends.min() <= omega <= ends.max():
             remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
             raise InputError("omega", omega, remedy)
+        solver = self.formulation.solver()
         hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
         found: list[Orbit] = []
         for p in hits:
             span = ends[p + 1] - ends[p]
             share = (omega - ends[p]) / span if span else 0.0
             guess = (1.0 - share) * self.traced.u[p] + share * self.traced.u[p + 1]
-            point = self.solver.solve(guess, omega)
+            point = solver.solve(guess, omega)
             if point is None:
                 continue
             same = any(np.allclose(point.u, one.unknowns, rtol=1e-7, atol=1e-12) for one in found)
@@ -260,7 +261,7 @@ class Branch:
         span = self.omega[after] - self.omega[before]
         share = min((omega - self.omega[before]) / span, 1.0) if span else 0.0
         guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
-        point = self.solver.solve(guess, omega)
+        point = self.formulation.solver().solve(guess, omega)
         if point is None:
             return None
         return self._solved(point, rises=True)
@@ -291,6 +292,7 @@ class Branch:
         """The peak or trough near point ``top``, searched in the steps on both sides of it."""
         sign = -1.0 if kind == "peak" else 1.0
         vector = self.system.coordinate(which)[None]
+        solver = self.formulation.solver()
         best = SpecialPoint(kind, self.orbit(top), float(top))
         for p in (top - 1, top):
             if not 0 <= p < self.omega.size - 1:
@@ -298,10 +300,10 @@ class Branch:
 
             def rise(share: float, p: int = p) -> float:
                 try:
-                    point = self.solver.between(self.traced, p, share)
+                    point = solver.between(self.traced, p, share)
                 except IncompleteError:
                     return math.inf  # not every motion between two sharp bends can be had
-                low, high, _ = self.solver.extremes(point.u[None], np.array([point.omega]), vector)
+                low, high, _ = solver.extremes(point.u[None], np.array([point.omega]), vector)
                 return sign * float(high[0, 0] - low[0, 0])
 
             share = float(
@@ -311,7 +313,7 @@ class Branch:
             )
             if not math.isfinite(rise(share)):
                 continue
-            point = self.solver.between(self.traced, p, share)
+            point = solver.between(self.traced, p, share)
             orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
             if sign * orbit.amplitude(which) < sign * best.amplitude(which):
                 best = SpecialPoint(kind, orbit, p + share)
@@ -320,7 +322,8 @@ class Branch:
     def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
-            low, high, first = self.solver.extremes(self.traced.u, self.omega, np.array([key]))
+            solver = self.formulation.solver()
+            low, high, first = solver.extremes(self.traced.u, self.omega, np.array([key]))
             self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
         return self._seen[key]
 

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.solver import Point, Real, Traced
+from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import determinant_minus
 
 BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
@@ -58,7 +59,7 @@ class ExactBeside:
         state = self.solver.states(near.u[None], np.array([near.omega]))[0]
         return self.exact.solve(state, near.omega)
 
-    def crosses(self, position: float, room: float, test: Callable[[Point], float]) -> bool:
+    def crosses(self, position: float, room: float, test: Callable[[Real], float]) -> bool:
         """Whether the exact branch has a zero of a test less than ``room`` steps off a position."""
         for share in BESIDE:
             sides = [self.at(position + sign * share) for sign in (-1.0, 1.0) if share < 0.5 * room]
@@ -94,9 +95,9 @@ class ExactBeside:
                 return True
         return False
 
-    def _zero_between(self, first: Point, last: Point, test: Callable[[Point], float]) -> bool:
+    def _zero_between(self, first: Point, last: Point, test: Callable[[Real], float]) -> bool:
         """Whether a test has a zero, not a jump, on the exact branch between two motions."""
-        values = test(first), test(last)
+        values = test(first.return_map), test(last.return_map)
         if not values[0] * values[1] < 0.0:
             return False
         record = self.exact.new_branch(2)
@@ -108,7 +109,7 @@ class ExactBeside:
         def value(share: float) -> float:
             if share in (0.0, 1.0):
                 return values[int(share)]
-            return test(self.exact.between(chord, 0, share))
+            return test(self.exact.between(chord, 0, share).return_map)
 
         try:
             root = float(brentq(value, 0.0, 1.0, xtol=1e-9, rtol=1e-9))

@@ -36,7 +36,7 @@ from flipflow.errors import InputError
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Point, Solver
+from flipflow.periodic.solver import Formulation, Point
 from flipflow.periodic.stability import UNDETERMINED, determinant_plus, neimark_sacker
 
 CUSP = "cusp"
@@ -75,7 +75,7 @@ def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float])
     orbit = fold.orbit
     screen, value = _screen_and_value(orbit, field)
     bounds = _check_bounds(screen, field, value, interval)
-    own = orbit.point.solver
+    own = orbit.point.formulation
     equations = FoldEquations(
         _system_of(screen, field), bounds, orbit.omega,
         half_turn=own.half_turn and _stays_symmetric(screen, field, bounds), turns=own.turns,
@@ -92,14 +92,14 @@ def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float])
 
 
 def field_branch(
-    orbit: Orbit, field: str, interval: tuple[float, float], solver: Solver
+    orbit: Orbit, field: str, interval: tuple[float, float], sought: Formulation
 ) -> FieldBranch:
-    """The branch of a motion over a field, sought as ``solver`` does."""
+    """The branch of a motion over a field, sought as a formulation has it."""
     screen, value = _screen_and_value(orbit, field)
     bounds = _check_bounds(screen, field, value, interval)
-    half_turn = solver.half_turn and _stays_symmetric(screen, field, bounds)
+    half_turn = sought.half_turn and _stays_symmetric(screen, field, bounds)
     equations = FieldEquations(
-        _system_of(screen, field), bounds, orbit.omega, half_turn=half_turn, turns=solver.turns
+        _system_of(screen, field), bounds, orbit.omega, half_turn=half_turn, turns=sought.turns
     )
     path = follow_both_ways(equations, np.append(orbit.state, value))
     found, notes = zeros_of(_tests(equations, path), FieldFollower(equations), path)
@@ -178,11 +178,12 @@ def _tests(equations: FieldEquations, path: Path) -> list[Test]:
 
 def _depth(point: Point, side: int) -> float:
     """Greatest depth in m beyond the gap on a side; NaN for a value without a gap there."""
-    springs = point.solver.builder.springs
+    solver = point.formulation.solver()
+    springs = solver.springs
     gap = springs[0].gaps[0 if side > 0 else 1] if springs else math.inf
     if math.isinf(gap):
         return math.nan
-    least, most = point.solver.gap_extremes(point.u[None], np.array([point.omega]))
+    least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
     return float((most[0, 0] if side > 0 else -least[0, 0]) - gap)
 
 

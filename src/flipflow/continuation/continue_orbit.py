@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from dataclasses import replace
 
 from flipflow.continuation import arclength
 from flipflow.continuation.branch import Branch, SpecialPoint
@@ -24,11 +25,11 @@ from flipflow.continuation.switching import (
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import check_interval
 from flipflow.model.system import Machine
-from flipflow.periodic.balance_solver import BalanceSolver, SampledSolver
+from flipflow.periodic.balance_solver import SampledSolver
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.options import Method, PiecewiseExact
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import STEP_SHARE, Point, Solver
+from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Solver
 from flipflow.periodic.stability import UNDETERMINED
 
 SYMMETRIC = 1e-9
@@ -74,14 +75,16 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
     if not isinstance(orbit, Orbit):
         raise InputError("orbit", orbit, "give a motion, for example one of ff.periodic_orbits")
     if field != "omega":
-        return field_branch(orbit, field, interval, solver_like(orbit, ExactSolver))
+        return field_branch(orbit, field, interval, formulation_like(orbit, ExactSolver))
     low, high = check_interval(interval)
     if not low <= orbit.omega <= high:
         remedy = f"the motion is one at {orbit.omega:.9g} rad/s; give an interval that holds it"
         raise InputError("interval", interval, remedy)
-    solver = solver_like(orbit, type(orbit.point.solver))
-    u = orbit.unknowns if solver is orbit.point.solver else solver.unknowns_from(orbit.motion)
-    method = method_of(solver)
+    own = orbit.point.formulation
+    sought = formulation_like(orbit, own.kind)
+    solver = sought.solver()
+    u = orbit.unknowns if sought is own else solver.unknowns_from(orbit.motion)
+    method = method_of(sought)
     if isinstance(solver, SampledSolver):
         warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
     followed = follow_both_ways(solver, u, orbit.omega, _course(low, high, method))
@@ -124,7 +127,7 @@ def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
         remedy = f"the point stands at {point.omega:.9g} rad/s; give an interval around it"
         raise InputError("interval", interval, remedy)
     parent = _exact_point(point)
-    child = child_of(parent.solver)
+    child = child_of(parent.formulation)
     method = PiecewiseExact()
     course = _course(low, high, method)
     first = beside(child, parent, course)
@@ -132,33 +135,29 @@ def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
     return _branch(point.orbit.machine, method, child, followed)
 
 
-def solver_like(orbit: Orbit, kind: type[Solver]) -> Solver:
-    """A solver of a kind for the orbit's periods, the mirror-symmetric one where it is symmetric.
+def formulation_like(orbit: Orbit, kind: type[Solver]) -> Formulation:
+    """A formulation of a kind for the orbit's periods, mirror-symmetric where the orbit is.
 
-    The orbit's own solver where that is such a one.
+    The orbit's own where that is such a one.
     """
-    own = orbit.point.solver
-    turns = own.turns
+    own = orbit.point.formulation
     symmetric = own.half_turn
-    if own.system.symmetric and turns % 2 == 1 and not symmetric:
-        mirrored = image(
-            ExactSolver(own.system, half_turn=True, turns=turns), orbit.state, orbit.omega
-        )
+    if own.system.symmetric and own.turns % 2 == 1 and not symmetric:
+        half = ExactSolver(own.system, half_turn=True, turns=own.turns)
+        mirrored = image(half, orbit.state, orbit.omega)
         symmetric = distance_to(orbit.state, mirrored, orbit.omega) < SYMMETRIC
-    if isinstance(own, kind) and own.half_turn == symmetric:
-        return own
-    if kind is SampledSolver and isinstance(own, SampledSolver):
-        return SampledSolver(own.system, own.order, own.samples, own.sharpness, half_turn=symmetric)
-    if kind is BalanceSolver and isinstance(own, BalanceSolver):
-        return BalanceSolver(own.system, own.order, half_turn=symmetric)
-    return ExactSolver(own.system, half_turn=symmetric, turns=turns)
+    if own.kind is kind:
+        return own if own.half_turn == symmetric else replace(own, half_turn=symmetric)
+    return Formulation(ExactSolver, own.system, symmetric, own.turns)
 
 
 def _exact_point(point: SpecialPoint) -> Point:
     """The special point of the exact flow."""
-    solver = solver_like(point.orbit, ExactSolver)
-    if solver is point.orbit.point.solver:
+    own = point.orbit.point.formulation
+    sought = formulation_like(point.orbit, ExactSolver)
+    if sought is own:
         return point.orbit.point
+    solver = sought.solver()
     exact = meeting(solver, solver.unknowns_from(point.orbit.motion), point.omega)
     if exact is None:
         raise InputError(

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import root_scalar
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.predictor_corrector import Equations, Path, Solved
 from flipflow.continuation.switching import distance_to, image, parent_of
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.solver import STEP_SHARE, Point, Real
+from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import determinant_plus
 
 POINTS = 200
@@ -122,7 +123,7 @@ class FieldEquations(Equations):
         n = solver.unknowns
         jacobian = solved.J[:n, :n]
         return FieldPoint(
-            solver, solved.w[:n], omega, float(solved.tangent[-1]), jacobian,
+            solver.formulation, solved.w[:n], omega, float(solved.tangent[-1]),
             known_map=jacobian + np.eye(n), value=value,
         )  # fmt: skip
 
@@ -185,6 +186,11 @@ class FieldFollower:
             raise IncompleteError(f"no point found between two of the branch near {value:.6g}")
         return self.equations.point(solved)
 
+    @staticmethod
+    def return_map(point: Point) -> Real:
+        """The return map of a motion, which its Jacobian tells."""
+        return point.return_map
+
 
 def meeting_over_field(parent: FieldEquations, z: Real, value: float) -> FieldPoint | None:
     """The parent's motion near (z, value) whose return map has the eigenvalue -1, by secants."""
@@ -210,4 +216,6 @@ def meeting_over_field(parent: FieldEquations, z: Real, value: float) -> FieldPo
     point = parent.solver_at(root).solve(guess, parent.omega)
     if point is None:
         return None
-    return FieldPoint(point.solver, point.u, point.omega, known_map=point.return_map, value=root)
+    return FieldPoint(
+        point.formulation, point.u, point.omega, known_map=point.return_map, value=root
+    )

@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
 from flipflow.continuation.arclength import (
     SHARP,
@@ -24,7 +25,6 @@ from flipflow.continuation.arclength import (
     trace,
 )
 from flipflow.continuation.problem import depths, residual
-from flipflow.dynamics.plan import Real
 
 TRACE_ALL = -1
 FOLD = -1
@@ -34,7 +34,13 @@ MOST_ROOT_STEPS = 100
 
 @kernel
 def correct_between(
-    problem: Any, work: Corrector, branch: Branch, p: int, share: float, course: Course
+    problem: Any,
+    scratch: Any,
+    work: Corrector,
+    branch: Branch,
+    p: int,
+    share: float,
+    course: Course,
 ) -> int:
     """A point of the branch between points p and p + 1: beside ``share`` of the cubic through them.
 
@@ -53,25 +59,32 @@ def correct_between(
     bend(work, branch, p + 1, step, chord)
     for k in range(n + 1):
         work.before[k] = work.border[k]
-    code, _ = correct(problem, work, SHARP)
+    code, _ = correct(problem, scratch, work, SHARP)
     if code != status.OK:
         return code
     new_tangent(work)
-    return residual(problem, work.w, float(work.w[n]), work.r, work.J)
+    return residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
 
 
 @kernel
-def height_of(problem: Any, work: Corrector, test: int) -> float:
+def height_of(problem: Any, scratch: Any, work: Corrector, test: int) -> float:
     """The test at the point in work: FOLD, or the depth beyond gap test // 2 on one side."""
     if test == FOLD:
         return float(work.tangent[work.r.shape[0]])
-    depths(problem, float(work.w[work.r.shape[0]]), work.depth)
+    depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
     return float(work.depth[test // 2, test % 2])
 
 
 @kernel
 def height_between(
-    problem: Any, work: Corrector, branch: Branch, p: int, share: float, test: int, course: Course
+    problem: Any,
+    scratch: Any,
+    work: Corrector,
+    branch: Branch,
+    p: int,
+    share: float,
+    test: int,
+    course: Course,
 ) -> tuple[int, float]:
     """Status and the test at a share of step p; at its ends as it was recorded.
 
@@ -82,31 +95,31 @@ def height_between(
         if test == FOLD:
             return status.OK, float(branch.tangent[end, work.r.shape[0]]) / course.omega_step
         return status.OK, float(branch.depth[end, test // 2, test % 2])
-    code = correct_between(problem, work, branch, p, share, course)
+    code = correct_between(problem, scratch, work, branch, p, share, course)
     if code != status.OK:
         return code, math.nan
-    return code, height_of(problem, work, test)
+    return code, height_of(problem, scratch, work, test)
 
 
 @kernel
 def zero_between(
-    problem: Any, work: Corrector, branch: Branch, p: int, low: float, high: float, test: int,
-    course: Course,
+    problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int, low: float, high: float,
+    test: int, course: Course,
 ) -> tuple[int, float]:  # fmt: skip
     """Zero of a test between two shares of step p by Chandrupatla's method: status and share.
 
     The point is left in work. T. R. Chandrupatla, Advances in Engineering Software 28 (1997) 145.
     """
     a, b = low, high
-    code_a, f_a = height_between(problem, work, branch, p, a, test, course)
-    code_b, f_b = height_between(problem, work, branch, p, b, test, course)
+    code_a, f_a = height_between(problem, scratch, work, branch, p, a, test, course)
+    code_b, f_b = height_between(problem, scratch, work, branch, p, b, test, course)
     if code_a != status.OK or code_b != status.OK or not f_a * f_b < 0.0:
         return status.NO_CONVERGENCE, low
     c, f_c = a, f_a
     t = f_a / (f_a - f_b)
     for _ in range(MOST_ROOT_STEPS):
         x = a + t * (b - a)
-        code, f = height_between(problem, work, branch, p, x, test, course)
+        code, f = height_between(problem, scratch, work, branch, p, x, test, course)
         if code != status.OK:
             return code, x
         if (f > 0.0) == (f_a > 0.0):
@@ -136,6 +149,7 @@ def _next_share(a: float, b: float, c: float, f_a: float, f_b: float, f_c: float
 @kernel(entry=True)
 def follow(
     problem: Any,
+    scratch: Any,
     work: Corrector,
     branch: Branch,
     u: Real,
@@ -153,9 +167,9 @@ def follow(
     that it calls.
     """
     if p == TRACE_ALL:
-        code, points = trace(problem, work, branch, u, omega, course)
+        code, points = trace(problem, scratch, work, branch, u, omega, course)
         return code, points, 0.0
     if low == high:
-        return correct_between(problem, work, branch, p, low, course), p, low
-    code, share = zero_between(problem, work, branch, p, low, high, test, course)
+        return correct_between(problem, scratch, work, branch, p, low, course), p, low
+    code, share = zero_between(problem, scratch, work, branch, p, low, high, test, course)
     return code, p, share

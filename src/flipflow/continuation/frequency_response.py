@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -25,7 +26,7 @@ from flipflow.periodic.options import (
     SampledHarmonicBalance,
 )
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import STEP_SHARE, Real, Solver, Traced
+from flipflow.periodic.solver import STEP_SHARE, Formulation, Solver, Traced
 from flipflow.periodic.stability import (
     UNDETERMINED,
     beyond_where_rising,
@@ -109,28 +110,35 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
 def solver_for(
     system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
 ) -> Solver:
-    """The solver of a method. Without stops both are the closed form, which shooting meets."""
+    """A solver of a method's equations for a machine: see :func:`formulation_of`."""
+    return formulation_of(system, method, half_turn=half_turn, turns=turns).solver()
+
+
+def formulation_of(
+    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
+) -> Formulation:
+    """The equations of a method. Without stops all are the closed form, which shooting meets."""
     symmetric = system.symmetric if half_turn is None else half_turn
-    springs = system.with_bonded().springs
-    if isinstance(method, HarmonicBalance) and springs:
-        return BalanceSolver(system, method.harmonics, half_turn=symmetric)
-    if isinstance(method, SampledHarmonicBalance) and springs:
-        if any(spring.law != "paper" for spring in springs):
+    linear = system.with_bonded()
+    if isinstance(method, HarmonicBalance) and linear.springs:
+        return Formulation(BalanceSolver, linear, symmetric, options=(method.harmonics,))
+    if isinstance(method, SampledHarmonicBalance) and linear.springs:
+        if any(spring.law != "paper" for spring in linear.springs):
             raise InputError(
                 "law", "compression-only", "only the paper's law has a smooth form to sample"
             )
-        return SampledSolver(
-            system, method.harmonics, method.samples, method.sharpness, half_turn=symmetric
-        )
-    return ExactSolver(system, half_turn=symmetric, turns=turns)
+        options = method.harmonics, method.samples, method.sharpness
+        return Formulation(SampledSolver, linear, symmetric, options=options)
+    return Formulation(ExactSolver, linear, symmetric, turns)
 
 
-def method_of(solver: Solver) -> Method:
-    """The method that a solver belongs to, with the usual number of points."""
-    if isinstance(solver, SampledSolver):
-        return SampledHarmonicBalance(solver.order, solver.samples, solver.sharpness)
-    if isinstance(solver, BalanceSolver):
-        return HarmonicBalance(solver.order)
+def method_of(formulation: Formulation) -> Method:
+    """The method that a formulation belongs to, with the usual number of points."""
+    if formulation.kind is SampledSolver:
+        harmonics, samples, sharpness = formulation.options
+        return SampledHarmonicBalance(int(harmonics), int(samples), sharpness)
+    if formulation.kind is BalanceSolver:
+        return HarmonicBalance(int(formulation.options[0]))
     return PiecewiseExact()
 
 
@@ -160,26 +168,22 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def lowest_contact(solver: Solver, omega: float) -> float | None:
     """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
     scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
-    X = solver.builder.contact_free(scan)
-    beyond = np.zeros(scan.size, dtype=bool)
-    for spring in solver.builder.springs:
-        beyond |= np.abs(X @ spring.direction) >= min(spring.gaps)
-    return float(scan[beyond][0]) if beyond.any() else None
+    _, first = solver.contact_free(scan, stop_at_contact=True)
+    return float(scan[first]) if first < scan.size else None
 
 
 def contact_free(solver: Solver, omega: float) -> bool:
     """Whether the linear motion at ``omega`` stays within all gaps."""
-    X = solver.builder.contact_free(np.array([omega]))[0]
-    return all(abs(spring.direction @ X) < min(spring.gaps) for spring in solver.builder.springs)
+    return solver.contact_free(np.array([omega]))[1] == 1
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = solver.builder.contact_free(np.array([omega]))[0]
+    X = solver.contact_free(np.array([omega]))[0][0]
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])
-        D = np.array([spring.direction for spring in solver.builder.springs])
+        D = solver.machine.direction
         m = D.shape[0]
         begin = 2 * m * at if solver.harmonics[0] != 0 else m + 2 * m * (at - 1)
         A = D @ X
@@ -227,7 +231,7 @@ def _finished(
     return Branch(
         machine=machine,
         method=method,
-        solver=solver,
+        formulation=solver.formulation,
         traced=traced,
         return_maps=maps,
         saddle_side_at_start=beyond,

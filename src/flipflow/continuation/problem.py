@@ -10,8 +10,8 @@ from typing import Any
 
 from numba.core.types import NamedTuple as NamedTupleType
 
+from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import chosen_by_type
-from flipflow.dynamics.plan import Real
 from flipflow.periodic.balance import balance_residual, series_scale
 from flipflow.periodic.sampled import (
     Sampled,
@@ -43,19 +43,19 @@ _DEPTHS: dict[type, Any] = {
 _SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale, Sampled: sampled_scale}
 
 
-def residual(problem: Any, u: Real, omega: float, r: Real, J: Real) -> int:
+def residual(problem: Any, scratch: Any, u: Real, omega: float, r: Real, J: Real) -> int:
     """Write the residual r(u, omega) and J = [dr/du, dr/d omega]; return a status."""
-    return int(_RESIDUAL[type(problem)](problem, u, omega, r, J))
+    return int(_RESIDUAL[type(problem)](problem, scratch, u, omega, r, J))
 
 
-def signature(problem: Any) -> int:
+def signature(problem: Any, scratch: Any) -> int:
     """A number that changes when the contacts of the last residual's motion change."""
-    return int(_SIGNATURE[type(problem)](problem))
+    return int(_SIGNATURE[type(problem)](scratch))
 
 
-def depths(problem: Any, omega: float, depth: Real) -> None:
+def depths(problem: Any, scratch: Any, omega: float, depth: Real) -> None:
     """Write the greatest depth in m beyond each gap, (m, 2), of the last residual's motion."""
-    _DEPTHS[type(problem)](problem, omega, depth)
+    _DEPTHS[type(problem)](problem, scratch, omega, depth)
 
 
 def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
@@ -68,31 +68,31 @@ def _kind(problem: Any) -> Any:
 
 
 @chosen_by_type(residual)
-def _residual(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
+def _residual(problem: Any, scratch: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
     chosen = _RESIDUAL[_kind(problem)]
 
-    def run(problem: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
-        return chosen(problem, u, omega, r, J)
+    def run(problem: Any, scratch: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
+        return chosen(problem, scratch, u, omega, r, J)
 
     return run
 
 
 @chosen_by_type(signature)
-def _signature(problem: Any) -> Any:
+def _signature(problem: Any, scratch: Any) -> Any:
     chosen = _SIGNATURE[_kind(problem)]
 
-    def run(problem: Any) -> Any:
-        return chosen(problem)
+    def run(problem: Any, scratch: Any) -> Any:
+        return chosen(scratch)
 
     return run
 
 
 @chosen_by_type(depths)
-def _depths(problem: Any, omega: Any, depth: Any) -> Any:
+def _depths(problem: Any, scratch: Any, omega: Any, depth: Any) -> Any:
     chosen = _DEPTHS[_kind(problem)]
 
-    def run(problem: Any, omega: Any, depth: Any) -> Any:
-        return chosen(problem, omega, depth)
+    def run(problem: Any, scratch: Any, omega: Any, depth: Any) -> Any:
+        return chosen(problem, scratch, omega, depth)
 
     return run
 

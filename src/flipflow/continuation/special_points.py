@@ -18,12 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from flipflow.compiled.arrays import Real
+from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
 from flipflow.continuation.confirm import ExactBeside, unconfirmed_note
 from flipflow.continuation.follow import FOLD as OF_FOLD
 from flipflow.continuation.follow import SHARE_TOLERANCE
 from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
-from flipflow.periodic.solver import Point, Real, Solver, Traced, eigenvalues_of
+from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
 DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
@@ -41,6 +43,10 @@ class Follower(Protocol):
 
     def between(self, traced: Any, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
+        ...
+
+    def return_map(self, point: Point) -> Real:
+        """The return map of such a point."""
         ...
 
 
@@ -95,7 +101,9 @@ def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Fou
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
                 notes.append(f"{test.kind}: {error}")
-    kept = sorted((one for one in found if _is_real(one)), key=lambda one: (one.index, one.share))
+    kept = sorted(
+        (one for one in found if _is_real(solver, one)), key=lambda one: (one.index, one.share)
+    )
     return kept, notes
 
 
@@ -115,7 +123,8 @@ def _confirmed(
             beside.folds_shown(positions[ours], side)
             if kind == FOLD
             else [
-                beside.crosses(*at, _TEST[kind]) for at in zip(positions[ours], room, strict=True)
+                beside.crosses(*at, MAP_TESTS[kind])
+                for at in zip(positions[ours], room, strict=True)
             ]
         )
         if kind in _ALONG:
@@ -126,12 +135,12 @@ def _confirmed(
     return [one for one, kept in zip(found, shown, strict=True) if kept], notes
 
 
-def _minus_one_test(point: Point) -> float:
-    return float(determinant_plus(point.return_map))
+def _minus_one(return_map: Real) -> float:
+    return float(determinant_plus(return_map))
 
 
-def _neimark_sacker_test(point: Point) -> float:
-    return float(neimark_sacker(point.eigenvalues))
+def _unit_pair(return_map: Real) -> float:
+    return float(neimark_sacker(eigenvalues_of(return_map)))
 
 
 def _fold_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
@@ -147,10 +156,10 @@ _ALONG: dict[str, Callable[[Traced, Real], Real]] = {
     FOLD: _fold_along,
     NEIMARK_SACKER: _neimark_sacker_along,
 }
-_TEST: dict[str, Callable[[Point], float]] = {
-    SYMMETRY: _minus_one_test,
-    DOUBLING: _minus_one_test,
-    NEIMARK_SACKER: _neimark_sacker_test,
+MAP_TESTS: dict[str, Callable[[Real], float]] = {
+    SYMMETRY: _minus_one,
+    DOUBLING: _minus_one,
+    NEIMARK_SACKER: _unit_pair,
 }
 
 
@@ -169,14 +178,19 @@ def _map_tests(
             suspects=hidden(fold),
             zero=partial(solver.zero_between, traced, OF_FOLD),
         ),
-        Test(kind, flips, _minus_one_test, suspects=hidden(flips)),
-        Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), _neimark_sacker_test),
+        Test(kind, flips, partial(_of_map, solver, kind), suspects=hidden(flips)),
+        Test(NEIMARK_SACKER, neimark_sacker(eigenvalues), partial(_of_map, solver, NEIMARK_SACKER)),
     ]
+
+
+def _of_map(solver: Solver, kind: str, point: Point) -> float:
+    """A test of the return map, worked out by the solver at hand."""
+    return MAP_TESTS[kind](solver.return_map(point))
 
 
 def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
     """Greatest depth beyond each gap over the turn; one side serves for a symmetric motion."""
-    springs = solver.builder.springs
+    springs = solver.springs
     if not springs:
         return []
     tests = []
@@ -313,8 +327,8 @@ def _zero_between(
     return share, last[share] if share in last else solver.between(traced, p, share)
 
 
-def _is_real(found: Found) -> bool:
+def _is_real(solver: Follower, found: Found) -> bool:
     """A product of two real eigenvalues passing one also zeroes the Neimark-Sacker test."""
     if found.kind != NEIMARK_SACKER:
         return True
-    return has_unit_pair(found.point.eigenvalues)
+    return has_unit_pair(eigenvalues_of(solver.return_map(found.point)))

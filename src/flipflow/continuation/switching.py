@@ -14,11 +14,12 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.predictor_corrector import CLOSE, NEAR, SAME
 from flipflow.errors import IncompleteError
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.solver import Point, Real, Solver, Traced
+from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus
 
 FINER = (1.0, 0.05, 0.01, 0.001)
@@ -49,7 +50,7 @@ def parent_of(solver: Solver) -> ExactSolver | None:
     return None
 
 
-def child_of(parent: Solver) -> ExactSolver:
+def child_of(parent: Formulation) -> ExactSolver:
     """The solver of the motions that branch off at an eigenvalue -1 of the parent's return map."""
     turns = parent.turns if parent.half_turn else 2 * parent.turns
     return ExactSolver(parent.system, half_turn=False, turns=turns)
@@ -81,7 +82,7 @@ def meeting(parent: Solver, u: Real, omega: float) -> Point | None:
         guess = last[-1]
         point = None if guess is None or w <= 0.0 else parent.solve(guess.u, w)
         last.append(point)
-        return math.nan if point is None else float(determinant_plus(point.return_map))
+        return math.nan if point is None else float(determinant_plus(parent.return_map(point)))
 
     answer = root_scalar(
         value, method="secant", x0=omega, x1=omega * (1.0 + SECANT), xtol=1e-12 * omega,
@@ -113,7 +114,7 @@ def follow_until_meeting(
         if landed.size == 0 or landed[0] == 0:
             break
     # The sign of det [J; tangent] changes where two branches cross and nowhere else.
-    crossed = np.flatnonzero(np.diff(np.sign(traced.record.side[: traced.omega.size])))
+    crossed = np.flatnonzero(np.diff(np.sign(traced.record.side)))
     stalled = [apart.size - 1] if traced.code == status.STEP_TOO_SMALL else []
     beyond = [int(p) - 1 for p in landed[:1] if p > 0]
     for p in sorted({*map(int, crossed), *stalled, *beyond}):
@@ -124,7 +125,7 @@ def follow_until_meeting(
         if point is not None:
             # Beside the meeting two branches are one to rounding; nothing is read off there.
             clear = int(np.flatnonzero(apart[: p + 1] > CLOSE).max(initial=0))
-            return Traced.recorded(traced.record, clear + 1, status.FOLLOWED, traced.course), point
+            return traced.first(clear + 1), point
     return traced, None
 
 

@@ -18,17 +18,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.plan import Complex, Int, Real
+from flipflow.dynamics.law import Stops, exit_of, signed_gap
+from flipflow.model.contact_law import ENTERED, MOST_EXITS, NO_EXIT, OPEN
 
-# A spring that is open, engaged on a side, or (+-2) beyond its gap without a force.
-OPEN, PLUS, MINUS = 0, 1, -1
-NOTHING = -9
-MAX_SEARCH = 20_000
-AT_GAP = 4e-16
-SMALLEST_STEP = 1e-11
+NOTHING = -9  # no regime: nothing has changed yet
+MAX_SEARCH = 20_000  # steps of one search; thirty are usual
+AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
+SMALLEST_STEP = 1e-11  # of the horizon: what bounds the steps of a search that grazes
 
 
 class GapMotion(NamedTuple):
@@ -45,16 +44,6 @@ class GapMotion(NamedTuple):
     turn: Complex  # (r,) terms of one gap, carried from sample to sample by ``extremes``
     ratio: Complex  # (r,) what carries them
     spacing: Int  # (1,) 0: any rates; s > 0: rates are i (r_0, r_0 + s, r_0 + 2 s, ...)
-
-
-class Contact(NamedTuple):
-    """The law of each spring, as the search needs it."""
-
-    gap_plus: Real
-    gap_minus: Real
-    stiffness: Real
-    damping: Real
-    clipped: Int
 
 
 @kernel(inline=True)
@@ -134,19 +123,18 @@ def gap_bounds(motion: GapMotion, count: int, j: int) -> tuple[float, float, flo
 
 
 @kernel(inline=True)
-def push_state(
-    motion: GapMotion, contact: Contact, count: int, j: int, gap: float
+def switching_state(
+    motion: GapMotion, count: int, j: int, gap: float, alpha: float, beta: float
 ) -> tuple[float, float, float, float, float]:
-    """The unclipped force k (y - gap) + c y': value, rate, curvature, bounds on what comes."""
-    k, c = contact.stiffness[j], contact.damping[j]
-    force = k * (motion.offset[j] - gap)
+    """alpha (y - gap) + beta y': value, rate, curvature, bounds on second and third derivative."""
+    value = alpha * (motion.offset[j] - gap)
     slope = 0.0
     curvature = 0.0
     second = 0.0
     third = 0.0
     for i in range(count):
-        term = motion.amplitude[j, i] * motion.factor[i] * (k + c * motion.rate[i])
-        force += term.real
+        term = motion.amplitude[j, i] * motion.factor[i] * (alpha + beta * motion.rate[i])
+        value += term.real
         term *= motion.rate[i]
         slope += term.real
         term *= motion.rate[i]
@@ -154,7 +142,7 @@ def push_state(
         size = modulus(term)
         second += size
         third += size * motion.size[i]
-    return force, slope, curvature, second, third
+    return value, slope, curvature, second, third
 
 
 @kernel(inline=True)
@@ -183,13 +171,13 @@ def safe_step(h: float, slope: float, curvature: float, second: float, third: fl
 @kernel(inline=True)
 def next_change(
     motion: GapMotion,
-    contact: Contact,
-    state: NDArray[np.int64],
+    stops: Stops,
+    regime: Int,
     count: int,
     horizon: float,
     fired: int,
 ) -> tuple[float, int, int]:
-    """Time of the next change of contact, the spring, and its new state.
+    """Time of the next change of contact, the spring, and its new regime.
 
     ``fired`` names the spring whose change began this segment (-1: none): its switching function
     stands at zero there and its sign is known, so rounding must not fire it again. Returns
@@ -201,8 +189,8 @@ def next_change(
     for _ in range(MAX_SEARCH):
         exponentials(motion, count, t)
         step = math.inf
-        for j in range(state.shape[0]):
-            low, new = spring_change(motion, contact, state[j], count, j)
+        for j in range(regime.shape[0]):
+            low, new = spring_change(motion, stops, regime[j], count, j)
             if new != NOTHING and not (t == 0.0 and j == fired):
                 # The last step may have been the smallest one: Newton takes back what it overshot.
                 return max(t + max(min(low, least), -least), 0.0), j, new
@@ -215,33 +203,35 @@ def next_change(
 
 @kernel(inline=True)
 def spring_change(
-    motion: GapMotion, contact: Contact, state: int, count: int, j: int
+    motion: GapMotion, stops: Stops, regime: int, count: int, j: int
 ) -> tuple[float, int]:
-    """Time before which spring j cannot change, or Newton's last step and its new state."""
+    """Time before which spring j cannot change, or Newton's last step and its new regime."""
     y, v = gap_state(motion, count, j)
     a, second, third = gap_bounds(motion, count, j)
     scale = abs(y) + abs(motion.offset[j])
-    if state == OPEN:
-        up = contact.gap_plus[j] - y
-        down = y + contact.gap_minus[j]
+    if regime == OPEN:
+        up = stops.gap[j, 0] - y
+        down = y + stops.gap[j, 1]
         return _sooner(
-            _approach(up, -v, -a, second, third, scale, PLUS),
-            _approach(down, v, a, second, third, scale, MINUS),
+            _approach(up, -v, -a, second, third, scale, ENTERED),
+            _approach(down, v, a, second, third, scale, -ENTERED),
         )
-    side = 1.0 if state > 0 else -1.0
-    gap = contact.gap_plus[j] if state > 0 else -contact.gap_minus[j]
-    leave = _approach(side * (y - gap), side * v, side * a, second, third, scale, OPEN)
-    if contact.clipped[j] == 0:
-        return leave
-    force, slope, bend, low2, low3 = push_state(motion, contact, count, j, gap)
-    push_scale = contact.stiffness[j] * scale + contact.damping[j] * abs(v)
-    if abs(state) == 1:
-        # A clipped spring leaves by losing its force, which always comes before the gap.
-        return _approach(side * force, side * slope, side * bend, low2, low3, push_scale, 2 * state)
-    again = _approach(
-        -side * force, -side * slope, -side * bend, low2, low3, push_scale, state // 2
-    )
-    return _sooner(leave, again)
+    side = 1 if regime > OPEN else -1
+    gap = signed_gap(stops, j, regime)
+    found = (math.inf, NOTHING)
+    for e in range(MOST_EXITS):
+        alpha, beta, target = exit_of(stops, j, regime, e)
+        if target == NO_EXIT:
+            continue
+        new = side * target
+        if target == OPEN:
+            one = _approach(side * (y - gap), side * v, side * a, second, third, scale, new)
+        else:
+            h, slope, bend, low2, low3 = switching_state(motion, count, j, gap, alpha, beta)
+            size = abs(alpha) * scale + abs(beta) * abs(v)
+            one = _approach(side * h, side * slope, side * bend, low2, low3, size, new)
+        found = _sooner(found, one)
+    return found
 
 
 @kernel(inline=True)
@@ -321,3 +311,21 @@ def _stationary_value(
             break
         t = new
     return y
+
+
+def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:
+    """Scratch for a sum of exponentials at some gaps or coordinates."""
+    shape = (gaps, rates.size)
+    return GapMotion(
+        offset=np.zeros(gaps),
+        amplitude=np.zeros(shape, np.complex128),
+        rate=rates.copy(),
+        factor=np.zeros(rates.size, np.complex128),
+        decay=np.zeros(rates.size),
+        curve=np.zeros(shape, np.complex128),
+        bound=np.zeros(shape),
+        size=np.zeros(rates.size),
+        turn=np.zeros(rates.size, np.complex128),
+        ratio=np.zeros(rates.size, np.complex128),
+        spacing=np.array([spacing], np.int64),
+    )

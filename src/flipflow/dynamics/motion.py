@@ -1,20 +1,25 @@
-"""A periodic motion as a function of time: in closed form, piece by piece, or as a series."""
+"""A periodic motion as a function of time: sums of exponentials and harmonics, piece by piece."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_search import (
+    GapMotion,
+    exponential,
+    extremes,
+    new_gap_motion,
+    prepare_search,
+)
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.plan import Plan
+from flipflow.model.contact_law import engaged_side
 from flipflow.model.system import MechanicalSystem
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -31,46 +36,113 @@ class ContactInterval:
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
-    """The contact record of one turn: E pieces in which no contact changes."""
+class Motion:
+    r"""A motion of period ``period`` under forcing at ``omega``, in closed form.
 
-    slot: NDArray[np.int64]  # (E,) configuration
-    start: Real  # (E,) s
-    length: Real  # (E,) s
-    modes: Complex  # (E, R) modal amplitudes at the start; empty for a series
-    states: NDArray[np.int64]  # (E, m) contact state of each spring
+    In piece e, from ``start[e]`` on,
 
-    @classmethod
-    def recorded(cls, flow: Flow, modes: Complex) -> Self:
-        """Copy of what the kernels left in their record."""
-        e = int(flow.segments[0])
-        return cls(
-            flow.slot[:e].copy(),
-            flow.start[:e].copy(),
-            flow.length[:e].copy(),
-            modes[:e].copy(),
-            flow.states[:e].copy(),
-        )
+    .. math:: x(t) = o_e + \mathrm{Re} \sum_h X_{eh} e^{i n_h \omega t}
+              + \mathrm{Re} \sum_i a_{ei} e^{\lambda_{ei} (t - t_e)}.
 
+    A truncated Fourier series has no exponentials, and the same harmonics in every piece.
 
-@dataclass(frozen=True, eq=False)
-class Motion(ABC):
-    """A motion of period ``period`` under forcing at ``omega``; arrays over time are (..., N)."""
+    Parameters
+    ----------
+    system
+        The machine, N degrees of freedom, m springs that open and close.
+    omega, period
+        In rad/s and s.
+    start, length
+        Of the pieces in s, (E,).
+    regime
+        Regime of each spring during a piece, (E, m): 0 open, else piece and side of its law.
+    offset, amplitude, rate
+        o, a and lambda, (E, N), (E, N, R), (E, R).
+    harmonic, order
+        X and n, (E, N, H), (H,).
+    """
 
     system: MechanicalSystem
     omega: float
     period: float
-    pieces: Pieces
+    start: Real
+    length: Real
+    regime: Int
+    offset: Real
+    amplitude: Complex
+    rate: Complex
+    harmonic: Complex
+    order: Real
 
-    @abstractmethod
+    @classmethod
+    def of_flow(cls, system: MechanicalSystem, flow: Flow, omega: float, period: float) -> Self:
+        """The motion that the exact flow has recorded."""
+        e, n = int(flow.segments[0]), system.size
+        slot, modes = flow.slot[:e], flow.modes
+        shape = modes.weight[slot][:, None, :] * modes.right[slot, :n]
+        return cls(
+            system=system,
+            omega=omega,
+            period=period,
+            start=flow.start[:e].copy(),
+            length=flow.length[:e].copy(),
+            regime=flow.regimes[:e].copy(),
+            offset=flow.rest[:e].copy(),
+            amplitude=shape * flow.q[:e, None, :],
+            rate=modes.rate[slot],
+            harmonic=flow.drive[slot, :n][:, :, None],
+            order=np.ones(1),
+        )
+
+    @classmethod
+    def of_series(
+        cls,
+        system: MechanicalSystem,
+        flow: Flow,
+        omega: float,
+        order: Int,
+        series: Complex,
+    ) -> Self:
+        """A Fourier series (n_h, N) with the contacts that were recorded along it."""
+        e, n = int(flow.segments[0]), system.size
+        return cls(
+            system=system,
+            omega=omega,
+            period=2.0 * np.pi / omega,
+            start=flow.start[:e].copy(),
+            length=flow.length[:e].copy(),
+            regime=flow.regimes[:e].copy(),
+            offset=np.zeros((e, n)),
+            amplitude=np.zeros((e, n, 0), np.complex128),
+            rate=np.zeros((e, 0), np.complex128),
+            harmonic=np.repeat(series.T[None], e, axis=0),
+            order=order.astype(float),
+        )
+
     def derivative(self, t: ArrayLike, order: int) -> Real:
         """x, x' or x'' (order 0, 1, 2) at times t, shape (..., N)."""
+        times = np.mod(np.asarray(t, float), self.period)
+        flat = self.piece_derivative(times.ravel(), self.piece(times).ravel(), order)
+        return flat.reshape(*times.shape, self.system.size)
 
     def piece(self, t: ArrayLike) -> NDArray[np.intp]:
         """Index of the piece in which each time lies."""
         inside = np.mod(np.asarray(t, float), self.period)
-        after = np.searchsorted(self.pieces.start, inside, side="right")
+        after = np.searchsorted(self.start, inside, side="right")
         return np.asarray(np.maximum(after - 1, 0))
+
+    def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
+        """x, x' or x'' at times t taken from the given pieces, (K, N)."""
+        turning = 1j * self.omega * self.order
+        wave = np.exp(turning * t[:, None]) * turning**order
+        x = np.einsum("knh,kh->kn", self.harmonic[piece], wave).real
+        if order == 0:
+            x = x + self.offset[piece]
+        if self.rate.shape[1]:
+            rate = self.rate[piece]
+            term = np.exp(rate * (t - self.start[piece])[:, None]) * rate**order
+            x = x + np.einsum("knr,kr->kn", self.amplitude[piece], term).real
+        return np.asarray(x, dtype=float)
 
     def samples(self, least: int = 256) -> tuple[Real, NDArray[np.intp]]:
         """Times and pieces of a grid that holds both ends of every piece, (K,) each.
@@ -78,75 +150,42 @@ class Motion(ABC):
         Where a contact changes, the same time stands twice, once for each piece.
         """
         times, owner = [], []
-        for e, (start, length) in enumerate(
-            zip(self.pieces.start, self.pieces.length, strict=True)
-        ):
+        for e, (start, length) in enumerate(zip(self.start, self.length, strict=True)):
             count = 5 + int(np.ceil(least * length / self.period))
             times.append(start + length * np.linspace(0.0, 1.0, count))
             owner.append(np.full(count, e))
         return np.concatenate(times), np.concatenate(owner)
 
-    @abstractmethod
-    def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
-        """x, x' or x'' at times t taken from the given pieces, (K, N)."""
+    def extremes(self, coordinates: Real) -> tuple[Real, Real, Complex]:
+        """Least and greatest value and first harmonic, (G,) each, of coordinates (G, N)."""
+        seen = np.ascontiguousarray(coordinates, dtype=float)
+        rates = self.rate.shape[1] + self.order.size
+        scratch = new_gap_motion(seen.shape[0], np.zeros(rates, np.complex128))
+        low, high = np.full(seen.shape[0], np.inf), np.full(seen.shape[0], -np.inf)
+        first = np.zeros(seen.shape[0], np.complex128)
+        amplitude, harmonic = (
+            np.ascontiguousarray(np.einsum("gn,enr->ger", seen, part))
+            for part in (self.amplitude, self.harmonic)
+        )
+        observe_motion(
+            self.start, self.length, seen @ self.offset.T, amplitude, self.rate, harmonic,
+            self.order, self.omega, scratch, low, high, first,
+        )  # fmt: skip
+        return low, high, first * (2.0 / self.period)
 
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""
         found: list[ContactInterval] = []
         # Where a piece ends the next one starts, to the last digit: touches are joined by it.
-        last = self.pieces.start[-1:] + self.pieces.length[-1:]
-        ends = np.concatenate([self.pieces.start[1:], last])
-        for j in range(self.pieces.states.shape[1]):
-            engaged = np.where(np.abs(self.pieces.states[:, j]) == 1, self.pieces.states[:, j], 0)
-            found += _joined(j, engaged, self.pieces.start, ends, self.period)
+        ends = np.concatenate([self.start[1:], self.start[-1:] + self.length[-1:]])
+        for j, spring in enumerate(self.system.springs):
+            side = engaged_side(spring.law, self.regime[:, j])
+            found += _joined(j, side, self.start, ends, self.period)
         return tuple(sorted(found, key=lambda interval: interval.start))
 
 
-@dataclass(frozen=True, eq=False)
-class PiecewiseMotion(Motion):
-    """Closed form within each piece of the exact flow."""
-
-    plan: Plan
-    drive: Complex  # (S, 2 N)
-
-    def derivative(self, t: ArrayLike, order: int) -> Real:
-        times = np.mod(np.asarray(t, float), self.period)
-        flat = self.piece_derivative(times.ravel(), self.piece(times).ravel(), order)
-        return flat.reshape(*times.shape, self.system.size)
-
-    def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
-        n = self.system.size
-        slot = self.pieces.slot[piece]
-        turn = np.exp(1j * self.omega * t) * (1j * self.omega) ** order
-        x = (self.drive[slot, :n] * turn[:, None]).real
-        if order == 0:
-            x = x + self.plan.rest[slot, :n]
-        rate = self.plan.rate[slot]
-        elapsed = (t - self.pieces.start[piece])[:, None]
-        term = self.plan.weight[slot] * self.pieces.modes[piece] * np.exp(rate * elapsed)
-        x += np.einsum("knr,kr->kn", self.plan.right[slot, :n], term * rate**order).real
-        return np.asarray(x, dtype=float)
-
-
-@dataclass(frozen=True, eq=False)
-class SeriesMotion(Motion):
-    """A truncated Fourier series: Re sum_h X_h exp(i h omega t)."""
-
-    harmonics: NDArray[np.int64]
-    series: Complex  # (n_h, N)
-
-    def derivative(self, t: ArrayLike, order: int) -> Real:
-        times = np.asarray(t, float)
-        rate = 1j * self.omega * self.harmonics
-        turn = np.exp(rate * times[..., None]) * rate**order
-        return np.asarray((turn @ self.series).real, dtype=float)
-
-    def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:  # noqa: ARG002
-        return self.derivative(t, order)
-
-
 def _joined(
-    spring: int, engaged: NDArray[np.int64], start: Real, end: Real, period: float
+    spring: int, engaged: Int, start: Real, end: Real, period: float
 ) -> list[ContactInterval]:
     """Neighbouring engaged pieces as one touch, also across the end of the turn."""
     touches: list[ContactInterval] = []
@@ -164,3 +203,65 @@ def _joined(
             touches[-1] = ContactInterval(spring, last.side, last.start, period + first.end)
             touches.pop(0)
     return touches
+
+
+@kernel(entry=True)
+def observe_motion(
+    start: Real,
+    length: Real,
+    offset: Real,
+    amplitude: Complex,
+    rate: Complex,
+    harmonic: Complex,
+    order: Real,
+    omega: float,
+    motion: GapMotion,
+    low: Real,
+    high: Real,
+    first: Complex,
+) -> None:
+    """Extremes of G coordinates over all pieces, and int y exp(-i omega t) dt.
+
+    Offsets are (G, E), amplitudes (G, E, R) and harmonics (G, E, H) seen in the coordinates.
+    """
+    modes, count = rate.shape[1], rate.shape[1] + order.shape[0]
+    for e in range(start.shape[0]):
+        for i in range(modes):
+            motion.rate[i] = rate[e, i]
+        for h in range(order.shape[0]):
+            motion.rate[modes + h] = 1j * (order[h] * omega)
+        for g in range(low.shape[0]):
+            motion.offset[g] = offset[g, e]
+            for i in range(modes):
+                motion.amplitude[g, i] = amplitude[g, e, i]
+            for h in range(order.shape[0]):
+                turn = exponential(1j * (order[h] * omega * start[e]))
+                motion.amplitude[g, modes + h] = harmonic[g, e, h] * turn
+        prepare_search(motion, count)
+        for g in range(low.shape[0]):
+            least, most = extremes(motion, count, g, length[e])
+            low[g], high[g] = min(low[g], least), max(high[g], most)
+            first[g] += first_harmonic(motion, count, g, start[e], length[e], omega)
+
+
+@kernel(inline=True)
+def first_harmonic(
+    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
+) -> complex:
+    """int y exp(-i omega t) dt over one piece, in closed form."""
+    turn = exponential(-1j * omega * start)
+    total = motion.offset[g] * _integral_of_exponential(-1j * omega, length)
+    for i in range(count):
+        amplitude = motion.amplitude[g, i]
+        total += 0.5 * amplitude * _integral_of_exponential(motion.rate[i] - 1j * omega, length)
+        conjugate = motion.rate[i].conjugate() - 1j * omega
+        total += 0.5 * amplitude.conjugate() * _integral_of_exponential(conjugate, length)
+    return total * turn
+
+
+@kernel
+def _integral_of_exponential(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt."""
+    if abs(rate) * length < 1e-9:
+        return length * (1.0 + 0.5 * rate * length)
+    return (exponential(rate * length) - 1.0) / rate

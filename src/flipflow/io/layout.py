@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from flipflow.errors import InputError
+from flipflow.model.contact_law import ContactLaw
 from flipflow.model.drive import DRIVE_FIELDS
-from flipflow.model.elements import ContactLaw
 from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
-
-ContactLaw = Literal["paper", "compression-only"]
+from flipflow.model import contact_law
+from flipflow.model.contact_law import ContactLaw
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +103,8 @@ class ClearanceSpring:
     def force(self, gap: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
         """H in N at gap coordinate y in m and its rate in m/s; zero exactly at the gap."""
         y, v = np.asarray(gap, float), np.asarray(rate, float)
-        plus, minus = self.gaps
-        penetration = np.where(y > plus, y - plus, np.where(y < -minus, y + minus, 0.0))
-        pushed = self.stiffness * penetration + self.damping * v
-        if self.law == "compression-only":
-            pushed = np.where(pushed * penetration > 0.0, pushed, 0.0)
-        return np.where(penetration == 0.0, 0.0, pushed)
+        of = self.law, self.stiffness, self.damping, self.gaps
+        return contact_law.force_in(*of, contact_law.regime_at(*of, y, v), y, v)
 
 
 @dataclass(frozen=True, eq=False)

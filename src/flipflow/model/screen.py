@@ -11,7 +11,8 @@ from typing import Self, get_args
 import numpy as np
 
 from flipflow.errors import InputError
-from flipflow.model.elements import ClearanceSpring, ContactLaw, Unbalance
+from flipflow.model.contact_law import ContactLaw
+from flipflow.model.elements import ClearanceSpring, Unbalance
 from flipflow.model.fields import FIELDS
 from flipflow.model.system import MechanicalSystem
 

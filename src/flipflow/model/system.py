@@ -97,6 +97,11 @@ class MechanicalSystem:
         object.__setattr__(self, "excitation", excitation)
         object.__setattr__(self, "coordinates", MappingProxyType(named))
 
+    def __reduce__(self) -> tuple[type[MechanicalSystem], tuple[object, ...]]:
+        """Copies are made anew: a read-only mapping cannot be sent to another process."""
+        parts = self.M, self.C, self.K, self.springs, self.excitation, dict(self.coordinates)
+        return type(self), parts
+
     @property
     def size(self) -> int:
         """N, the number of degrees of freedom."""

@@ -21,12 +21,14 @@ from __future__ import annotations
 import math
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import reciprocal
 from flipflow.dynamics.flow import prepare_drive
-from flipflow.dynamics.plan import Real
+from flipflow.dynamics.modes import prepare
 from flipflow.periodic.series import (
     Balance,
+    BalanceWork,
     amplitude_of,
     contact_integrals,
     place,
@@ -37,92 +39,97 @@ from flipflow.periodic.series import (
 
 
 @kernel(inline=True)
-def prepare_receptance(problem: Balance, omega: float) -> None:
+def prepare_receptance(problem: Balance, work: BalanceWork, omega: float) -> int:
     """G_h = D (K - h^2 omega^2 M + i h omega C)^-1 D^T by modes, and its derivative in omega."""
-    plan = problem.plan
-    m = problem.linear.shape[0]
-    n = plan.direction.shape[1]
-    prepare_drive(plan, problem.flow, 0, omega)
+    machine, modes = problem.machine, work.flow.modes
+    m, n = machine.direction.shape
+    if modes.ready[0] == 0:
+        prepare(machine, modes, 0)
+    if modes.ready[0] < 0:
+        return status.SINGULAR
+    prepare_drive(machine, work.flow, 0, omega)
     for j in range(m):
-        problem.linear[j] = 0.0
-        problem.linear_slope[j] = 0.0
+        work.linear[j] = 0.0
+        work.linear_slope[j] = 0.0
         for k in range(n):
-            problem.linear[j] += plan.direction[j, k] * problem.flow.drive[0, k]
-            problem.linear_slope[j] += plan.direction[j, k] * problem.flow.drive_slope[0, k]
+            work.linear[j] += machine.direction[j, k] * work.flow.drive[0, k]
+            work.linear_slope[j] += machine.direction[j, k] * work.flow.drive_slope[0, k]
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for j in range(m):
             for c in range(m):
                 total = 0j
                 slope = 0j
-                for i in range(plan.mode_count[0]):
-                    share = plan.gap_shape[0, j, i] * plan.gap_pick[i, c]
-                    gap = reciprocal(1j * (h * omega) - plan.rate[0, i])
+                for i in range(modes.mode_count[0]):
+                    share = modes.gap_shape[0, j, i] * modes.gap_pick[0, i, c]
+                    gap = reciprocal(1j * (h * omega) - modes.rate[0, i])
                     total += share * gap
                     slope -= 1j * h * share * gap * gap
-                    if plan.weight[0, i] == 2.0:
-                        gap = reciprocal(1j * (h * omega) - plan.rate[0, i].conjugate())
+                    if modes.weight[0, i] == 2.0:
+                        gap = reciprocal(1j * (h * omega) - modes.rate[0, i].conjugate())
                         total += share.conjugate() * gap
                         slope -= 1j * h * share.conjugate() * gap * gap
-                problem.receptance[a, j, c] = total
-                problem.receptance_slope[a, j, c] = slope
+                work.receptance[a, j, c] = total
+                work.receptance_slope[a, j, c] = slope
+    return status.OK
 
 
 @kernel(inline=True)
-def contact_forces(problem: Balance, omega: float) -> None:
+def contact_forces(problem: Balance, work: BalanceWork, omega: float) -> None:
     """Lambda_h and its derivative in omega at fixed A, from the integrals."""
-    plan = problem.plan
-    for j in range(problem.linear.shape[0]):
+    stops = problem.machine.stops
+    for j in range(work.linear.shape[0]):
         for a in range(problem.harmonics.shape[0]):
             h = problem.harmonics[a]
-            depth = -problem.integral_gap[j, h].conjugate()
+            depth = -work.integral_gap[j, h].conjugate()
             for b in range(problem.harmonics.shape[0]):
                 k = problem.harmonics[b]
-                A = amplitude_of(problem, b, j)
+                A = amplitude_of(problem, work, b, j)
                 if k == 0:
-                    depth += A * whole_integral(problem, j, -h)
+                    depth += A * whole_integral(work, j, -h)
                 else:
-                    depth += 0.5 * A * whole_integral(problem, j, k - h)
-                    depth += 0.5 * A.conjugate() * whole_integral(problem, j, -k - h)
+                    depth += 0.5 * A * whole_integral(work, j, k - h)
+                    depth += 0.5 * A.conjugate() * whole_integral(work, j, -k - h)
             share = 1.0 / math.pi if h > 0 else 0.5 / math.pi
-            k_spring, c = plan.stiffness[j], plan.damping[j]
-            edge = problem.edge_depth[j, h]
-            problem.force[a, j] = share * (
-                (k_spring + 1j * c * omega * h) * depth + c * omega * edge
-            )
-            problem.force_slope[a, j] = share * c * (1j * h * depth + edge)
+            k_spring, c = stops.stiffness[j], stops.damping[j]
+            edge = work.edge_depth[j, h]
+            work.force[a, j] = share * ((k_spring + 1j * c * omega * h) * depth + c * omega * edge)
+            work.force_slope[a, j] = share * c * (1j * h * depth + edge)
 
 
 @kernel(inline=True)
-def balance_residual(problem: Balance, u: Real, omega: float, r: Real, J: Real) -> int:
+def balance_residual(
+    problem: Balance, work: BalanceWork, u: Real, omega: float, r: Real, J: Real
+) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
-    set_series(problem, u)
-    prepare_receptance(problem, omega)
-    code = record_contacts(problem, omega)
+    set_series(problem, work, u)
+    code = prepare_receptance(problem, work, omega)
+    if code == status.OK:
+        code = record_contacts(problem, work, omega)
     if code != status.OK:
         return code
-    contact_integrals(problem, omega)
-    contact_forces(problem, omega)
-    _jacobian(problem, omega, J)
-    return write_residual(problem, r, J)
+    contact_integrals(problem, work, omega)
+    contact_forces(problem, work, omega)
+    _jacobian(problem, work, omega, J)
+    return write_residual(problem, work, r, J)
 
 
 @kernel(inline=True)
-def write_residual(problem: Balance, r: Real, J: Real) -> int:
+def write_residual(problem: Balance, work: BalanceWork, r: Real, J: Real) -> int:
     """r and dr/d omega, the last column of J, from the forces of the series last set."""
-    m, size = problem.linear.shape[0], r.shape[0]
+    m, size = work.linear.shape[0], r.shape[0]
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for j in range(m):
-            value = amplitude_of(problem, a, j)
+            value = amplitude_of(problem, work, a, j)
             slope = 0j
             if h == 1:
-                value -= problem.linear[j]
-                slope -= problem.linear_slope[j]
+                value -= work.linear[j]
+                slope -= work.linear_slope[j]
             for c in range(m):
-                value += problem.receptance[a, j, c] * problem.force[a, c]
-                slope += problem.receptance_slope[a, j, c] * problem.force[a, c]
-                slope += problem.receptance[a, j, c] * problem.force_slope[a, c]
+                value += work.receptance[a, j, c] * work.force[a, c]
+                slope += work.receptance_slope[a, j, c] * work.force[a, c]
+                slope += work.receptance[a, j, c] * work.force_slope[a, c]
             k = place(problem, a, j)
             r[k] = value.real
             J[k, size] = slope.real
@@ -136,30 +143,29 @@ def write_residual(problem: Balance, r: Real, J: Real) -> int:
 
 
 @kernel(inline=True)
-def _jacobian(problem: Balance, omega: float, J: Real) -> None:
+def _jacobian(problem: Balance, work: BalanceWork, omega: float, J: Real) -> None:
     """dr = c1 dA + c2 conj(dA): Toeplitz (l - h) and Hankel (-l - h) parts of the integrals."""
-    plan = problem.plan
-    m = problem.linear.shape[0]
-    middle = problem.integral.shape[1] - 1
+    stops = problem.machine.stops
+    m = work.linear.shape[0]
+    middle = work.integral.shape[1] - 1
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         share = 0.5 / math.pi if h > 0 else 0.25 / math.pi
         for b in range(problem.harmonics.shape[0]):
             k = problem.harmonics[b]
             for c in range(m):
-                dynamic = plan.stiffness[c] + 1j * plan.damping[c] * omega * h
+                dynamic = stops.stiffness[c] + 1j * stops.damping[c] * omega * h
                 # What the moving limit of a clipped spring adds; zero for limits at the gap.
-                moving = plan.damping[c] * omega
+                moving = stops.damping[c] * omega
                 direct = share * (
-                    dynamic * whole_integral(problem, c, k - h)
-                    + moving * problem.edge[c, k - h + middle]
+                    dynamic * whole_integral(work, c, k - h) + moving * work.edge[c, k - h + middle]
                 )
                 mirror = share * (
-                    dynamic * whole_integral(problem, c, -k - h)
-                    + moving * problem.edge[c, -k - h + middle]
+                    dynamic * whole_integral(work, c, -k - h)
+                    + moving * work.edge[c, -k - h + middle]
                 )
                 for j in range(m):
-                    G = problem.receptance[a, j, c]
+                    G = work.receptance[a, j, c]
                     unit = 1.0 if a == b and j == c else 0.0
                     write_block(problem, a, j, b, c, G * direct, G * mirror, unit, J)
 
@@ -185,9 +191,10 @@ def write_block(
 @kernel(inline=True)
 def series_scale(problem: Balance, u: Real, omega: float, scale: Real) -> None:  # noqa: ARG001
     """Size of each unknown: the largest amplitude of all."""
-    size = problem.linear.shape[0] * (2 * problem.harmonics.shape[0])
+    m = problem.machine.direction.shape[0]
+    size = m * (2 * problem.harmonics.shape[0])
     if problem.harmonics[0] == 0:
-        size -= problem.linear.shape[0]
+        size -= m
     largest = problem.length
     for k in range(size):
         largest = max(largest, abs(u[k]))

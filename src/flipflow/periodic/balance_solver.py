@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.motion import Motion, Pieces, SeriesMotion
+from flipflow.dynamics.motion import Motion
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import describe_balance, describe_sampled, observe_series
-from flipflow.periodic.sampled import Sampled
-from flipflow.periodic.scratch import new_balance, new_gap_motion, new_sampled
-from flipflow.periodic.series import Balance
-from flipflow.periodic.solver import Complex, Real, Solver
+from flipflow.periodic.sampled import Sampled, SampledWork, new_sampled, new_sampled_work
+from flipflow.periodic.series import Balance, BalanceWork, new_balance, new_balance_work
+from flipflow.periodic.solver import Solver
 
 
 class BalanceSolver(Solver):
@@ -25,30 +25,29 @@ class BalanceSolver(Solver):
     reads_jacobian = False
     confirmed = True
 
-    def __init__(self, system: MechanicalSystem, harmonics: int, *, half_turn: bool) -> None:
+    def __init__(
+        self, system: MechanicalSystem, harmonics: int, *, half_turn: bool, turns: int = 1
+    ) -> None:
+        super().__init__(system, half_turn=half_turn, turns=turns)
         self.order = harmonics
-        super().__init__(system, half_turn=half_turn)
-
-    def _prepare(self) -> None:
-        self.balance = new_balance(
-            self.builder.plan, self.order, half_turn=self.half_turn, length=self.length
-        )
-        self.problem = self._formulated()
+        self.balance = new_balance(self.machine, harmonics, half_turn=half_turn, length=self.length)
+        self.balance_work = new_balance_work(self.balance)
+        self.problem: Balance | Sampled = self.balance
+        self.scratch: BalanceWork | SampledWork = self.balance_work
         self.harmonics = self.balance.harmonics
         kept = int(2 * np.count_nonzero(self.harmonics) + np.count_nonzero(self.harmonics == 0))
-        self.unknowns = kept * len(self.builder.springs)
-        self._new_work()
+        self.unknowns = kept * len(self.springs)
         empty = np.zeros(0)
         self._last = empty, empty, empty.astype(np.complex128)
         self._last_maps = empty, empty, (empty, empty)
 
-    def _formulated(self) -> Balance | Sampled:
-        """The equations that are solved, over the present balance."""
-        return self.balance
+    @property
+    def options(self) -> tuple[float, ...]:
+        return (self.order,)
 
     @property
     def flow(self) -> Flow:
-        return self.balance.flow
+        return self.balance_work.flow
 
     def _describe(self, u: Real, omega: Real) -> Complex:
         """Displacement harmonics (P, n_h, N).
@@ -66,12 +65,9 @@ class BalanceSolver(Solver):
         """Displacement harmonics (P, n_h, N); the last point's contacts stay recorded."""
         series = np.empty((omega.size, self.harmonics.size, self.system.size), np.complex128)
         code = np.zeros(omega.size, np.int64)
-        while True:
-            walk = 2.0 * np.pi if whole_turn else self.balance.walk
-            describe_balance(self.balance._replace(walk=walk), u, omega, series, code)
-            if not np.any(code == status.MISSING_CONFIGURATION):
-                break
-            self.add_missing_configuration()
+        walk = 2.0 * np.pi if whole_turn else self.balance.walk
+        problem = self.balance._replace(walk=walk)
+        describe_balance(problem, self.balance_work, u, omega, series, code)
         series[code != status.OK] = np.nan
         return series
 
@@ -97,7 +93,7 @@ class BalanceSolver(Solver):
             self._last_maps = u.copy(), omega.copy(), maps
         return maps
 
-    def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
+    def series(self, u: Real, omega: Real) -> tuple[Int, Complex]:
         return self.harmonics, self._describe(u, omega)
 
     def states(self, u: Real, omega: Real) -> Real:
@@ -108,8 +104,8 @@ class BalanceSolver(Solver):
         return self._extremes(np.einsum("gn,phn->pgh", coordinates, series))
 
     def gap_extremes(self, u: Real, omega: Real) -> tuple[Real, Real]:  # noqa: ARG002
-        means = int(self.harmonics[0] == 0) * len(self.builder.springs)
-        pairs = u[:, means:].reshape(u.shape[0], -1, len(self.builder.springs), 2)
+        means = int(self.harmonics[0] == 0) * len(self.springs)
+        pairs = u[:, means:].reshape(u.shape[0], -1, len(self.springs), 2)
         moving = (pairs[..., 0] + 1j * pairs[..., 1]).transpose(0, 2, 1)
         seen = np.concatenate([u[:, :means, None], moving], axis=2) if means else moving
         low, high, _ = self._extremes(seen)
@@ -119,7 +115,7 @@ class BalanceSolver(Solver):
         """Least and greatest value and first harmonic (P, G) of series (P, G, n_h)."""
         moving = self.harmonics > 0
         rate = 1j * self.harmonics[moving].astype(np.complex128)
-        scratch = new_gap_motion(1, rate, spacing=int(self.balance.motion.spacing[0]))
+        scratch = new_gap_motion(1, rate, spacing=int(self.balance_work.motion.spacing[0]))
         offset = np.ascontiguousarray(seen[:, :, ~moving].real.sum(axis=2))
         low, high = np.empty(offset.shape), np.empty(offset.shape)
         observe_series(scratch, offset, np.ascontiguousarray(seen[:, :, moving]), low, high)
@@ -127,16 +123,12 @@ class BalanceSolver(Solver):
 
     def motion(self, u: Real, omega: float) -> Motion:
         series = self._read_off(u[None], np.array([omega]), whole_turn=True)
-        flow = self.flow
-        pieces = Pieces.recorded(flow, np.zeros((flow.start.size, 0), np.complex128))
-        return SeriesMotion(
-            self.system, omega, 2.0 * np.pi / omega, pieces, self.harmonics, series[0]
-        )
+        return Motion.of_series(self.system, self.flow, omega, self.harmonics, series[0])
 
     def unknowns_from(self, motion: Motion) -> Real:
         count = 16 * (self.order + 1)
         t = motion.period * np.arange(count) / count
-        directions = np.array([spring.direction for spring in self.builder.springs])
+        directions = np.array([spring.direction for spring in self.springs])
         spectrum = np.fft.rfft(motion.derivative(t, 0) @ directions.T, axis=0) / count
         parts = []
         for h in self.harmonics:
@@ -165,20 +157,24 @@ class SampledSolver(BalanceSolver):
         sharpness: float,
         *,
         half_turn: bool,
+        turns: int = 1,
     ) -> None:
+        super().__init__(system, harmonics, half_turn=half_turn, turns=turns)
         self.samples, self.sharpness = samples, sharpness
-        super().__init__(system, harmonics, half_turn=half_turn)
+        self.problem = self.sampled = new_sampled(self.balance, samples, sharpness)
+        self.scratch = self.sampled_work = new_sampled_work(self.balance_work)
 
-    def _formulated(self) -> Sampled:
-        return new_sampled(self.balance, self.samples, self.sharpness)
+    @property
+    def options(self) -> tuple[float, ...]:
+        return (self.order, self.samples, self.sharpness)
 
     def _read_off(self, u: Real, omega: Real, *, whole_turn: bool = False) -> Complex:
         series = super()._read_off(u, omega, whole_turn=whole_turn)
-        describe_sampled(self.problem, u, omega, series)
+        describe_sampled(self.sampled, self.sampled_work, u, omega, series)
         return series
 
 
-def _states(series: Complex, harmonics: NDArray[np.int64], omega: Real) -> Real:
+def _states(series: Complex, harmonics: Int, omega: Real) -> Real:
     """State (x, x') of series (P, n_h, N) at t = 0, (P, 2 N)."""
     rate = 1j * omega[:, None] * harmonics
     position, velocity = series.sum(axis=1), np.einsum("ph,phn->pn", rate, series)

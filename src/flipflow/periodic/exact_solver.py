@@ -5,16 +5,17 @@ from __future__ import annotations
 import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.dynamics.motion import Motion, Pieces, PiecewiseMotion
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.dynamics.contact_search import new_gap_motion
+from flipflow.dynamics.flow import Flow
+from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import observe_flow
-from flipflow.periodic.scratch import new_gap_motion
 from flipflow.periodic.shooting import shooting_step
-from flipflow.periodic.solver import Complex, Real, Solver
+from flipflow.periodic.solver import Solver
 from flipflow.periodic.turns import strobe
 
 
@@ -28,31 +29,35 @@ class ExactSolver(Solver):
     reads_jacobian = True
 
     def __init__(self, system: MechanicalSystem, *, half_turn: bool, turns: int = 1) -> None:
-        self.turns = turns
-        super().__init__(system, half_turn=half_turn)
-
-    def _prepare(self) -> None:
+        super().__init__(system, half_turn=half_turn, turns=turns)
         self.unknowns = 2 * self.system.size
-        self._new_work()
-        self.problem = self.shooting(half_turn=self.half_turn)
-        self.turn = self.shooting(half_turn=False)
+        self.scratch = self.shooting_work
+        self.problem = self.shooting(half_turn=half_turn)
+        self.whole = self.shooting(half_turn=False)
+
+    @property
+    def flow(self) -> Flow:
+        return self.shooting_work.flow
 
     def residual(self, z: Real, omega: float) -> tuple[Real, Real] | None:
         """r = sign flow(z) - z and [dr/dz, dr/d omega]; None where the flow does not end."""
         r, J = np.empty(self.unknowns), np.empty((self.unknowns, self.unknowns + 1))
-        while True:
-            code = shooting_step(self.problem, np.array(z), omega, r, J)
-            if code != status.MISSING_CONFIGURATION:
-                return (r, J) if code == status.OK else None
-            self.add_missing_configuration()
+        code = shooting_step(self.problem, self.scratch, np.array(z), omega, r, J)
+        return (r, J) if code == status.OK else None
 
-    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
-        return np.asarray(jacobian + np.eye(self.unknowns))
+    def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:
+        if jacobian.shape[1:] == (self.unknowns, self.unknowns):
+            return np.asarray(jacobian + np.eye(self.unknowns))
+        solved = (self.residual(z, float(w)) for z, w in zip(u, omega, strict=True))
+        unknown = np.full((self.unknowns, self.unknowns), np.nan)
+        return np.array(
+            [unknown if one is None else one[1][:, :-1] + np.eye(self.unknowns) for one in solved]
+        )
 
     def states(self, u: Real, omega: Real) -> Real:  # noqa: ARG002
         return u
 
-    def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
+    def series(self, u: Real, omega: Real) -> tuple[Int, Complex]:
         return np.zeros(0, np.int64), np.zeros((omega.size, 0, u.shape[1] // 2), np.complex128)
 
     def extremes(self, u: Real, omega: Real, coordinates: Real) -> tuple[Real, Real, Complex]:
@@ -73,7 +78,8 @@ class ExactSolver(Solver):
         """A solver of the same machine for motions that repeat after ``turns`` periods."""
         other = copy.copy(self)
         other.turns, other.half_turn = turns, False
-        other._prepare()  # noqa: SLF001  a copy of itself
+        other.problem = other.whole = other.shooting(half_turn=False)
+        other.__dict__.pop("formulation", None)
         return other
 
     def section(self, z: Real, omega: float, turns: int) -> Real:
@@ -85,13 +91,9 @@ class ExactSolver(Solver):
             When the flow over a turn does not end.
         """
         record = np.empty((turns, z.size))
-        while True:
-            code = strobe(self.turn, np.array(z), omega, record)
-            if code == status.OK:
-                return record
-            if code != status.MISSING_CONFIGURATION:
-                raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
-            self.add_configuration(self.turn.flow)
+        if strobe(self.whole, self.scratch, np.array(z), omega, record) != status.OK:
+            raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
+        return record
 
     def motion(self, u: Real, omega: float) -> Motion:
         states = np.array(u)[None]
@@ -99,12 +101,8 @@ class ExactSolver(Solver):
         low, _, _ = self._observe(states, np.array([omega]), every, whole_turn=True)
         if np.isnan(low).any():
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
-        flow = self.turn.flow
-        pieces = Pieces.recorded(flow, flow.modes)
-        period = 2.0 * np.pi / omega * self.turn.fraction
-        return PiecewiseMotion(
-            self.system, omega, period, pieces, self.builder.plan, flow.drive.copy()
-        )
+        period = 2.0 * np.pi / omega * self.whole.fraction
+        return Motion.of_flow(self.system, self.flow, omega, period)
 
     def _observe(
         self,
@@ -125,18 +123,13 @@ class ExactSolver(Solver):
         shape = (omega.size, count)
         low, high, first = np.empty(shape), np.empty(shape), np.empty(shape, np.complex128)
         code = np.zeros(omega.size, np.int64)
-        begin = states.copy()
-        while True:
-            problem = self.turn if whole_turn else self.problem
-            modes = self.builder.plan.rate.shape[1] + 1
-            scratch = new_gap_motion(count, np.zeros(modes, np.complex128))
-            observe_flow(
-                problem, states, omega, waiting, coordinates, scratch, low, high, first, code
-            )
-            if not np.any(code == status.MISSING_CONFIGURATION):
-                break
-            self.add_configuration(problem.flow)
-            states[:] = begin
+        problem = self.whole if whole_turn else self.problem
+        modes = self.flow.modes.rate.shape[1] + 1
+        scratch = new_gap_motion(count, np.zeros(modes, np.complex128))
+        observe_flow(
+            problem, self.scratch, states, omega, waiting, coordinates, scratch, low, high, first,
+            code,
+        )  # fmt: skip
         bad = code != status.OK
         low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan
         return low, high, first

@@ -5,15 +5,22 @@ from __future__ import annotations
 import math
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
 from flipflow.dynamics.flow import run_flow, segment_motion, segment_state
-from flipflow.dynamics.plan import Complex, Int, Real
+from flipflow.dynamics.motion import first_harmonic
 from flipflow.periodic.balance import contact_forces, prepare_receptance
-from flipflow.periodic.sampled import Sampled, sampled_forces
-from flipflow.periodic.series import Balance, contact_integrals, record_contacts, set_series
-from flipflow.periodic.shooting import Shooting, shoot
+from flipflow.periodic.sampled import Sampled, SampledWork, sampled_forces
+from flipflow.periodic.series import (
+    Balance,
+    BalanceWork,
+    contact_integrals,
+    record_contacts,
+    set_series,
+)
+from flipflow.periodic.shooting import Shooting, ShootingWork, shoot
 
 ROUNDING = 1e-9
 
@@ -21,6 +28,7 @@ ROUNDING = 1e-9
 @kernel(entry=True)
 def observe_flow(
     problem: Shooting,
+    work: ShootingWork,
     states: Real,
     omega: Real,
     waiting: int,
@@ -37,19 +45,17 @@ def observe_flow(
     scratch for G coordinates; low, high, first are (P, G), code (P,). The record of the last
     turn stays in the problem's flow.
     """
-    plan, flow = problem.plan, problem.flow
+    flow = work.flow
     for p in range(omega.shape[0]):
         turn = problem.fraction * 2.0 * math.pi / omega[p]
-        code[p] = _turn_after(problem, states[p], omega[p], turn, waiting)
-        if code[p] == status.MISSING_CONFIGURATION:
-            break
+        code[p] = _turn_after(problem, work, states[p], omega[p], turn, waiting)
         if code[p] != status.OK:
             continue
         for g in range(coordinate.shape[0]):
             low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
         for e in range(flow.segments[0]):
-            segment_motion(plan, flow, e, omega[p], coordinate, motion)
-            count = plan.mode_count[flow.slot[e]] + 1
+            segment_motion(flow, e, omega[p], coordinate, motion)
+            count = flow.modes.mode_count[flow.slot[e]] + 1
             prepare_search(motion, count)
             for g in range(coordinate.shape[0]):
                 smallest, largest = extremes(motion, count, g, flow.length[e])
@@ -60,41 +66,20 @@ def observe_flow(
 
 
 @kernel(inline=True)
-def _turn_after(problem: Shooting, z: Real, omega: float, turn: float, waiting: int) -> int:
+def _turn_after(
+    problem: Shooting, work: ShootingWork, z: Real, omega: float, turn: float, waiting: int
+) -> int:
     """Record a turn after ``waiting`` turns from z, which becomes the state at its start."""
-    flow = problem.flow
+    flow = work.flow
     for k in range(flow.z.shape[0]):
         flow.z[k] = z[k]
     for _ in range(waiting):
-        code = run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
+        code = run_flow(problem.machine, flow, omega, 0.0, turn, work.rate)
         if code != status.OK:
             return code
     for k in range(flow.z.shape[0]):
         z[k] = flow.z[k]
-    return run_flow(problem.plan, flow, omega, 0.0, turn, problem.rate)
-
-
-@kernel(inline=True)
-def first_harmonic(
-    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
-) -> complex:
-    """int y exp(-i omega t) dt over one segment, in closed form."""
-    turn = exponential(-1j * omega * start)
-    total = motion.offset[g] * _mean_of_exponential(-1j * omega, length)
-    for i in range(count):
-        amplitude = motion.amplitude[g, i]
-        total += 0.5 * amplitude * _mean_of_exponential(motion.rate[i] - 1j * omega, length)
-        conjugate = motion.rate[i].conjugate() - 1j * omega
-        total += 0.5 * amplitude.conjugate() * _mean_of_exponential(conjugate, length)
-    return total * turn
-
-
-@kernel
-def _mean_of_exponential(rate: complex, length: float) -> complex:
-    """int_0^length exp(rate t) dt."""
-    if abs(rate) * length < 1e-9:
-        return length * (1.0 + 0.5 * rate * length)
-    return (exponential(rate * length) - 1.0) / rate
+    return run_flow(problem.machine, flow, omega, 0.0, turn, work.rate)
 
 
 @kernel(entry=True)
@@ -113,57 +98,61 @@ def observe_series(
 
 
 @kernel(entry=True)
-def describe_balance(problem: Balance, u: Real, omega: Real, series: Complex, code: Int) -> None:
+def describe_balance(
+    problem: Balance, work: BalanceWork, u: Real, omega: Real, series: Complex, code: Int
+) -> None:
     """Displacement harmonics (P, n_h, N) of points; the last one's contacts stay recorded."""
     for p in range(omega.shape[0]):
-        set_series(problem, u[p])
-        prepare_receptance(problem, omega[p])
-        code[p] = record_contacts(problem, omega[p])
-        if code[p] == status.MISSING_CONFIGURATION:
-            break
+        set_series(problem, work, u[p])
+        code[p] = prepare_receptance(problem, work, omega[p])
+        if code[p] == status.OK:
+            code[p] = record_contacts(problem, work, omega[p])
         if code[p] != status.OK:
             continue
-        contact_integrals(problem, omega[p])
-        contact_forces(problem, omega[p])
-        _displacements(problem, omega[p], series[p])
+        contact_integrals(problem, work, omega[p])
+        contact_forces(problem, work, omega[p])
+        _displacements(problem, work, omega[p], series[p])
 
 
 @kernel(entry=True)
-def describe_sampled(problem: Sampled, u: Real, omega: Real, series: Complex) -> None:
+def describe_sampled(
+    problem: Sampled, work: SampledWork, u: Real, omega: Real, series: Complex
+) -> None:
     """Displacement harmonics (P, n_h, N) of points under the sampled force."""
     for p in range(omega.shape[0]):
-        set_series(problem.balance, u[p])
-        prepare_receptance(problem.balance, omega[p])
-        sampled_forces(problem, omega[p])
-        _displacements(problem.balance, omega[p], series[p])
+        set_series(problem.balance, work.balance, u[p])
+        prepare_receptance(problem.balance, work.balance, omega[p])
+        sampled_forces(problem, work, omega[p])
+        _displacements(problem.balance, work.balance, omega[p], series[p])
 
 
 @kernel(inline=True)
-def _displacements(problem: Balance, omega: float, series: Complex) -> None:
+def _displacements(problem: Balance, work: BalanceWork, omega: float, series: Complex) -> None:
     """X_h = delta_h1 X_linear - (K - h^2 omega^2 M + i h omega C)^-1 D^T Lambda_h by modes."""
-    plan = problem.plan
+    modes = work.flow.modes
     n = series.shape[1]
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for k in range(n):
-            series[a, k] = problem.flow.drive[0, k] if h == 1 else 0.0
-        for i in range(plan.mode_count[0]):
+            series[a, k] = work.flow.drive[0, k] if h == 1 else 0.0
+        for i in range(modes.mode_count[0]):
             push = 0j
             push_conj = 0j
-            for j in range(problem.linear.shape[0]):
-                push += plan.gap_pick[i, j] * problem.force[a, j]
-                push_conj += plan.gap_pick[i, j].conjugate() * problem.force[a, j]
-            push /= 1j * h * omega - plan.rate[0, i]
-            push_conj /= 1j * h * omega - plan.rate[0, i].conjugate()
+            for j in range(work.linear.shape[0]):
+                push += modes.gap_pick[0, i, j] * work.force[a, j]
+                push_conj += modes.gap_pick[0, i, j].conjugate() * work.force[a, j]
+            push /= 1j * h * omega - modes.rate[0, i]
+            push_conj /= 1j * h * omega - modes.rate[0, i].conjugate()
             for k in range(n):
-                series[a, k] -= plan.right[0, k, i] * push
-                if plan.weight[0, i] == 2.0:
-                    series[a, k] -= plan.right[0, k, i].conjugate() * push_conj
+                series[a, k] -= modes.right[0, k, i] * push
+                if modes.weight[0, i] == 2.0:
+                    series[a, k] -= modes.right[0, k, i].conjugate() * push_conj
 
 
 @kernel(entry=True)
 def corrected(
     problem: Shooting,
+    work: ShootingWork,
     states: Real,
     omega: Real,
     harmonics: Int,
@@ -185,29 +174,28 @@ def corrected(
     """
     for p in range(omega.shape[0]):
         code[p], first, last = _correct_state(
-            problem, states[p], omega[p], A, pivot, delta, maps[p]
+            problem, work, states[p], omega[p], A, pivot, delta, maps[p]
         )
-        if code[p] == status.MISSING_CONFIGURATION:
-            break
         error[p] = first + last
         if harmonics.shape[0] > 0 and math.isfinite(error[p]):
-            error[p] = _distance(problem, omega[p], harmonics, series[p], last)
+            error[p] = _distance(problem, work, omega[p], harmonics, series[p], last)
 
 
 @kernel(inline=True)
 def _correct_state(
-    problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real, out: Real
-) -> tuple[int, float, float]:
+    problem: Shooting, work: ShootingWork, z: Real, omega: float, A: Real, pivot: Int, delta: Real,
+    out: Real,
+) -> tuple[int, float, float]:  # fmt: skip
     """A Newton step of z in place unless it is rounding; its length and the next's, or infinity."""
     size = delta.shape[0]
     n = size // 2
     for k in range(size):
         for c in range(size):
             out[k, c] = math.nan
-    code, first = _newton_step(problem, z, omega, A, pivot, delta)
+    code, first = _newton_step(problem, work, z, omega, A, pivot, delta)
     if code != status.OK:
         return code, math.inf, math.inf
-    _store_map(problem, out)
+    _store_map(problem, work, out)
     # Steps within the rounding of the flow do not shrink; relative to the motion they are nothing.
     size_of_motion = 0.0
     for k in range(n):
@@ -219,40 +207,40 @@ def _correct_state(
         return code, math.inf, math.inf
     for k in range(size):
         z[k] += delta[k]
-    code, last = _newton_step(problem, z, omega, A, pivot, delta)
+    code, last = _newton_step(problem, work, z, omega, A, pivot, delta)
     if code != status.OK:
         return code, first, math.inf
     if not last <= max(0.5 * first, rounding):
         return code, first, math.inf
-    _store_map(problem, out)
+    _store_map(problem, work, out)
     return code, first, last
 
 
 @kernel(inline=True)
-def _store_map(problem: Shooting, out: Real) -> None:
+def _store_map(problem: Shooting, work: ShootingWork, out: Real) -> None:
     """The return map that was carried last."""
     for k in range(out.shape[0]):
         for c in range(out.shape[0]):
-            out[k, c] = problem.sign * problem.map[k, c]
+            out[k, c] = problem.sign * work.map[k, c]
 
 
 @kernel(inline=True)
 def _newton_step(
-    problem: Shooting, z: Real, omega: float, A: Real, pivot: Int, delta: Real
+    problem: Shooting, work: ShootingWork, z: Real, omega: float, A: Real, pivot: Int, delta: Real
 ) -> tuple[int, float]:
     """delta = (I - M)^-1 (flow(z) - z); its largest displacement, infinite when I - M is singular.
 
-    The map M stays in problem.map, without the problem's sign.
+    The map M stays in work.map, without the problem's sign.
     """
     size = A.shape[0]
     n = size // 2
-    code = shoot(problem, z, omega, problem.map)
+    code = shoot(problem, work, z, omega, work.map)
     if code != status.OK:
         return code, math.inf
     for i in range(size):
-        delta[i] = problem.sign * problem.flow.z[i] - z[i]
+        delta[i] = problem.sign * work.flow.z[i] - z[i]
         for j in range(size):
-            A[i, j] = -problem.sign * problem.map[i, j]
+            A[i, j] = -problem.sign * work.map[i, j]
         A[i, i] += 1.0
     if not lu_factor(A, pivot):
         return code, math.inf
@@ -265,10 +253,15 @@ def _newton_step(
 
 @kernel(inline=True)
 def _distance(
-    problem: Shooting, omega: float, harmonics: Int, series: Complex, rest: float
+    problem: Shooting,
+    work: ShootingWork,
+    omega: float,
+    harmonics: Int,
+    series: Complex,
+    rest: float,
 ) -> float:
     """Largest |x_flow - x_series| over samples of the recorded flow, plus the last correction."""
-    plan, flow = problem.plan, problem.flow
+    flow = work.flow
     n = flow.z.shape[0] // 2
     turn = problem.fraction * 2.0 * math.pi / omega
     largest = 0.0
@@ -276,7 +269,7 @@ def _distance(
         samples = 2 + int(128.0 * flow.length[e] / turn)
         for s in range(samples):
             elapsed = flow.length[e] * s / samples
-            segment_state(plan, flow, e, omega, elapsed, flow.z, problem.rate)
+            segment_state(flow, e, omega, elapsed, flow.z, work.rate)
             for k in range(n):
                 value = flow.z[k]
                 for a in range(harmonics.shape[0]):

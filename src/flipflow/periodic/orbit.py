@@ -9,14 +9,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.motion import ContactInterval, Motion
 from flipflow.errors import InputError
+from flipflow.model.contact_law import ENTERED, OPEN, force_in, shares
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
 
-Real = NDArray[np.float64]
 GAUSS_POINTS = 24
 POINTS_PER_TURN = 720
 
@@ -63,12 +64,12 @@ class Orbit:
     @property
     def system(self) -> MechanicalSystem:
         """The machine."""
-        return self.point.solver.system
+        return self.point.formulation.system
 
     @property
     def periods(self) -> int:
         """Number of forcing periods after which the motion repeats."""
-        return self.point.solver.turns
+        return self.point.formulation.turns
 
     @property
     def period(self) -> float:
@@ -78,7 +79,7 @@ class Orbit:
     @cached_property
     def motion(self) -> Motion:
         """The motion as a function of time, with its record of contacts."""
-        return self.point.solver.motion(self.unknowns, self.omega)
+        return self.point.formulation.solver().motion(self.unknowns, self.omega)
 
     @cached_property
     def t(self) -> Real:
@@ -88,18 +89,20 @@ class Orbit:
     @cached_property
     def state(self) -> Real:
         """State (x, x') at t = 0, shape (2 N,)."""
-        return np.asarray(self.point.solver.states(self.unknowns[None], np.array([self.omega]))[0])
+        return np.asarray(
+            self.point.formulation.solver().states(self.unknowns[None], np.array([self.omega]))[0]
+        )
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers of the full period, largest modulus first, (2 N,)."""
-        return full_turn(self.point.eigenvalues, half_turn=self.point.solver.half_turn)
+        return full_turn(self.point.eigenvalues, half_turn=self.point.formulation.half_turn)
 
     @cached_property
     def monodromy(self) -> Real:
         """Linearised flow over the full period, (2 N, 2 N), saltation included."""
         M = self.return_map
-        return np.asarray(M @ M if self.point.solver.half_turn else M)
+        return np.asarray(M @ M if self.point.formulation.half_turn else M)
 
     @cached_property
     def stability(self) -> str:
@@ -116,7 +119,9 @@ class Orbit:
     @cached_property
     def error(self) -> float:
         """Estimated distance in m from the exact motion; infinite where nothing is promised."""
-        return float(self.point.solver.errors(self.unknowns[None], np.array([self.omega]))[0])
+        return float(
+            self.point.formulation.solver().errors(self.unknowns[None], np.array([self.omega]))[0]
+        )
 
     def displacement(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
         """Displacement of a coordinate in m at times t (default: :attr:`t`)."""
@@ -184,15 +189,17 @@ class Orbit:
     def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
         """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
 
-        With ``spring``, only the time is counted during which that stop is engaged: damping times
-        this is the power that the stop takes.
+        With ``spring``, only the time is counted during which that stop's damper acts: damping
+        times this is the power that the stop takes.
         """
         vector = self.system.coordinate(which)
 
         def square(t: Real, piece: NDArray[np.intp]) -> Real:
             rate = self.motion.piece_derivative(t, piece, 1) @ vector
-            engaged = 1.0 if spring is None else np.abs(self._side(spring, piece))
-            return np.asarray(rate**2 * engaged)
+            if spring is None:
+                return np.asarray(rate**2)
+            _, damped = shares(self._spring(spring).law, self._regime(spring, piece))
+            return np.asarray(rate**2 * damped)
 
         return self._mean(square)
 
@@ -200,16 +207,15 @@ class Orbit:
         """Mean power that the excitation feeds in, W: only the first harmonic takes part in it."""
         force = self.system.excitation
         F = force.vector * self.omega**force.power
-        _, _, first = self.point.solver.extremes(
-            self.unknowns[None], np.array([self.omega]), np.eye(self.system.size)
-        )
-        return float(0.5 * (F.conj() @ (1j * self.omega * first[0])).real)
+        _, _, first = self.motion.extremes(np.eye(self.system.size))
+        return float(0.5 * (F.conj() @ (1j * self.omega * first)).real)
 
     def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         total = 0.0
-        pieces = self.motion.pieces
-        for e, (start, length) in enumerate(zip(pieces.start, pieces.length, strict=True)):
+        for e, (start, length) in enumerate(
+            zip(self.motion.start, self.motion.length, strict=True)
+        ):
             # A free piece may last the whole turn and hold many harmonics: cut it up.
             parts = 1 + int(16.0 * length / self.period)
             for part in range(parts):
@@ -251,30 +257,24 @@ class Orbit:
             raise InputError("spring", number, f"the machine has {count} springs, from 0 on")
         return self._springs[number]
 
-    def _side(self, spring: int, piece: NDArray[np.intp]) -> NDArray[np.int64]:
-        """Side (+1, -1) on which a spring is engaged in each piece, 0 where it carries no force."""
+    def _regime(self, spring: int, piece: NDArray[np.intp]) -> Int:
+        """Regime of a spring in each piece: one without gap always pushes."""
         if self._spring(spring).bonded:
-            return np.ones(piece.shape, np.int64)
+            return np.full(piece.shape, ENTERED)
         if spring not in self._kept:
-            return np.zeros(piece.shape, np.int64)
-        state = self.motion.pieces.states[piece, self._kept.index(spring)]
-        return np.where(np.abs(state) == 1, state, 0)
+            return np.full(piece.shape, OPEN)
+        return np.asarray(self.motion.regime[piece, self._kept.index(spring)])
 
     def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
         """Force of a spring of the machine as it was given."""
-        stop, side = self._spring(spring), self._side(spring, piece)
+        stop, regime = self._spring(spring), self._regime(spring, piece)
         y = self.motion.piece_derivative(t, piece, 0) @ stop.direction
         v = self.motion.piece_derivative(t, piece, 1) @ stop.direction
-        plus, minus = stop.gaps
-        gap = np.select([side == 1, side == -1], [plus, -minus])
-        return np.where(side == 0, 0.0, stop.stiffness * (y - gap) + stop.damping * v)
+        return force_in(stop.law, stop.stiffness, stop.damping, stop.gaps, regime, y, v)
 
     def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
-        vector = self.system.coordinate(which)[None]
-        low, high, first = self.point.solver.extremes(
-            self.unknowns[None], np.array([self.omega]), vector
-        )
-        return float(low[0, 0]), float(high[0, 0]), complex(first[0, 0])
+        low, high, first = self.motion.extremes(self.system.coordinate(which)[None])
+        return float(low[0]), float(high[0]), complex(first[0])
 
 
 def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:

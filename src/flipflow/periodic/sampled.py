@@ -19,15 +19,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.plan import Complex, Int, Real
 from flipflow.periodic.balance import (
     prepare_receptance,
     series_scale,
     write_block,
     write_residual,
 )
-from flipflow.periodic.series import Balance, amplitude_of, series_depths, set_series
+from flipflow.periodic.series import Balance, BalanceWork, amplitude_of, series_depths, set_series
 
 
 class Sampled(NamedTuple):
@@ -35,10 +38,32 @@ class Sampled(NamedTuple):
 
     balance: Balance
     turn: Complex  # (N,) exp(i theta_n)
+    sharpness: float  # s in 1/m
+
+
+class SampledWork(NamedTuple):
+    """Scratch of the problem."""
+
+    balance: BalanceWork
     stiffness: Complex  # (m, 2 H + 1) sum dG/dy exp(i q theta_n), q = 0 ... 2 H
     damping: Complex  # (m, 2 H + 1) sum dG/dv exp(i q theta_n)
     beyond: Int  # (m,) how often the samples pass a gap in a turn
-    sharpness: float  # s in 1/m
+
+
+def new_sampled(balance: Balance, samples: int, sharpness: float) -> Sampled:
+    """The problem of a balance with the smooth law sampled at fixed times."""
+    return Sampled(balance, np.exp(2j * np.pi * np.arange(samples) / samples), float(sharpness))
+
+
+def new_sampled_work(balance: BalanceWork) -> SampledWork:
+    """Scratch around that of the balance."""
+    m, most = balance.integral.shape
+    return SampledWork(
+        balance=balance,
+        stiffness=np.zeros((m, most), np.complex128),
+        damping=np.zeros((m, most), np.complex128),
+        beyond=np.zeros(m, np.int64),
+    )
 
 
 @kernel(inline=True)
@@ -55,28 +80,28 @@ def switched(
 
 
 @kernel
-def sampled_forces(problem: Sampled, omega: float) -> None:
+def sampled_forces(problem: Sampled, work: SampledWork, omega: float) -> None:
     """Lambda_h, its derivative in omega at fixed A, and the sums the Jacobian needs."""
-    balance = problem.balance
+    balance, scratch = problem.balance, work.balance
     kinds = balance.harmonics.shape[0]
-    for j in range(balance.linear.shape[0]):
-        for q in range(problem.stiffness.shape[1]):
-            problem.stiffness[j, q] = 0.0
-            problem.damping[j, q] = 0.0
+    for j in range(scratch.linear.shape[0]):
+        for q in range(work.stiffness.shape[1]):
+            work.stiffness[j, q] = 0.0
+            work.damping[j, q] = 0.0
         for a in range(kinds):
-            balance.force[a, j] = 0.0
-            balance.force_slope[a, j] = 0.0
-        problem.beyond[j] = 0
+            scratch.force[a, j] = 0.0
+            scratch.force_slope[a, j] = 0.0
+        work.beyond[j] = 0
         before = 0
         for n in range(problem.turn.shape[0]):
-            side = _add_sample(problem, omega, j, n)
+            side = _add_sample(problem, work, omega, j, n)
             if n > 0 and side != before:
-                problem.beyond[j] += 1
+                work.beyond[j] += 1
             before = side
         for a in range(kinds):
             share = _share(problem, a)
-            balance.force[a, j] *= share
-            balance.force_slope[a, j] *= share
+            scratch.force[a, j] *= share
+            scratch.force_slope[a, j] *= share
 
 
 @kernel(inline=True)
@@ -85,33 +110,33 @@ def _share(problem: Sampled, a: int) -> float:
 
 
 @kernel(inline=True)
-def _add_sample(problem: Sampled, omega: float, j: int, n: int) -> int:
+def _add_sample(problem: Sampled, work: SampledWork, omega: float, j: int, n: int) -> int:
     """Add sample n at gap j to all sums; the side of the stop beyond whose gap it lies, or 0."""
-    balance = problem.balance
-    plan = balance.plan
+    balance, scratch = problem.balance, work.balance
+    stops = balance.machine.stops
     kinds, samples = balance.harmonics.shape[0], problem.turn.shape[0]
     y, slope = 0.0, 0.0
     for a in range(kinds):
         h = balance.harmonics[a]
-        term = amplitude_of(balance, a, j) * problem.turn[(h * n) % samples]
+        term = amplitude_of(balance, scratch, a, j) * problem.turn[(h * n) % samples]
         y += term.real
         slope -= h * term.imag
     v = omega * slope
-    k, c, s = plan.stiffness[j], plan.damping[j], problem.sharpness
-    plus, plus_y, plus_v = switched(y, v, plan.gap_plus[j], k, c, s)
-    minus, minus_y, minus_v = switched(-y, -v, plan.gap_minus[j], k, c, s)
+    k, c, s = stops.stiffness[j], stops.damping[j], problem.sharpness
+    plus, plus_y, plus_v = switched(y, v, stops.gap[j, 0], k, c, s)
+    minus, minus_y, minus_v = switched(-y, -v, stops.gap[j, 1], k, c, s)
     force, by_y, by_v = plus - minus, plus_y + minus_y, plus_v + minus_v
     for a in range(kinds):
         back = problem.turn[(balance.harmonics[a] * n) % samples].conjugate()
-        balance.force[a, j] += force * back
-        balance.force_slope[a, j] += by_v * slope * back
-    for q in range(problem.stiffness.shape[1]):
+        scratch.force[a, j] += force * back
+        scratch.force_slope[a, j] += by_v * slope * back
+    for q in range(work.stiffness.shape[1]):
         turn = problem.turn[(q * n) % samples]
-        problem.stiffness[j, q] += by_y * turn
-        problem.damping[j, q] += by_v * turn
-    if y > plan.gap_plus[j]:
+        work.stiffness[j, q] += by_y * turn
+        work.damping[j, q] += by_v * turn
+    if y > stops.gap[j, 0]:
         return 1
-    return -1 if -y > plan.gap_minus[j] else 0
+    return -1 if -y > stops.gap[j, 1] else 0
 
 
 @kernel(inline=True)
@@ -121,20 +146,24 @@ def _sum(sums: Complex, j: int, q: int) -> complex:
 
 
 @kernel
-def sampled_residual(problem: Sampled, u: Real, omega: float, r: Real, J: Real) -> int:
+def sampled_residual(
+    problem: Sampled, work: SampledWork, u: Real, omega: float, r: Real, J: Real
+) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
-    set_series(problem.balance, u)
-    prepare_receptance(problem.balance, omega)
-    sampled_forces(problem, omega)
-    _jacobian(problem, omega, J)
-    return write_residual(problem.balance, r, J)
+    set_series(problem.balance, work.balance, u)
+    code = prepare_receptance(problem.balance, work.balance, omega)
+    if code != status.OK:
+        return code
+    sampled_forces(problem, work, omega)
+    _jacobian(problem, work, omega, J)
+    return write_residual(problem.balance, work.balance, r, J)
 
 
 @kernel
-def _jacobian(problem: Sampled, omega: float, J: Real) -> None:
+def _jacobian(problem: Sampled, work: SampledWork, omega: float, J: Real) -> None:
     """dr = c1 dA + c2 conj(dA), with dy = Re dA exp(i l theta), dv = omega Re i l dA exp(...)."""
-    balance = problem.balance
-    m = balance.linear.shape[0]
+    balance, scratch = problem.balance, work.balance
+    m = scratch.linear.shape[0]
     for a in range(balance.harmonics.shape[0]):
         h = balance.harmonics[a]
         half = 0.5 * _share(problem, a)
@@ -143,30 +172,30 @@ def _jacobian(problem: Sampled, omega: float, J: Real) -> None:
             rate = 1j * (k * omega)
             for c in range(m):
                 direct = half * (
-                    _sum(problem.stiffness, c, k - h) + rate * _sum(problem.damping, c, k - h)
+                    _sum(work.stiffness, c, k - h) + rate * _sum(work.damping, c, k - h)
                 )
                 mirror = half * (
-                    _sum(problem.stiffness, c, -k - h) - rate * _sum(problem.damping, c, -k - h)
+                    _sum(work.stiffness, c, -k - h) - rate * _sum(work.damping, c, -k - h)
                 )
                 for j in range(m):
-                    G = balance.receptance[a, j, c]
+                    G = scratch.receptance[a, j, c]
                     unit = 1.0 if a == b and j == c else 0.0
                     write_block(balance, a, j, b, c, G * direct, G * mirror, unit, J)
 
 
 @kernel
-def passages(problem: Sampled) -> int:
+def passages(work: SampledWork) -> int:
     """A number that changes when the samples begin or cease to pass a gap."""
     total = 0
-    for j in range(problem.beyond.shape[0]):
-        total += problem.beyond[j] + 1000 * j * problem.beyond[j]
+    for j in range(work.beyond.shape[0]):
+        total += work.beyond[j] + 1000 * j * work.beyond[j]
     return total
 
 
 @kernel
-def sampled_depths(problem: Sampled, omega: float, depth: Real) -> None:
+def sampled_depths(problem: Sampled, work: SampledWork, omega: float, depth: Real) -> None:
     """Greatest depth in m beyond each gap, (m, 2), as the series itself has it."""
-    series_depths(problem.balance, omega, depth)
+    series_depths(problem.balance, work.balance, omega, depth)
 
 
 @kernel

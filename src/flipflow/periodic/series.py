@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
     GapMotion,
@@ -17,11 +20,20 @@ from flipflow.dynamics.contact_search import (
     exponentials,
     extremes,
     gap_state,
+    new_gap_motion,
     next_change,
     prepare_search,
 )
-from flipflow.dynamics.flow import Flow, configuration, contact_number, contact_state, kick_sign
-from flipflow.dynamics.plan import Complex, Int, Plan, Real
+from flipflow.dynamics.flow import Flow, contact_number, new_flow
+from flipflow.dynamics.law import (
+    Stops,
+    damping_share,
+    kind,
+    regime_at,
+    signed_gap,
+    tangent_kick,
+)
+from flipflow.dynamics.machine import MachineArrays
 
 NO_SPRING = -1
 
@@ -29,10 +41,18 @@ NO_SPRING = -1
 class Balance(NamedTuple):
     """The problem: n_h harmonics at m gaps; unknowns as :func:`place` orders them."""
 
-    plan: Plan
-    flow: Flow  # record of the contacts in a turn; its contact damping is c omega
-    motion: GapMotion  # the series itself
+    machine: MachineArrays
     harmonics: Int  # (n_h,) 0 first when there is a mean, equally spaced otherwise
+    walk: float  # angle over which contacts are sought: pi where the second half mirrors the first
+    length: float  # length in m below which amplitudes count as small
+
+
+class BalanceWork(NamedTuple):
+    """Scratch of the problem, and what the series last set left."""
+
+    flow: Flow  # record of the contacts in a turn, and the open machine's modes and drive
+    stops: Stops  # those of the machine, with damping c omega: the series runs over theta
+    motion: GapMotion  # the series itself
     receptance: Complex  # (n_h, m, m) G_h
     receptance_slope: Complex  # (n_h, m, m) dG_h / d omega
     linear: Complex  # (m,) A_linear
@@ -43,69 +63,94 @@ class Balance(NamedTuple):
     edge_depth: Complex  # (m, 2 H + 1) sum +-p exp(-i k theta) there, k = 0 ... 2 H
     force: Complex  # (n_h, m) Lambda_h
     force_slope: Complex  # (n_h, m) its derivative in omega at fixed A
-    walk: float  # angle over which contacts are sought: pi where the second half mirrors the first
-    length: float
+
+
+def new_balance(
+    machine: MachineArrays, harmonics: int, *, half_turn: bool, length: float
+) -> Balance:
+    """The harmonic-balance problem; a mirror-symmetric motion has odd harmonics only."""
+    kept = np.arange(1, harmonics + 1, 2) if half_turn else np.arange(harmonics + 1)
+    return Balance(machine, kept.astype(np.int64), np.pi if half_turn else 2.0 * np.pi, length)
+
+
+def new_balance_work(problem: Balance) -> BalanceWork:
+    """Scratch for a harmonic-balance problem."""
+    kept, stops = problem.harmonics, problem.machine.stops
+    m, most = problem.machine.direction.shape[0], 2 * int(kept[-1]) + 1
+    rates = 1j * kept[kept > 0].astype(np.complex128)
+    spacing = 2 if kept[0] == 1 else 1
+    return BalanceWork(
+        flow=new_flow(problem.machine)._replace(motion=new_gap_motion(m, rates, spacing)),
+        stops=stops._replace(damping=np.zeros(m)),
+        motion=new_gap_motion(m, rates, spacing),
+        receptance=np.zeros((kept.size, m, m), np.complex128),
+        receptance_slope=np.zeros((kept.size, m, m), np.complex128),
+        linear=np.zeros(m, np.complex128),
+        linear_slope=np.zeros(m, np.complex128),
+        integral=np.zeros((m, most), np.complex128),
+        integral_gap=np.zeros((m, most), np.complex128),
+        edge=np.zeros((m, 2 * most - 1), np.complex128),
+        edge_depth=np.zeros((m, most), np.complex128),
+        force=np.zeros((kept.size, m), np.complex128),
+        force_slope=np.zeros((kept.size, m), np.complex128),
+    )
 
 
 @kernel(inline=True)
 def place(problem: Balance, a: int, j: int) -> int:
     """Where the real part of harmonic a at gap j stands; the imaginary part follows it."""
-    m = problem.linear.shape[0]
+    m = problem.machine.direction.shape[0]
     if problem.harmonics[0] != 0:
         return 2 * (a * m + j)
     return j if a == 0 else m + 2 * ((a - 1) * m + j)
 
 
 @kernel(inline=True)
-def set_series(problem: Balance, u: Real) -> None:
+def set_series(problem: Balance, work: BalanceWork, u: Real) -> None:
     """The unknowns as offsets and amplitudes at the gaps."""
-    m = problem.linear.shape[0]
+    m = work.linear.shape[0]
     mean = 1 if problem.harmonics[0] == 0 else 0
     for j in range(m):
-        problem.motion.offset[j] = u[j] if mean == 1 else 0.0
+        work.motion.offset[j] = u[j] if mean == 1 else 0.0
         for a in range(mean, problem.harmonics.shape[0]):
             k = place(problem, a, j)
-            problem.motion.amplitude[j, a - mean] = complex(u[k], u[k + 1])
+            work.motion.amplitude[j, a - mean] = complex(u[k], u[k + 1])
 
 
 @kernel(inline=True)
-def amplitude_of(problem: Balance, a: int, j: int) -> complex:
+def amplitude_of(problem: Balance, work: BalanceWork, a: int, j: int) -> complex:
     """A_hj of the series last set."""
     if problem.harmonics[0] != 0:
-        return problem.motion.amplitude[j, a]
-    return problem.motion.offset[j] + 0j if a == 0 else problem.motion.amplitude[j, a - 1]
+        return work.motion.amplitude[j, a]
+    return work.motion.offset[j] + 0j if a == 0 else work.motion.amplitude[j, a - 1]
 
 
 @kernel(inline=True)
-def series_contact_state(problem: Balance) -> None:
-    """Contact state of each spring at theta = 0."""
-    count = problem.motion.rate.shape[0]
-    exponentials(problem.motion, count, 0.0)
-    for j in range(problem.linear.shape[0]):
-        y, v = gap_state(problem.motion, count, j)
-        problem.flow.state[j] = contact_state(problem.flow.contact, j, y, v)
+def set_series_regimes(work: BalanceWork) -> None:
+    """Regime of each spring at theta = 0."""
+    count = work.motion.rate.shape[0]
+    exponentials(work.motion, count, 0.0)
+    for j in range(work.linear.shape[0]):
+        y, v = gap_state(work.motion, count, j)
+        work.flow.regime[j] = regime_at(work.stops, j, y, v)
 
 
 @kernel(inline=True)
-def record_contacts(problem: Balance, omega: float) -> int:
+def record_contacts(problem: Balance, work: BalanceWork, omega: float) -> int:
     """Walk along the series and record who touches when, as a flow does (times in s)."""
-    flow = problem.flow
-    for j in range(problem.linear.shape[0]):
-        flow.contact.damping[j] = problem.plan.damping[j] * omega
-    series_contact_state(problem)
+    flow = work.flow
+    for j in range(work.linear.shape[0]):
+        work.stops.damping[j] = problem.machine.stops.damping[j] * omega
+    set_series_regimes(work)
     rest = problem.walk
     theta = 0.0
     fired = NO_SPRING
     for e in range(flow.start.shape[0]):
-        slot = problem.plan.slot[configuration(flow.state)]
         flow.segments[0] = e + 1
-        if slot < 0:
-            return status.MISSING_CONFIGURATION
-        flow.slot[e] = slot
         flow.start[e] = theta / omega
-        for j in range(flow.state.shape[0]):
-            flow.states[e, j] = flow.state[j]
-        length, spring, new = next_change_from(problem, theta, rest, fired)
+        for j in range(flow.regime.shape[0]):
+            flow.regimes[e, j] = flow.regime[j]
+        length, spring, new = next_change_from(work, theta, rest, fired)
         if math.isnan(length):
             return status.SEARCH_NOT_ENDED
         flow.length[e] = length / omega
@@ -113,8 +158,8 @@ def record_contacts(problem: Balance, omega: float) -> int:
         flow.kick[e] = 0.0
         if spring < 0:
             return status.OK
-        flow.kick[e] = kick_sign(flow.state[spring], new)
-        flow.state[spring] = new
+        flow.kick[e] = tangent_kick(work.stops, spring, flow.regime[spring], new)
+        flow.regime[spring] = new
         fired = spring
         theta += length
         rest -= length
@@ -123,112 +168,114 @@ def record_contacts(problem: Balance, omega: float) -> int:
 
 @kernel(inline=True)
 def next_change_from(
-    problem: Balance, theta: float, horizon: float, fired: int
+    work: BalanceWork, theta: float, horizon: float, fired: int
 ) -> tuple[float, int, int]:
     """The next change of contact after theta: the series is turned to start there."""
-    motion = problem.motion
-    turned = problem.flow.motion
+    motion = work.motion
+    turned = work.flow.motion
     count = motion.rate.shape[0]
     exponentials(motion, count, theta)
     for j in range(motion.offset.shape[0]):
         turned.offset[j] = motion.offset[j]
         for i in range(count):
             turned.amplitude[j, i] = motion.amplitude[j, i] * motion.factor[i]
-    return next_change(turned, problem.flow.contact, problem.flow.state, count, horizon, fired)
+    return next_change(turned, work.stops, work.flow.regime, count, horizon, fired)
 
 
 @kernel(inline=True)
-def contact_integrals(problem: Balance, omega: float) -> None:
+def contact_integrals(problem: Balance, work: BalanceWork, omega: float) -> None:
     """int exp(i k theta) over the contacts, and what clipped limits leave.
 
     The mirrored contact half a turn later has the same integral times (-1)^k and the opposite gap.
     Odd harmonics ask for even k, and for odd k where a gap or depth is a factor: all double.
     """
-    flow = problem.flow
-    m, most = problem.integral.shape
+    flow = work.flow
+    m, most = work.integral.shape
     for j in range(m):
         for k in range(most):
-            problem.integral[j, k] = 0.0
-            problem.integral_gap[j, k] = 0.0
-            problem.edge_depth[j, k] = 0.0
+            work.integral[j, k] = 0.0
+            work.integral_gap[j, k] = 0.0
+            work.edge_depth[j, k] = 0.0
         for k in range(2 * most - 1):
-            problem.edge[j, k] = 0.0
+            work.edge[j, k] = 0.0
     for e in range(flow.segments[0]):
         first = flow.start[e] * omega
         last = first + flow.length[e] * omega
         for j in range(m):
-            if abs(flow.states[e, j]) == 1:
-                gap = flow.contact.gap_plus[j]
-                if flow.states[e, j] < 0:
-                    gap = -flow.contact.gap_minus[j]
-                _add_interval(problem, j, first, last, gap)
+            if kind(work.stops, j, flow.regimes[e, j]) != 0:
+                gap = signed_gap(work.stops, j, flow.regimes[e, j])
+                _add_interval(problem, work, j, first, last, gap)
         if flow.spring[e] >= 0 and flow.kick[e] == 0.0:
-            _add_clipped_limit(problem, e, last)
+            _add_clipped_limit(problem, work, e, last)
 
 
 @kernel(inline=True)
-def _add_clipped_limit(problem: Balance, e: int, theta: float) -> None:
+def _add_clipped_limit(problem: Balance, work: BalanceWork, e: int, theta: float) -> None:
     """The end of piece e, where a clipped spring lets go or takes hold beyond its gap."""
-    flow = problem.flow
+    flow = work.flow
     spring = flow.spring[e]
-    before, after = flow.states[e, spring], flow.states[e + 1, spring]
-    if abs(before) == 1 and abs(after) == 2:
-        _add_edge(problem, spring, theta, 1.0, before)
-    elif abs(before) == 2 and abs(after) == 1:
-        _add_edge(problem, spring, theta, -1.0, after)
+    before, after = flow.regimes[e, spring], flow.regimes[e + 1, spring]
+    if before * after == 0:
+        return
+    share = damping_share(work.stops, spring, before) - damping_share(work.stops, spring, after)
+    if share != 0.0:
+        _add_edge(problem, work, spring, theta, share, before)
 
 
 @kernel(inline=True)
-def _add_interval(problem: Balance, j: int, first: float, last: float, gap: float) -> None:
+def _add_interval(
+    problem: Balance, work: BalanceWork, j: int, first: float, last: float, gap: float
+) -> None:
     turns = 2.0 * math.pi / problem.walk
     start, start_turn = turns + 0j, exponential(1j * first)
     end, end_turn = turns + 0j, exponential(1j * last)
-    problem.integral[j, 0] += turns * (last - first)
-    problem.integral_gap[j, 0] += turns * gap * (last - first)
-    for k in range(1, problem.integral.shape[1]):
+    work.integral[j, 0] += turns * (last - first)
+    work.integral_gap[j, 0] += turns * gap * (last - first)
+    for k in range(1, work.integral.shape[1]):
         start *= start_turn
         end *= end_turn
         value = (end - start) * (-1j / k)
-        problem.integral[j, k] += value
-        problem.integral_gap[j, k] += gap * value
+        work.integral[j, k] += value
+        work.integral_gap[j, k] += gap * value
 
 
 @kernel(inline=True)
-def _add_edge(problem: Balance, j: int, theta: float, sign: float, side: int) -> None:
+def _add_edge(
+    problem: Balance, work: BalanceWork, j: int, theta: float, sign: float, regime: int
+) -> None:
     """A limit of contact beyond the gap: +1 where a clipped spring lets go, -1 where it holds."""
-    most = problem.integral.shape[1]
-    count = problem.motion.rate.shape[0]
-    exponentials(problem.motion, count, theta)
-    y, _ = gap_state(problem.motion, count, j)
-    contact = problem.flow.contact
-    depth = y - contact.gap_plus[j] if side > 0 else y + contact.gap_minus[j]
+    most = work.integral.shape[1]
+    count = work.motion.rate.shape[0]
+    exponentials(work.motion, count, theta)
+    y, _ = gap_state(work.motion, count, j)
+    depth = y - signed_gap(work.stops, j, regime)
     sign *= 2.0 * math.pi / problem.walk
     for k in range(-(most - 1), most):
         turn = sign * exponential(1j * (k * theta))
-        problem.edge[j, k + most - 1] += turn
+        work.edge[j, k + most - 1] += turn
         if k <= 0:
-            problem.edge_depth[j, -k] += depth * turn
+            work.edge_depth[j, -k] += depth * turn
 
 
 @kernel(inline=True)
-def whole_integral(problem: Balance, j: int, k: int) -> complex:
+def whole_integral(work: BalanceWork, j: int, k: int) -> complex:
     """int exp(i k theta) over the contacts of gap j, any sign of k."""
-    return problem.integral[j, k] if k >= 0 else problem.integral[j, -k].conjugate()
+    return work.integral[j, k] if k >= 0 else work.integral[j, -k].conjugate()
 
 
 @kernel(inline=True)
-def contact_count(problem: Balance) -> int:
+def contact_count(work: BalanceWork) -> int:
     """A number that changes when the contacts met in a turn change."""
-    return contact_number(problem.flow)
+    return contact_number(work.flow)
 
 
 @kernel(inline=True)
-def series_depths(problem: Balance, omega: float, depth: Real) -> None:  # noqa: ARG001
+def series_depths(problem: Balance, work: BalanceWork, omega: float, depth: Real) -> None:  # noqa: ARG001
     """Greatest depth in m of the series last set beyond each gap, (m, 2): plus and minus side."""
-    motion = problem.motion
+    motion = work.motion
     count = motion.rate.shape[0]
     prepare_search(motion, count)
     for j in range(depth.shape[0]):
         low, high = extremes(motion, count, j, 2.0 * math.pi)
-        depth[j, 0] = high - problem.plan.gap_plus[j]
-        depth[j, 1] = -low - problem.plan.gap_minus[j]
+        depth[j, 0] = high - problem.machine.stops.gap[j, 0]
+        depth[j, 1] = -low - problem.machine.stops.gap[j, 1]

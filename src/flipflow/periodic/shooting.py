@@ -9,48 +9,77 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import extremes, prepare_search
 from flipflow.dynamics.flow import (
     Flow,
     carry_tangent,
     contact_number,
+    new_flow,
     run_flow,
     segment_motion,
 )
-from flipflow.dynamics.plan import Complex, Plan, Real
+from flipflow.dynamics.machine import MachineArrays
 
 
 class Shooting(NamedTuple):
-    """The problem: a plan, the scratch of its flow, and the part of a turn to shoot over."""
+    """The problem: a machine, and the part of a turn to shoot over."""
 
-    plan: Plan
-    flow: Flow
-    tangent: Real  # (2 N, 2 N + 1) with the derivative in omega
-    map: Real  # (2 N, 2 N) without it
-    work: Complex  # (R, 2 N + 1)
-    rate: Real  # (2 N,)
+    machine: MachineArrays
     fraction: float
     sign: float
     length: float  # length in m below which displacements count as small
 
 
+class ShootingWork(NamedTuple):
+    """Scratch of the problem; the flow holds the record of the last motion."""
+
+    flow: Flow
+    tangent: Real  # (2 N, 2 N + 1) with the derivative in omega
+    map: Real  # (2 N, 2 N) without it
+    columns: Complex  # (R, 2 N + 1)
+    rate: Real  # (2 N,)
+
+
+def new_shooting(
+    machine: MachineArrays, *, half_turn: bool, length: float, turns: int = 1
+) -> Shooting:
+    """The shooting problem over ``turns``, or half of them for a mirror-symmetric motion."""
+    fraction = 0.5 * turns if half_turn else float(turns)
+    return Shooting(machine, fraction, -1.0 if half_turn else 1.0, length)
+
+
+def new_shooting_work(machine: MachineArrays) -> ShootingWork:
+    """Scratch for shooting at one machine, whatever the turns."""
+    size = 2 * machine.direction.shape[1]
+    return ShootingWork(
+        flow=new_flow(machine),
+        tangent=np.zeros((size, size + 1)),
+        map=np.zeros((size, size)),
+        columns=np.zeros((size, size + 1), np.complex128),
+        rate=np.zeros(size),
+    )
+
+
 @kernel(inline=True)
-def shoot(problem: Shooting, z: Real, omega: float, U: Real) -> int:
+def shoot(problem: Shooting, work: ShootingWork, z: Real, omega: float, U: Real) -> int:
     """Carry z and its tangent over the problem's part of a turn: flow.z, and U as it takes columns.
 
     U is (2 N, 2 N), or (2 N, 2 N + 1) with the derivative in omega at fixed time.
     """
-    flow = problem.flow
+    flow = work.flow
     for k in range(U.shape[0]):
         flow.z[k] = z[k]
         for c in range(U.shape[1]):
             U[k, c] = 1.0 if k == c else 0.0
     duration = problem.fraction * 2.0 * math.pi / omega
-    code = run_flow(problem.plan, flow, omega, 0.0, duration, problem.rate)
+    code = run_flow(problem.machine, flow, omega, 0.0, duration, work.rate)
     if code == status.OK:
-        carry_tangent(problem.plan, flow, omega, U, problem.work)
+        carry_tangent(problem.machine, flow, omega, U, work.columns)
         for k in range(U.shape[0]):
             if not math.isfinite(flow.z[k]):
                 return status.NOT_FINITE
@@ -58,48 +87,52 @@ def shoot(problem: Shooting, z: Real, omega: float, U: Real) -> int:
 
 
 @kernel(inline=True)
-def shooting_residual(problem: Shooting, z: Real, omega: float, r: Real, J: Real) -> int:
+def shooting_residual(
+    problem: Shooting, work: ShootingWork, z: Real, omega: float, r: Real, J: Real
+) -> int:
     """r = sign flow(z) - z and J = [dr/dz, dr/d omega], shapes (2 N,) and (2 N, 2 N + 1)."""
     size = r.shape[0]
-    U = problem.tangent
-    code = shoot(problem, z, omega, U)
+    U = work.tangent
+    code = shoot(problem, work, z, omega, U)
     if code != status.OK:
         return code
     for k in range(size):
-        r[k] = problem.sign * problem.flow.z[k] - z[k]
+        r[k] = problem.sign * work.flow.z[k] - z[k]
         for c in range(size):
             J[k, c] = problem.sign * U[k, c]
         J[k, k] -= 1.0
         # The last column is taken at fixed time; the end of the flow moves with omega as well.
         end = problem.fraction * 2.0 * math.pi / omega
-        J[k, size] = problem.sign * (U[k, size] - problem.rate[k] * end / omega)
+        J[k, size] = problem.sign * (U[k, size] - work.rate[k] * end / omega)
     return status.OK
 
 
 @kernel(entry=True)
-def shooting_step(problem: Shooting, z: Real, omega: float, r: Real, J: Real) -> int:
+def shooting_step(
+    problem: Shooting, work: ShootingWork, z: Real, omega: float, r: Real, J: Real
+) -> int:
     """``shooting_residual`` for callers outside the kernels."""
-    return shooting_residual(problem, z, omega, r, J)
+    return shooting_residual(problem, work, z, omega, r, J)
 
 
 @kernel
-def crossings(problem: Shooting) -> int:
+def crossings(work: ShootingWork) -> int:
     """A number that changes when the contacts met in a turn change: crossings, spring by spring."""
-    return contact_number(problem.flow)
+    return contact_number(work.flow)
 
 
 @kernel
-def flow_depths(problem: Shooting, omega: float, depth: Real) -> None:
+def flow_depths(problem: Shooting, work: ShootingWork, omega: float, depth: Real) -> None:
     """Greatest depth in m beyond each gap in the recorded flow, (m, 2): plus and minus side.
 
     Half a turn tells both of a motion that is its own mirror image after it.
     """
-    plan, flow, motion = problem.plan, problem.flow, problem.flow.motion
+    machine, flow, motion = problem.machine, work.flow, work.flow.motion
     for j in range(depth.shape[0]):
         depth[j, 0], depth[j, 1] = -math.inf, -math.inf
     for e in range(flow.segments[0]):
-        segment_motion(plan, flow, e, omega, plan.direction, motion)
-        count = plan.mode_count[flow.slot[e]] + 1
+        segment_motion(flow, e, omega, machine.direction, motion)
+        count = flow.modes.mode_count[flow.slot[e]] + 1
         prepare_search(motion, count)
         for j in range(depth.shape[0]):
             low, high = extremes(motion, count, j, flow.length[e])
@@ -108,14 +141,14 @@ def flow_depths(problem: Shooting, omega: float, depth: Real) -> None:
         if problem.sign < 0.0:
             depth[j, 0] = max(depth[j, 0], depth[j, 1])
             depth[j, 1] = depth[j, 0]
-        depth[j, 0] -= plan.gap_plus[j]
-        depth[j, 1] -= plan.gap_minus[j]
+        depth[j, 0] -= machine.stops.gap[j, 0]
+        depth[j, 1] -= machine.stops.gap[j, 1]
 
 
 @kernel
 def state_scale(problem: Shooting, z: Real, omega: float, scale: Real) -> None:
     """Size of each unknown: the motion's amplitude (m), that times omega for velocities."""
-    n = problem.plan.direction.shape[1]
+    n = problem.machine.direction.shape[1]
     amplitude = problem.length
     for k in range(n):
         amplitude = max(amplitude, math.hypot(z[k], z[n + k] / omega))

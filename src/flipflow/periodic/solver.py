@@ -9,62 +9,82 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import arclength
 from flipflow.continuation.follow import FOLD, TRACE_ALL, follow
-from flipflow.dynamics.assembly import PlanBuilder
 from flipflow.dynamics.flow import Flow
+from flipflow.dynamics.machine import MachineArrays, machine_arrays
+from flipflow.dynamics.modes import contact_free
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import corrected
-from flipflow.periodic.scratch import new_branch, new_corrector, new_shooting
-from flipflow.periodic.shooting import Shooting
+from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-STEP_SHARE = 0.1
-POINTS_MOST = 20_000
+STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size
+POINTS_MOST = 20_000  # of one branch; a few hundred are usual
 
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """Points of a branch as the arc-length loop left them; arrays over the points first."""
+    """Points of a branch as the arc-length loop left them; arrays over the points first.
 
-    u: Real
-    omega: Real
-    tangent: Real
-    jacobian: Real
-    signature: NDArray[np.int64]
-    depth: Real
-    iterations: NDArray[np.int64]
-    rejected: NDArray[np.int64]
-    reason: NDArray[np.int64]
+    ``rejected`` and ``reason`` have one place more, for the step at which the branch ended.
+    """
+
+    record: arclength.Branch
+    rejected: Int
+    reason: Int
     code: int
     course: arclength.Course
-    record: arclength.Branch
 
     @classmethod
     def recorded(
         cls, record: arclength.Branch, points: int, code: int, course: arclength.Course
     ) -> Self:
         """The first ``points`` of a record, and what happened on the way to the next."""
-        return cls(
-            record.u[:points],
-            record.omega[:points],
-            record.tangent[:points],
-            record.jacobian[:points],
-            record.signature[:points],
-            record.depth[:points],
-            record.iterations[:points],
-            record.rejected[: points + 1],
-            record.reason[: points + 1],
-            code,
-            course,
-            record,
-        )
+        kept = arclength.first_points(record, points)
+        rejected, reason = record.rejected[: points + 1], record.reason[: points + 1]
+        return cls(kept, rejected.copy(), reason.copy(), code, course)
+
+    def first(self, points: int) -> Self:
+        """The branch up to a point, as followed to an end there."""
+        kept = arclength.first_points(self.record, points)
+        tried = self.rejected[: points + 1], self.reason[: points + 1]
+        return type(self)(kept, *tried, status.FOLLOWED, self.course)
+
+    @property
+    def u(self) -> Real:
+        """Unknowns, (n, unknowns)."""
+        return self.record.u
+
+    @property
+    def omega(self) -> Real:
+        """Frequency in rad/s, (n,)."""
+        return self.record.omega
+
+    @property
+    def tangent(self) -> Real:
+        """Unit in scaled unknowns, (n, unknowns + 1), the last column in omega."""
+        return self.record.tangent
+
+    @property
+    def jacobian(self) -> Real:
+        """dr/du, or (n, 0, 0) where nothing is read off it."""
+        return self.record.jacobian
+
+    @property
+    def signature(self) -> Int:
+        """A number that changes with the contacts of a turn, 0 without contact, (n,)."""
+        return self.record.signature
+
+    @property
+    def depth(self) -> Real:
+        """Greatest depth in m beyond each gap, (n, m, 2)."""
+        return self.record.depth
 
     def reversed_into(self, ahead: Traced) -> Traced:
         """Read the branch backwards, then ``ahead``, which starts from the same point."""
@@ -73,82 +93,117 @@ class Traced:
         points = back + ahead.omega.size
         ends = (status.REACHED_UPPER, status.REACHED_LOWER, status.FOLLOWED)
         code = self.code if self.code not in ends else ahead.code
+        code = status.FOLLOWED if code in ends else code
         # What is told of a step stands at its end, which is its other point when read backwards.
         none = np.zeros(1, np.int64)
         rejected, reason = (
             np.concatenate([none, mine[turned], its[1:]])
             for mine, its in ((self.rejected, ahead.rejected), (self.reason, ahead.reason))
         )
+        joined = {
+            name: np.concatenate([getattr(self.record, name)[turned], getattr(ahead.record, name)])
+            for name in ("u", "omega", "jacobian", "signature", "depth", "iterations")
+        }
+        opposite = {
+            name: np.concatenate([-getattr(self.record, name)[turned], getattr(ahead.record, name)])
+            for name in ("tangent", "side")
+        }
         record = arclength.Branch(
-            u=np.concatenate([self.u[turned], ahead.u]),
-            omega=np.concatenate([self.omega[turned], ahead.omega]),
-            tangent=np.concatenate([-self.tangent[turned], ahead.tangent]),
-            jacobian=np.concatenate([self.jacobian[turned], ahead.jacobian]),
-            side=np.concatenate([-self.record.side[turned], ahead.record.side[: ahead.omega.size]]),
-            signature=np.concatenate([self.signature[turned], ahead.signature]),
-            depth=np.concatenate([self.depth[turned], ahead.depth]),
-            iterations=np.concatenate([self.iterations[turned], ahead.iterations]),
-            rejected=rejected,
-            reason=reason,
+            **joined, **opposite, rejected=rejected[:points], reason=reason[:points]
         )
-        code = status.FOLLOWED if code in ends else code
-        return Traced.recorded(record, points, code, ahead.course)
+        return Traced(record, rejected, reason, code, ahead.course)
+
+
+@dataclass(frozen=True, eq=False)
+class Formulation:
+    """What is solved for periodic motions of a machine, without any scratch.
+
+    Parameters
+    ----------
+    kind
+        The solver, made anew whenever something is solved.
+    system
+        The machine, its springs without gap moved into the matrices.
+    half_turn, turns
+        As of :class:`Solver`.
+    options
+        What else the solver takes.
+    """
+
+    kind: type[Solver]
+    system: MechanicalSystem
+    half_turn: bool
+    turns: int = 1
+    options: tuple[float, ...] = ()
+
+    def solver(self) -> Solver:
+        """A solver of its own for whoever asks."""
+        return self.kind(self.system, *self.options, half_turn=self.half_turn, turns=self.turns)
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A solved motion: unknowns, tangent's share in omega, and return map or Jacobian."""
+    """A solved motion: unknowns, tangent's share in omega, and return map where it is known."""
 
-    solver: Solver
+    formulation: Formulation
     u: Real
     omega: float
     omega_tangent: float = math.nan
-    jacobian: Real | None = None
     known_map: Real | None = None
 
     @cached_property
     def return_map(self) -> Real:
         """Return map (2 N, 2 N) of a turn, or of half a turn with sign; worked out when asked."""
-        if self.known_map is not None:
-            return self.known_map
-        jacobian = np.zeros((0, 0)) if self.jacobian is None else self.jacobian
-        u, omega = self.u[None], np.array([self.omega])
-        return np.asarray(self.solver.return_maps(u, omega, jacobian[None])[0])
+        return self.formulation.solver().return_map(self)
 
     @property
     def eigenvalues(self) -> Complex:
         """Eigenvalues of the return map, (2 N,)."""
-        return eigenvalues_of(self.return_map)
+        return eigenvalues(self.return_map)
 
 
 class Solver(ABC):
-    """Finds periodic motions of one system at its forcing period.
+    """Finds periodic motions of one machine; holds the scratch, for one caller at a time.
 
     Parameters
     ----------
     system
-        The machine.
+        The machine; springs that always act are moved into C and K first.
     half_turn
         Look for motions that are their own mirror image after half a turn. Every solution then
         has the return map of half a turn, with sign: its eigenvalue +1 is a fold, -1 the loss of
         symmetry, and the multipliers of the full turn are its eigenvalues squared.
+    turns
+        Forcing periods that pass before the motion repeats.
+
+    Raises
+    ------
+    InputError
+        For a machine that has no steady state: see
+        :func:`~flipflow.dynamics.machine.machine_arrays`.
     """
 
     unknowns: int
     problem: Any
+    scratch: Any
     reads_jacobian: bool
-    turns: int = 1
 
-    def __init__(self, system: MechanicalSystem, *, half_turn: bool) -> None:
-        self.builder = PlanBuilder(system)
-        self.system = self.builder.system
-        self.half_turn = half_turn
-        self.length = characteristic_length(self.builder)
-        self._prepare()
+    def __init__(self, system: MechanicalSystem, *, half_turn: bool, turns: int = 1) -> None:
+        self.system = system.with_bonded()
+        self.springs = self.system.springs
+        self.half_turn, self.turns = half_turn, turns
+        self.machine = machine_arrays(self.system)
+        self.length = characteristic_length(self.system, self.machine)
 
-    @abstractmethod
-    def _prepare(self) -> None:
-        """Build the problem and its scratch for the present plan."""
+    @property
+    def options(self) -> tuple[float, ...]:
+        """What the solver takes besides machine, symmetry and turns."""
+        return ()
+
+    @cached_property
+    def formulation(self) -> Formulation:
+        """What this solver solves."""
+        return Formulation(type(self), self.system, self.half_turn, self.turns, self.options)
 
     @abstractmethod
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:
@@ -160,7 +215,7 @@ class Solver(ABC):
 
     def gap_extremes(self, u: Real, omega: Real) -> tuple[Real, Real]:
         """Least and greatest position at each gap, (P, m)."""
-        low, high, _ = self.extremes(u, omega, self.builder.plan.direction)
+        low, high, _ = self.extremes(u, omega, self.machine.direction)
         return low, high
 
     @abstractmethod
@@ -169,10 +224,10 @@ class Solver(ABC):
 
     @abstractmethod
     def motion(self, u: Real, omega: float) -> Motion:
-        """The motion over one turn."""
+        """The motion over one period."""
 
     @abstractmethod
-    def series(self, u: Real, omega: Real) -> tuple[NDArray[np.int64], Complex]:
+    def series(self, u: Real, omega: Real) -> tuple[Int, Complex]:
         """Harmonics (n_h,) and displacement amplitudes (P, n_h, N); empty for an exact motion."""
 
     @abstractmethod
@@ -180,18 +235,31 @@ class Solver(ABC):
         """Unknowns of a known motion, as a guess."""
 
     @property
+    @abstractmethod
     def flow(self) -> Flow:
-        """Scratch whose contact state tells which configuration a kernel found missing."""
-        return self.problem.flow
+        """The flow's scratch, with the modes met so far."""
 
-    def add_missing_configuration(self) -> None:
-        """Prepare the configuration a kernel stopped at, and the problem anew."""
-        self.add_configuration(self.flow)
+    def return_map(self, point: Point) -> Real:
+        """The return map of a point that this solver, or one like it, has found."""
+        if point.known_map is not None:
+            return point.known_map
+        none = np.zeros((1, 0, 0))
+        return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
 
-    def add_configuration(self, flow: Flow) -> None:
-        """Prepare the configuration at which a flow stopped, and the problem anew."""
-        self.builder.add_contact_state(flow.state)
-        self._prepare()
+    def contact_free(self, omega: Real, *, stop_at_contact: bool = False) -> tuple[Complex, int]:
+        """X (n, N) in x = Re(X exp(i omega t)) with all springs open; the first index in contact.
+
+        Raises
+        ------
+        IncompleteError
+            When the open machine has no modes.
+        """
+        answer = np.zeros((omega.size, self.system.size), np.complex128)
+        modes = self.flow.modes
+        first = contact_free(self.machine, modes, omega, answer, stop_at_contact)
+        if first < 0:
+            raise IncompleteError("no modes of the machine with all stops open could be found")
+        return answer, first
 
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
@@ -201,8 +269,13 @@ class Solver(ABC):
 
     def new_branch(self, points: int) -> arclength.Branch:
         """An empty record for up to ``points`` points."""
-        gaps = len(self.builder.springs)
-        return new_branch(self.unknowns, gaps, points, with_jacobian=self.reads_jacobian)
+        gaps = len(self.springs)
+        return arclength.new_branch(self.unknowns, gaps, points, with_jacobian=self.reads_jacobian)
+
+    @cached_property
+    def corrector(self) -> arclength.Corrector:
+        """Scratch of the bordered Newton solves; the last point corrected stands in it."""
+        return arclength.new_corrector(self.unknowns, len(self.springs))
 
     def _follow(
         self,
@@ -214,17 +287,10 @@ class Solver(ABC):
         shares: tuple[float, float] = (0.0, 0.0),
         test: int = 0,
     ) -> tuple[int, int, float]:
-        """The compiled loop, begun anew whenever it finds a configuration missing."""
-        while True:
-            code, points, share = follow(
-                self.problem, self.work, record, u, omega, course, p, *shares, test
-            )
-            if code != status.MISSING_CONFIGURATION:
-                return code, points, share
-            self.add_missing_configuration()
-            if p == TRACE_ALL:
-                record.rejected[:] = 0
-                record.reason[:] = arclength.REASON_NONE
+        """The compiled loop: status, points, share."""
+        return follow(
+            self.problem, self.scratch, self.corrector, record, u, omega, course, p, *shares, test
+        )
 
     def trace_through(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch from (u, omega) both ways, in rising omega at the start."""
@@ -254,21 +320,34 @@ class Solver(ABC):
             raise IncompleteError(
                 f"no point found between two of the branch near {omega:.6g} rad/s"
             )
-        u, omega = self.work.w[:-1].copy(), float(self.work.w[-1])
-        jacobian = self.work.J[:, :-1].copy()
-        return share, Point(self, u, omega, float(self.work.tangent[-1]), jacobian)
+        w, tangent = self.corrector.w, float(self.corrector.tangent[-1])
+        return share, self._point(w[:-1].copy(), float(w[-1]), tangent, self.corrector.J[:, :-1])
+
+    def _point(self, u: Real, omega: float, omega_tangent: float, jacobian: Real) -> Point:
+        """A corrected point; where a Jacobian tells the return map, with it."""
+        known = None
+        if self.reads_jacobian:
+            known = self.return_maps(u[None], np.array([omega]), jacobian[None])[0]
+        return Point(self.formulation, u, omega, omega_tangent, known)
 
     def eigenvalues(self, traced: Traced, maps: Real) -> Complex:
         """Eigenvalues (P, 2 N) of return maps; without contact those of the open machine."""
-        plan, shooting = self.builder.plan, self.shooting(half_turn=self.half_turn)
-        rate = plan.rate[0, : plan.mode_count[0]]
-        rate = np.concatenate([rate, rate[rate.imag > 0.0].conj()])
         free = np.all(traced.depth < 0.0, axis=(1, 2))
-        duration = shooting.fraction * 2.0 * np.pi / traced.omega[free]
         found = np.empty(maps.shape[:-1], np.complex128)
-        found[free] = shooting.sign * np.exp(duration[:, None] * rate)
-        found[~free] = eigenvalues_of(maps[~free])
+        found[~free] = eigenvalues(maps[~free])
+        if free.any():
+            rate = self._open_rates()
+            problem = self.shooting(half_turn=self.half_turn)
+            duration = problem.fraction * 2.0 * np.pi / traced.omega[free]
+            found[free] = problem.sign * np.exp(duration[:, None] * rate)
         return found
+
+    def _open_rates(self) -> Complex:
+        """Eigenvalues of the open machine in 1/s, (2 N,)."""
+        self.contact_free(np.ones(1))
+        modes = self.flow.modes
+        rate = modes.rate[0, : modes.mode_count[0]]
+        return np.concatenate([rate, rate[rate.imag > 0.0].conj()])
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
@@ -277,7 +356,7 @@ class Solver(ABC):
         _, points, _ = self._follow(record, u, omega, course)
         if points == 0:
             return None
-        return Point(self, record.u[0], omega, float(record.tangent[0, -1]), record.jacobian[0])
+        return self._point(record.u[0], omega, float(record.tangent[0, -1]), record.jacobian[0])
 
     def errors(self, u: Real, omega: Real) -> Real:
         """Distance in m of each motion from the exact one; infinite where it is not bounded.
@@ -295,7 +374,7 @@ class Solver(ABC):
         self,
         states: Real,
         omega: Real,
-        harmonics: NDArray[np.int64],
+        harmonics: Int,
         series: Complex,
         *,
         half_turn: bool,
@@ -304,47 +383,30 @@ class Solver(ABC):
         points, size = states.shape
         maps, error = np.empty((points, size, size)), np.empty(points)
         code = np.zeros(points, np.int64)
-        while True:
-            problem = self.shooting(half_turn=half_turn)
-            square, pivot = np.empty((size, size)), np.zeros(size, np.int64)
-            corrected(
-                problem, states.copy(), omega, harmonics, series, square, pivot, np.empty(size),
-                maps, error, code,
-            )  # fmt: skip
-            if not np.any(code == status.MISSING_CONFIGURATION):
-                return maps, error
-            self.add_configuration(problem.flow)
+        square, pivot = np.empty((size, size)), np.zeros(size, np.int64)
+        corrected(
+            self.shooting(half_turn=half_turn), self.shooting_work, states.copy(), omega, harmonics,
+            series, square, pivot, np.empty(size), maps, error, code,
+        )  # fmt: skip
+        return maps, error
 
     def shooting(self, *, half_turn: bool) -> Shooting:
-        """The shooting problem of the present plan, made once."""
-        if half_turn not in self._shooting:
-            self._shooting[half_turn] = new_shooting(
-                self.builder.plan, half_turn=half_turn, length=self.length, turns=self.turns
-            )
-        return self._shooting[half_turn]
+        """The shooting problem over the motion's period, or half of it."""
+        return new_shooting(self.machine, half_turn=half_turn, length=self.length, turns=self.turns)
 
-    def _new_work(self) -> None:
-        self.work = new_corrector(self.unknowns, len(self.builder.springs))
-        self._shooting: dict[bool, Shooting] = {}
+    @cached_property
+    def shooting_work(self) -> ShootingWork:
+        """Scratch of the exact flow."""
+        return new_shooting_work(self.machine)
 
 
-def eigenvalues_of(maps: Real) -> Complex:
-    """Eigenvalues (..., 2 N) of return maps; NaN where the flow failed and there is none."""
-    known = np.isfinite(maps).all(axis=(-2, -1))
-    if known.all():
-        return np.linalg.eigvals(maps).astype(np.complex128)
-    found = np.full(maps.shape[:-1], np.nan, np.complex128)
-    found[known] = np.linalg.eigvals(maps[known])
-    return found
-
-
-def characteristic_length(builder: PlanBuilder) -> float:
+def characteristic_length(system: MechanicalSystem, machine: MachineArrays) -> float:
     """The smallest gap in m that is not zero, else the stroke that the force alone would give."""
-    gaps = [gap for spring in builder.springs for gap in spring.gaps if 0.0 < gap < np.inf]
-    if gaps:
-        return float(min(gaps))
-    system = builder.system
-    push = np.abs(np.linalg.solve(system.M, system.excitation.vector)).max()
-    if system.excitation.power == 0:
+    gaps = machine.stops.gap
+    real = gaps[(gaps > 0.0) & (gaps < np.inf)]
+    if real.size:
+        return float(real.min())
+    push = np.abs(machine.push).max()
+    if machine.power == 0:
         push = np.abs(np.linalg.solve(system.K, system.excitation.vector)).max()
     return float(push) or 1.0

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.periodic.solver import Real
+from flipflow.compiled.arrays import Complex, Real
 
 STABLE, UNSTABLE, UNDETERMINED = "stable", "unstable", "undetermined"
 NEAR_ONE = 1e-6
 SADDLE_NODE_BAND = 0.2
-
-Complex = NDArray[np.complex128]
 
 
 def full_turn(eigenvalues: Complex, *, half_turn: bool) -> Complex:

@@ -5,47 +5,47 @@ from __future__ import annotations
 import math
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.flow import run_flow
-from flipflow.dynamics.plan import Int, Real
-from flipflow.periodic.shooting import Shooting
+from flipflow.periodic.shooting import Shooting, ShootingWork
 
 NOT_SETTLED = -1
 
 
 @kernel
-def next_turn(problem: Shooting, omega: float) -> int:
+def next_turn(problem: Shooting, work: ShootingWork, omega: float) -> int:
     """Carry flow.z over the problem's part of a turn, with its sign."""
     duration = problem.fraction * 2.0 * math.pi / omega
-    code = run_flow(problem.plan, problem.flow, omega, 0.0, duration, problem.rate)
-    for k in range(problem.flow.z.shape[0]):
-        problem.flow.z[k] *= problem.sign
-        if code == status.OK and not math.isfinite(problem.flow.z[k]):
+    code = run_flow(problem.machine, work.flow, omega, 0.0, duration, work.rate)
+    for k in range(work.flow.z.shape[0]):
+        work.flow.z[k] *= problem.sign
+        if code == status.OK and not math.isfinite(work.flow.z[k]):
             code = status.NOT_FINITE
     return code
 
 
 @kernel
-def finish_turn(problem: Shooting, omega: float, begin: float) -> int:
+def finish_turn(problem: Shooting, work: ShootingWork, omega: float, begin: float) -> int:
     """Carry flow.z from time ``begin`` to the end of the turn; at the start of it, nothing."""
-    flow = problem.flow
+    flow = work.flow
     for k in range(flow.z.shape[0]):
         if not math.isfinite(flow.z[k]):
             return status.NOT_FINITE
     if begin == 0.0:
         return status.OK
     duration = 2.0 * math.pi / omega - begin
-    return run_flow(problem.plan, flow, omega, begin, duration, problem.rate)
+    return run_flow(problem.machine, flow, omega, begin, duration, work.rate)
 
 
 @kernel(entry=True)
-def strobe(problem: Shooting, z: Real, omega: float, record: Real) -> int:
+def strobe(problem: Shooting, work: ShootingWork, z: Real, omega: float, record: Real) -> int:
     """States after 1, 2, ... turns from z into ``record`` (T, 2 N): a Poincare section."""
-    flow = problem.flow
+    flow = work.flow
     for k in range(z.shape[0]):
         flow.z[k] = z[k]
     for turn in range(record.shape[0]):
-        code = next_turn(problem, omega)
+        code = next_turn(problem, work, omega)
         if code != status.OK:
             return code
         for k in range(z.shape[0]):
@@ -56,6 +56,7 @@ def strobe(problem: Shooting, z: Real, omega: float, record: Real) -> int:
 @kernel(entry=True)
 def settle_lanes(
     problem: Shooting,
+    work: ShootingWork,
     states: Real,
     begin: Real,
     omega: float,
@@ -74,23 +75,21 @@ def settle_lanes(
     at the end of a turn. A lane that nothing catches within ``most`` turns keeps the label
     NOT_SETTLED. States end where they were caught.
     """
-    flow = problem.flow
+    flow = work.flow
     for lane in range(states.shape[0]):
         for k in range(states.shape[1]):
             flow.z[k] = states[lane, k]
         turns[lane] = 0
         label[lane] = NOT_SETTLED
-        code[lane] = finish_turn(problem, omega, begin[lane])
+        code[lane] = finish_turn(problem, work, omega, begin[lane])
         if code[lane] == status.OK:
             label[lane] = caught(flow.z, centre, form, owner)
         while code[lane] == status.OK and label[lane] == NOT_SETTLED and turns[lane] < most:
-            code[lane] = next_turn(problem, omega)
+            code[lane] = next_turn(problem, work, omega)
             if code[lane] != status.OK:
                 break
             turns[lane] += 1
             label[lane] = caught(flow.z, centre, form, owner)
-        if code[lane] == status.MISSING_CONFIGURATION:
-            return
         for k in range(states.shape[1]):
             states[lane, k] = flow.z[k]
 

@@ -1,4 +1,4 @@
-"""The symmetric motion with one touch a side: a scalar problem.
+"""The symmetric motion with one touch a side, found without a guess: a scalar problem.
 
 One spring with equal gaps is touched for the share s of each half turn. Counting time from the
 moment of contact, the half turn is an engaged piece of length s pi / omega and an open one, and
@@ -8,7 +8,7 @@ touch: one 2 N x 2 N solve, then a 2 x 2 one. Motions of the machine are the zer
 
     f(s) = |F(s, omega)| - 1,
 
-a fold is f_s = 0, a cusp f_s = f_ss = 0.
+a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting has the last word on each.
 """
 
 from __future__ import annotations
@@ -16,21 +16,27 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.contact_search import exponential
-from flipflow.dynamics.flow import Flow, prepare_drive, run_flow
-from flipflow.dynamics.plan import Int, Plan, Real
+from flipflow.dynamics.flow import Flow, new_flow, prepare_drive, run_flow
+from flipflow.dynamics.machine import MachineArrays
+from flipflow.dynamics.modes import Modes, prepare
+from flipflow.model.system import MechanicalSystem
 
 OPEN_SLOT, PLUS_SLOT = 0, 1
-MOST_ROOT_STEPS = 60
+MOST_ROOT_STEPS = 60  # twenty are usual
+SAMPLES = 48  # of the contact share, between which a zero of f is sought
+MOST_MOTIONS = 8
 
 
 class TwoEvent(NamedTuple):
     """Scratch of the scalar problem for 2 N states."""
 
-    plan: Plan
     flow: Flow
     engaged: Real  # (2 N, 2 N) exp(A t) over the touch
     open: Real  # (2 N, 2 N) over the open piece
@@ -44,68 +50,76 @@ class TwoEvent(NamedTuple):
 
 
 @kernel
-def piece_exponential(plan: Plan, slot: int, length: float, out: Real) -> None:
-    """out = exp(A length) of one configuration, by its modes."""
+def piece_exponential(modes: Modes, slot: int, length: float, out: Real) -> None:
+    """out = exp(A length) of one contact state, by its modes."""
     size = out.shape[0]
     for r in range(size):
         for c in range(size):
             out[r, c] = 0.0
-    for i in range(plan.mode_count[slot]):
-        factor = plan.weight[slot, i] * exponential(plan.rate[slot, i] * length)
+    for i in range(modes.mode_count[slot]):
+        factor = modes.weight[slot, i] * exponential(modes.rate[slot, i] * length)
         for r in range(size):
-            v = plan.right[slot, r, i] * factor
+            v = modes.right[slot, r, i] * factor
             for c in range(size):
-                left = plan.left[slot, i, c]
+                left = modes.left[slot, i, c]
                 out[r, c] += v.real * left.real - v.imag * left.imag
 
 
 @kernel
-def required_force(problem: TwoEvent, omega: float, s: float) -> complex:
-    """F of the motion that touches for the share s; its state at contact into problem.z."""
-    plan, flow = problem.plan, problem.flow
-    size = problem.z.shape[0]
+def required_force(machine: MachineArrays, work: TwoEvent, omega: float, s: float) -> complex:
+    """F of the motion that touches for the share s; its state at contact into work.z."""
+    flow = work.flow
+    size = work.z.shape[0]
     half = math.pi / omega
-    prepare_drive(plan, flow, OPEN_SLOT, omega)
-    prepare_drive(plan, flow, PLUS_SLOT, omega)
-    piece_exponential(plan, PLUS_SLOT, s * half, problem.engaged)
-    piece_exponential(plan, OPEN_SLOT, (1.0 - s) * half, problem.open)
+    for slot in (OPEN_SLOT, PLUS_SLOT):
+        if flow.modes.ready[slot] == 0:
+            prepare(machine, flow.modes, slot)
+        if flow.modes.ready[slot] < 0:
+            return complex(math.nan, math.nan)
+        prepare_drive(machine, flow, slot, omega)
+    piece_exponential(flow.modes, PLUS_SLOT, s * half, work.engaged)
+    piece_exponential(flow.modes, OPEN_SLOT, (1.0 - s) * half, work.open)
     turn = exponential(1j * (s * math.pi))
-    _end_of_touch(problem, turn)
+    _end_of_touch(machine, work, turn)
     # -z = open z_end + ..., with z_end = engaged z + end: (I + open engaged) z = right sides.
     for r in range(size):
         for c in range(size):
             total = 1.0 if r == c else 0.0
             for k in range(size):
-                total += problem.open[r, k] * problem.engaged[k, c]
-            problem.A[r, c] = total
-    if not lu_factor(problem.A, problem.pivot):
+                total += work.open[r, k] * work.engaged[k, c]
+            work.A[r, c] = total
+    if not lu_factor(work.A, work.pivot):
         return complex(math.nan, math.nan)
     for part in range(3):
-        _solve_begin(problem, turn, part)
-    return _solve_force(problem, s * half)
+        _solve_begin(work, turn, part)
+    return _solve_force(machine, work, s * half)
 
 
 @kernel
-def _end_of_touch(problem: TwoEvent, turn: complex) -> None:
-    """problem.end: the state at release less exp(A t) z, constant and per part of F."""
-    plan, flow = problem.plan, problem.flow
-    size = problem.z.shape[0]
+def _end_of_touch(machine: MachineArrays, work: TwoEvent, turn: complex) -> None:
+    """work.end: the state at release less exp(A t) z, constant and per part of F."""
+    flow = work.flow
+    size = work.z.shape[0]
+    n, gap = size // 2, machine.stops.gap[0, 0]
     for r in range(size):
         drive = flow.drive[PLUS_SLOT, r] * turn
-        constant, real, imag = plan.rest[PLUS_SLOT, r], drive.real, -drive.imag
+        constant, real, imag = 0.0, drive.real, -drive.imag
+        if r < n:
+            constant = gap * flow.modes.rest[PLUS_SLOT, 0, r]
         for c in range(size):
             before = flow.drive[PLUS_SLOT, c]
-            constant -= problem.engaged[r, c] * plan.rest[PLUS_SLOT, c]
-            real -= problem.engaged[r, c] * before.real
-            imag += problem.engaged[r, c] * before.imag
-        problem.end[r, 0], problem.end[r, 1], problem.end[r, 2] = constant, real, imag
+            if c < n:
+                constant -= work.engaged[r, c] * gap * flow.modes.rest[PLUS_SLOT, 0, c]
+            real -= work.engaged[r, c] * before.real
+            imag += work.engaged[r, c] * before.imag
+        work.end[r, 0], work.end[r, 1], work.end[r, 2] = constant, real, imag
 
 
 @kernel
-def _solve_begin(problem: TwoEvent, turn: complex, part: int) -> None:
-    """One column of problem.begin, and of problem.end with exp(A t) z added."""
-    flow = problem.flow
-    size = problem.z.shape[0]
+def _solve_begin(work: TwoEvent, turn: complex, part: int) -> None:
+    """One column of work.begin, and of work.end with exp(A t) z added."""
+    flow = work.flow
+    size = work.z.shape[0]
     for r in range(size):
         # At the end of the half turn the drive has the opposite sign.
         drive = flow.drive[OPEN_SLOT, r]
@@ -113,55 +127,54 @@ def _solve_begin(problem: TwoEvent, turn: complex, part: int) -> None:
         for c in range(size):
             before = flow.drive[OPEN_SLOT, c] * turn
             driven = 0.0 if part == 0 else before.real if part == 1 else -before.imag
-            total -= problem.open[r, c] * (problem.end[c, part] - driven)
-        problem.column[r] = total
-    lu_solve(problem.A, problem.pivot, problem.column)
+            total -= work.open[r, c] * (work.end[c, part] - driven)
+        work.column[r] = total
+    lu_solve(work.A, work.pivot, work.column)
     for r in range(size):
-        problem.begin[r, part] = problem.column[r]
+        work.begin[r, part] = work.column[r]
     for r in range(size):
         for c in range(size):
-            problem.end[r, part] += problem.engaged[r, c] * problem.column[c]
+            work.end[r, part] += work.engaged[r, c] * work.column[c]
 
 
 @kernel
-def _solve_force(problem: TwoEvent, touch: float) -> complex:
+def _solve_force(machine: MachineArrays, work: TwoEvent, touch: float) -> complex:
     """F from y = e at both ends of the touch; the second as a difference quotient."""
-    plan = problem.plan
-    n = plan.direction.shape[1]
-    gap = plan.gap_plus[0]
+    n = machine.direction.shape[1]
+    gap = machine.stops.gap[0, 0]
     first0, first1, first2 = -gap, 0.0, 0.0
     next0, next1, next2 = 0.0, 0.0, 0.0
     for k in range(n):
-        d = plan.direction[0, k]
-        first0 += d * problem.begin[k, 0]
-        first1 += d * problem.begin[k, 1]
-        first2 += d * problem.begin[k, 2]
-        next0 += d * (problem.end[k, 0] - problem.begin[k, 0]) / touch
-        next1 += d * (problem.end[k, 1] - problem.begin[k, 1]) / touch
-        next2 += d * (problem.end[k, 2] - problem.begin[k, 2]) / touch
+        d = machine.direction[0, k]
+        first0 += d * work.begin[k, 0]
+        first1 += d * work.begin[k, 1]
+        first2 += d * work.begin[k, 2]
+        next0 += d * (work.end[k, 0] - work.begin[k, 0]) / touch
+        next1 += d * (work.end[k, 1] - work.begin[k, 1]) / touch
+        next2 += d * (work.end[k, 2] - work.begin[k, 2]) / touch
     det = first1 * next2 - first2 * next1
     a = (first2 * next0 - first0 * next2) / det
     b = (first0 * next1 - first1 * next0) / det
-    for k in range(problem.z.shape[0]):
-        problem.z[k] = problem.begin[k, 0] + a * problem.begin[k, 1] + b * problem.begin[k, 2]
+    for k in range(work.z.shape[0]):
+        work.z[k] = work.begin[k, 0] + a * work.begin[k, 1] + b * work.begin[k, 2]
     return complex(a, b)
 
 
 @kernel
-def force_excess(problem: TwoEvent, omega: float, s: float) -> float:
+def force_excess(machine: MachineArrays, work: TwoEvent, omega: float, s: float) -> float:
     """f(s) = |F| - 1."""
-    F = required_force(problem, omega, s)
+    F = required_force(machine, work, omega, s)
     return math.sqrt(F.real * F.real + F.imag * F.imag) - 1.0
 
 
 @kernel
 def root_between(
-    problem: TwoEvent, omega: float, a: float, b: float, f_a: float, f_b: float
+    machine: MachineArrays, work: TwoEvent, omega: float, a: float, b: float, f_a: float, f_b: float
 ) -> float:
     """Zero of f in [a, b] by false position with halving of the stale end (Illinois)."""
     for _ in range(MOST_ROOT_STEPS):
         s = (a * f_b - b * f_a) / (f_b - f_a)
-        f = force_excess(problem, omega, s)
+        f = force_excess(machine, work, omega, s)
         if abs(f) < 1e-14 or abs(b - a) < 1e-14:
             return s
         if f * f_b < 0.0:
@@ -174,7 +187,7 @@ def root_between(
 
 @kernel(entry=True)
 def two_event_states(
-    problem: TwoEvent, omega: float, samples: int, states: Real, shares: Real
+    machine: MachineArrays, work: TwoEvent, omega: float, samples: int, states: Real, shares: Real
 ) -> int:
     """All zeros of f that lie more than one sample apart: states at t = 0 and shares; their number.
 
@@ -185,19 +198,19 @@ def two_event_states(
     before, f_before = 0.0, math.nan
     for i in range(samples):
         s = (i + 0.5) / samples
-        f = force_excess(problem, omega, s)
+        f = force_excess(machine, work, omega, s)
         if f * f_before < 0.0 and found < states.shape[0]:
-            root = root_between(problem, omega, before, s, f_before, f)
-            F = required_force(problem, omega, root)
+            root = root_between(machine, work, omega, before, s, f_before, f)
+            F = required_force(machine, work, omega, root)
             phase = math.atan2(F.imag, F.real) % (2.0 * math.pi)
             start = phase / omega
-            for k in range(problem.z.shape[0]):
-                problem.flow.z[k] = problem.z[k]
+            for k in range(work.z.shape[0]):
+                work.flow.z[k] = work.z[k]
             rest = 2.0 * math.pi / omega - start
-            code = run_flow(problem.plan, problem.flow, omega, start, rest, problem.rate)
+            code = run_flow(machine, work.flow, omega, start, rest, work.rate)
             if code == status.OK:
-                for k in range(problem.z.shape[0]):
-                    states[found, k] = problem.flow.z[k]
+                for k in range(work.z.shape[0]):
+                    states[found, k] = work.flow.z[k]
                 shares[found] = root
                 found += 1
         before, f_before = s, f
@@ -205,7 +218,50 @@ def two_event_states(
 
 
 @kernel(entry=True)
-def force_excesses(problem: TwoEvent, omega: Real, shares: Real, out: Real) -> None:
+def force_excesses(
+    machine: MachineArrays, work: TwoEvent, omega: Real, shares: Real, out: Real
+) -> None:
     """f at pairs of omega and s, (P,)."""
     for p in range(omega.shape[0]):
-        out[p] = force_excess(problem, omega[p], shares[p])
+        out[p] = force_excess(machine, work, omega[p], shares[p])
+
+
+class TwoEventProblem:
+    """The scalar problem f(s) = |F(s, omega)| - 1 of a machine with one symmetric stop."""
+
+    def __init__(self, machine: MachineArrays) -> None:
+        size = 2 * machine.direction.shape[1]
+        square = (size, size)
+        self._machine = machine
+        self._work = TwoEvent(
+            flow=new_flow(machine),
+            engaged=np.zeros(square),
+            open=np.zeros(square),
+            A=np.zeros(square),
+            pivot=np.zeros(size, np.int64),
+            column=np.zeros(size),
+            begin=np.zeros((size, 3)),
+            end=np.zeros((size, 3)),
+            z=np.zeros(size),
+            rate=np.zeros(size),
+        )
+
+    @staticmethod
+    def applies(system: MechanicalSystem) -> bool:
+        """Whether the machine has one stop, the same on both sides, with the paper's law."""
+        springs = system.springs
+        return len(springs) == 1 and springs[0].symmetric and springs[0].law == "paper"
+
+    def states(self, omega: float) -> tuple[Real, Real]:
+        """States at t = 0, (k, 2 N), and contact shares, (k,), of the candidates at ``omega``."""
+        states = np.empty((MOST_MOTIONS, self._work.z.size))
+        shares = np.empty(MOST_MOTIONS)
+        found = two_event_states(self._machine, self._work, omega, SAMPLES, states, shares)
+        return states[:found], shares[:found]
+
+    def excess(self, omega: Real, share: Real) -> Real:
+        """f at pairs of omega and contact share, (P,): 0 where the machine has such a motion."""
+        out = np.empty(np.shape(omega))
+        pairs = np.ascontiguousarray(omega), np.ascontiguousarray(share)
+        force_excesses(self._machine, self._work, *pairs, out)
+        return out

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from flipflow.batch.lanes import Capture, Lanes, Run
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.model.arguments import checked_generator
 from flipflow.model.system import Machine, system_of
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Point, Real
+from flipflow.periodic.solver import Point
 from flipflow.periodic.turns import NOT_SETTLED
 from flipflow.studies.capture import capture_of
 from flipflow.studies.periodic_orbits import MOST_PERIODS, attracting_orbits

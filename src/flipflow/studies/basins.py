@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow import __version__
 from flipflow.batch.lanes import Run
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count
 from flipflow.model.monitor import Monitor, silent
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Real
 from flipflow.periodic.turns import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 

@@ -15,8 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.system import Coordinate, MechanicalSystem
-from flipflow.periodic.solver import Point, Real
+from flipflow.periodic.solver import Point
 from flipflow.periodic.turns import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
@@ -65,8 +66,8 @@ class Blows:
         self.attractors = attractors
         self.home = home
         self.omega = point.omega
-        self.turns = point.solver.turns
-        self.motion = point.solver.motion(point.u, point.omega)
+        self.turns = point.formulation.turns
+        self.motion = point.formulation.solver().motion(point.u, point.omega)
         self.mobility = np.linalg.inv(attractors.system.M)
         self.rows = tuple(self._rows(largest))
         self.tried = 0

@@ -20,7 +20,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_lyapunov
 
 from flipflow.batch.lanes import Capture, Lanes
-from flipflow.periodic.solver import Point, Real
+from flipflow.compiled.arrays import Real
+from flipflow.periodic.solver import Point
 
 SAMPLES = 384
 GROWTH, MOST_GROWTH, MOST_HALVINGS = 1.25, 40, 30
@@ -35,10 +36,11 @@ def capture_of(
 
     ``point`` is solved for over whole turns; ``phases`` (turns, 2 N) are its states at their ends.
     """
+    solver = point.formulation.solver()
     centres, forms = [], []
     for z in phases:
-        centre = point.solver.solve(z, point.omega)
-        form = None if centre is None else _form(lanes, centre, rng)
+        centre = solver.solve(z, point.omega)
+        form = None if centre is None else _form(lanes, centre, solver.length, rng)
         if centre is None or form is None:
             return None
         centres.append(centre.u)
@@ -46,11 +48,11 @@ def capture_of(
     return Capture(np.array(centres), np.array(forms), np.full(len(forms), label))
 
 
-def _form(lanes: Lanes, centre: Point, rng: np.random.Generator) -> Real | None:
+def _form(lanes: Lanes, centre: Point, length: float, rng: np.random.Generator) -> Real | None:
     """Form of the largest ellipsoid around a state that passes the trial."""
     n = centre.u.size // 2
     scaled = centre.u / np.repeat([1.0, centre.omega], n)
-    size = float(np.abs(scaled).max()) + centre.solver.length
+    size = float(np.abs(scaled).max()) + length
     scale = size * np.repeat([1.0, centre.omega], n)
     M = centre.return_map * scale / scale[:, None]
     passes = _passes(M)
@@ -83,7 +85,7 @@ def _radius(
     ball[SAMPLES // 2 :] *= rng.uniform(0.05, 1.0, (SAMPLES - SAMPLES // 2, 1))
 
     def falls(radius: float) -> bool:
-        ends = lanes.carry(centre.u + radius * ball @ out.T, passes * centre.solver.turns)
+        ends = lanes.carry(centre.u + radius * ball @ out.T, passes * centre.formulation.turns)
         V = np.linalg.norm((ends - centre.u) @ back.T, axis=1)
         return bool(np.all(radius * np.linalg.norm(ball, axis=1) > V))
 

@@ -45,16 +45,16 @@ def branch_document(branch: Branch) -> Document:
         "method": method_document(branch.method),
         "shortened_steps": [dataclasses.asdict(step) for step in branch.shortened_steps],
         "special_points": [special_point_document(point) for point in branch.special_points],
-        "half_turn": branch.solver.half_turn,
-        "turns": branch.solver.turns,
+        "half_turn": branch.formulation.half_turn,
+        "turns": branch.formulation.turns,
         "saddle_side_at_start": branch.saddle_side_at_start,
         "unknowns": plain(traced.u),
         "tangent": plain(traced.tangent),
         "return_maps": plain(branch.return_maps),
         "course": plain(tuple(traced.course)),
-        "side": plain(traced.record.side[: traced.omega.size]),
+        "side": plain(traced.record.side),
         "signature": plain(traced.signature),
-        "iterations": plain(traced.iterations),
+        "iterations": plain(traced.record.iterations),
         "rejected": plain(traced.rejected),
         "reason": plain(traced.reason),
         "code": traced.code,
@@ -113,7 +113,7 @@ def orbit_document(orbit: Orbit) -> Document:
     system = orbit.system
     return {
         "machine": machine_document(orbit.machine),
-        "method": method_document(method_of(orbit.point.solver)),
+        "method": method_document(method_of(orbit.point.formulation)),
         "omega": orbit.omega,
         "periods": orbit.periods,
         "stability": orbit.stability,
@@ -146,8 +146,8 @@ def _point_document(point: Point) -> Document:
     """A motion as its solver left it."""
     return {
         "omega": point.omega,
-        "half_turn": point.solver.half_turn,
-        "turns": point.solver.turns,
+        "half_turn": point.formulation.half_turn,
+        "turns": point.formulation.turns,
         "unknowns": plain(point.u),
         "return_map": plain(point.return_map),
     }

@@ -194,7 +194,7 @@ def jump_risk(
             "edge of a jump. Try a speed a little lower."
         )
     blows = Blows(attractors, point, home, largest_impulse)
-    turns = point.solver.turns
+    turns = point.formulation.turns
     phases = 2.0 * np.pi * np.arange(PHASES * turns) / PHASES
     every = np.arange(len(blows.rows))
     if len(attractors.orbits) == 1:

@@ -89,6 +89,6 @@ def _marched(solver: ExactSolver, start: Orbit, speeds: Real) -> Iterator[Orbit]
 
 
 def _leans(orbit: Orbit, solver: ExactSolver) -> bool:
-    gap = solver.builder.springs[0].direction
+    gap = solver.springs[0].direction
     low, high, _ = solver.extremes(orbit.unknowns[None], np.array([orbit.omega]), gap[None])
     return abs(float(low[0, 0] + high[0, 0])) > LEAN * solver.length

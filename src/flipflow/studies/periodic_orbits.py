@@ -8,6 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError
@@ -16,8 +17,8 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import STEP_SHARE, Point, Real
-from flipflow.periodic.two_event_starts import TwoEventProblem
+from flipflow.periodic.solver import STEP_SHARE, Point
+from flipflow.periodic.two_event import TwoEventProblem
 from flipflow.transient.settle import Settling
 
 STARTS = 64
@@ -76,8 +77,8 @@ def periodic_orbits(
     checked_count("max_periods", max_periods, MOST_PERIODS)
     search = _Search(machine, checked_speed(omega), max_periods)
     starts = search.starts(checked_generator(rng))
-    if TwoEventProblem.applies(search.settling.solver.builder):
-        starts += list(TwoEventProblem(search.settling.solver.builder).states(search.omega)[0])
+    if TwoEventProblem.applies(search.settling.solver.system):
+        starts += list(TwoEventProblem(search.settling.solver.machine).states(search.omega)[0])
     for k, start in enumerate(starts):
         search.try_from(start)
         if monitor is not None:
@@ -112,11 +113,11 @@ class _Search:
         """Rest, the branch from below, a cloud of states, and stepped speeds."""
         solver = self.settling.solver
         n = solver.system.size
-        X = np.abs(solver.builder.contact_free(np.array([self.omega]))[0])
-        gaps = [g for s in solver.builder.springs for g in s.gaps if math.isfinite(g)]
+        X = np.abs(solver.contact_free(np.array([self.omega]))[0][0])
+        gaps = [g for s in solver.springs for g in s.gaps if math.isfinite(g)]
         size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
         box = np.concatenate([size, self.omega * size])
-        cloud = _spread(STARTS if solver.builder.springs else 0, 2 * n, rng)
+        cloud = _spread(STARTS if solver.springs else 0, 2 * n, rng)
         stepped = (self._stepped(ratio) for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO))
         return [
             np.zeros(2 * n),
@@ -185,7 +186,7 @@ class _Search:
     def _keep(self, point: Point) -> None:
         """Add a motion unless it is known, in whatever phase."""
         for known in self.found:
-            if known.solver.turns == point.solver.turns and any(
+            if known.formulation.turns == point.formulation.turns and any(
                 self.settling.same(point.u, phase, self.omega)
                 for phase in self.settling.phases(known)
             ):
@@ -194,7 +195,7 @@ class _Search:
 
     def _mirrored(self, point: Point) -> Point:
         """The mirror image: minus the state half a turn later."""
-        solver = self.settling.solver_of(point.solver.turns)
+        solver = self.settling.solver_of(point.formulation.turns)
         motion = solver.motion(point.u, self.omega)
         t = math.pi / self.omega
         state = -np.concatenate([motion.derivative(t, 0), motion.derivative(t, 1)])
@@ -243,7 +244,5 @@ def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:
 def _reach(orbit: Orbit, which: Real) -> float:
     """Half peak-to-peak at the first gap, in m, in steps that hide rounding between mirrors."""
     vector = which[: orbit.system.size]
-    low, high, _ = orbit.point.solver.extremes(
-        orbit.unknowns[None], np.array([orbit.omega]), vector[None]
-    )
-    return round(float(high[0, 0] - low[0, 0]) / 2.0, 9)
+    low, high, _ = orbit.motion.extremes(vector[None])
+    return round(float(high[0] - low[0]) / 2.0, 9)

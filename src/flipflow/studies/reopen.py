@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
 from flipflow.continuation.field_path import FieldPoint
-from flipflow.continuation.frequency_response import solver_for
+from flipflow.continuation.frequency_response import formulation_of
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.model.vary import Distribution
-from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.options import Method
+from flipflow.periodic.options import Method, PiecewiseExact
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Point, Solver, Traced
+from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.results.codec import Codec, Form, array
 from flipflow.studies.documents import (
     branch_document,
@@ -45,29 +45,30 @@ from flipflow.transient.settle import Settled
 from flipflow.transient.sweep import Jump, Sweep
 
 Document = Mapping[str, Any]
-SolverOf = Callable[[bool, int], Solver]
+FormulationFor = Callable[[bool, int], Formulation]
 
 
 def branch_from(document: Document) -> Branch:
     """The branch that :func:`flipflow.studies.documents.branch_document` wrote."""
     machine, method = machine_from(document["machine"]), method_from(document["method"])
-    solver_of = _solvers(machine, method)
-    solver = solver_of(document["half_turn"], document["turns"])
-    traced = _traced_from(document, solver)
-    points, n = traced.omega.size, solver.system.size
+    formulation_for = _formulations(machine, method)
+    formulation = formulation_for(document["half_turn"], document["turns"])
+    traced = _traced_from(document, formulation.solver())
+    points, n = traced.omega.size, formulation.system.size
     return Branch(
         machine=machine,
         method=method,
-        solver=solver,
+        formulation=formulation,
         traced=traced,
-        return_maps=_return_maps(document, solver),
+        return_maps=_return_maps(document, n),
         saddle_side_at_start=document["saddle_side_at_start"],
         multipliers=array(document["multipliers"], complex).reshape(points, 2 * n),
         stability=np.asarray(document["stability"], dtype="<U12"),
         # Where a branch meets another, the point is one of the other's motions.
         special_points=tuple(
             SpecialPoint(
-                orbit=Orbit(machine, _point_from(one, solver_of), one["stability"]), **_place(one)
+                orbit=Orbit(machine, _point_from(one, formulation_for), one["stability"]),
+                **_place(one),
             )
             for one in document["special_points"]
         ),
@@ -77,20 +78,19 @@ def branch_from(document: Document) -> Branch:
     )
 
 
-def _solvers(machine: Machine, method: Method) -> SolverOf:
-    """Solvers by whether they look for half a turn, and by turns, each made once."""
+def _formulations(machine: Machine, method: Method) -> FormulationFor:
+    """Formulations by whether they look for half a turn, and by turns, each made once."""
     system = machine.system()
 
     @cache
-    def solver_of(half_turn: bool, turns: int) -> Solver:
-        return solver_for(system, method, half_turn=half_turn, turns=turns)
+    def formulation_for(half_turn: bool, turns: int) -> Formulation:
+        return formulation_of(system, method, half_turn=half_turn, turns=turns)
 
-    return solver_of
+    return formulation_for
 
 
-def _return_maps(document: Document, solver: Solver) -> np.ndarray[Any, np.dtype[np.float64]]:
-    size = 2 * solver.system.size
-    return array(document["return_maps"]).reshape(-1, size, size)
+def _return_maps(document: Document, n: int) -> Real:
+    return array(document["return_maps"]).reshape(-1, 2 * n, 2 * n)
 
 
 def _traced_from(document: Document, solver: Solver) -> Traced:
@@ -107,18 +107,20 @@ def _traced_from(document: Document, solver: Solver) -> Traced:
     record.signature[:points] = document["signature"]
     record.iterations[:points] = document["iterations"]
     if solver.reads_jacobian:
-        record.jacobian[:points] = _return_maps(document, solver) - np.eye(solver.unknowns)
+        record.jacobian[:points] = _return_maps(document, solver.system.size) - np.eye(
+            solver.unknowns
+        )
     tried = len(document["rejected"])
     record.rejected[:tried], record.reason[:tried] = document["rejected"], document["reason"]
     course = arclength.Course(*document["course"])
     return Traced.recorded(record, points, document["code"], course)
 
 
-def _point_from(document: Document, solver_of: SolverOf) -> Point:
+def _point_from(document: Document, formulation_for: FormulationFor) -> Point:
     """A motion as its solver left it."""
-    solver = solver_of(document["half_turn"], document["turns"])
+    formulation = formulation_for(document["half_turn"], document["turns"])
     known = array(document["return_map"])
-    return Point(solver, array(document["unknowns"]), document["omega"], known_map=known)
+    return Point(formulation, array(document["unknowns"]), document["omega"], known_map=known)
 
 
 def _place(document: Document) -> dict[str, Any]:
@@ -129,7 +131,7 @@ def _place(document: Document) -> dict[str, Any]:
 def orbit_from(document: Document) -> Orbit:
     """The motion that :func:`flipflow.studies.documents.orbit_document` wrote."""
     machine, method = machine_from(document["machine"]), method_from(document["method"])
-    point = _point_from(document, _solvers(machine, method))
+    point = _point_from(document, _formulations(machine, method))
     return Orbit(machine, point, document["stability"])
 
 
@@ -139,9 +141,9 @@ def field_branch_from(document: Document) -> FieldBranch:
 
     def orbit_at(value: float, one: Document, word: str) -> Orbit:
         machine = screen.replace(**{field: value})
-        solver = ExactSolver(machine.system(), half_turn=one["half_turn"], turns=one["turns"])
+        formulation = _formulations(machine, PiecewiseExact())(one["half_turn"], one["turns"])
         point = FieldPoint(
-            solver, array(one["unknowns"]), one["omega"],
+            formulation, array(one["unknowns"]), one["omega"],
             known_map=array(one["return_map"]), value=value,
         )  # fmt: skip
         return Orbit(machine, point, word)
@@ -169,16 +171,11 @@ def field_branch_from(document: Document) -> FieldBranch:
 def sweep_from(document: Document) -> Sweep:
     """The sweep that :func:`flipflow.studies.documents.sweep_document` wrote."""
     machine = machine_from(document["machine"])
-    solver = ExactSolver(system_of(machine), half_turn=False)
-
-    @cache
-    def solver_of(_half_turn: bool, turns: int) -> Solver:
-        return solver if turns == 1 else solver.with_turns(turns)
-
+    formulation_for = _formulations(machine, PiecewiseExact())
     rows = []
     for k, (states, one) in enumerate(zip(document["states"], document["points"], strict=True)):
         recent = array(states)
-        point = None if one is None else _point_from(one, solver_of)
+        point = None if one is None else _point_from(one, formulation_for)
         distance = np.inf if point is None else document["distance"][k]
         turns, settled = document["turns"][k], document["settled"][k]
         rows.append(Settled(recent[-1].copy(), turns, point, distance, settled, recent))
@@ -189,7 +186,7 @@ def sweep_from(document: Document) -> Sweep:
         jumps=tuple(Jump(**jump) for jump in document["jumps"]),
         max_periods=document["max_periods"],
         most_turns=document["most_turns"],
-        solver=solver,
+        formulation=formulation_for(False, 1),
         version=document["version"],
         complete=document.get("complete", True),
     )

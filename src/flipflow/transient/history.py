@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import IncompleteError, InputError
+from flipflow.model.contact_law import ENTERED, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,16 @@ class History:
         object.__setattr__(self, "counters", MappingProxyType(dict(self.counters)))
         object.__setattr__(self, "works", MappingProxyType(dict(self.works)))
 
+    def __getstate__(self) -> dict[str, object]:
+        """Read-only mappings cannot be sent to another process: they go as dictionaries."""
+        state = self.__dict__.items()
+        return {key: dict(v) if isinstance(v, MappingProxyType) else v for key, v in state}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        for key, value in state.items():
+            frozen = MappingProxyType(value) if isinstance(value, dict) else value
+            object.__setattr__(self, key, frozen)
+
     def __repr__(self) -> str:
         return f"History({self.t.size} times, {self.t[0]:.6g} to {self.t[-1]:.6g} s)"
 
@@ -143,22 +152,18 @@ class History:
         return np.asarray(self.torque * self.omega)
 
 
-def stop_forces(system: MechanicalSystem, x: Real, v: Real, contacts: NDArray[np.int64]) -> Real:
+def stop_forces(system: MechanicalSystem, x: Real, v: Real, regimes: Int) -> Real:
     """Force of each spring of the machine as given, (n, m), from x and x', (n, N).
 
-    ``contacts`` has a column for each spring with a gap that can act: +1 or -1 where it is engaged.
+    ``regimes`` has a column for each spring with a gap that can act.
     """
     force = np.zeros((x.shape[0], len(system.springs)))
-    column = 0
+    columns = iter(regimes.T)
     for j, spring in enumerate(system.springs):
+        if not spring.acts:
+            continue
+        regime = np.full(x.shape[0], ENTERED) if spring.bonded else next(columns)
         y, rate = x @ spring.direction, v @ spring.direction
-        if spring.bonded:
-            force[:, j] = spring.stiffness * y + spring.damping * rate
-        elif spring.acts:
-            state = contacts[:, column]
-            column += 1
-            plus, minus = spring.gaps
-            gap = np.where(state == 1, plus, np.where(state == -1, -minus, 0.0))
-            pushed = spring.stiffness * (y - gap) + spring.damping * rate
-            force[:, j] = np.where(np.abs(state) == 1, pushed, 0.0)
+        of = spring.law, spring.stiffness, spring.damping, spring.gaps
+        force[:, j] = force_in(*of, regime, y, rate)
     return force

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.scratch import MOST_SEGMENTS
 from flipflow.transient.sampling import Budget, Changes, Table, sample_motion
 
 Real = NDArray[np.float64]
@@ -86,20 +86,14 @@ class Recording:
         """State at ``until``; None, and nothing recorded, where the flow does not end."""
         capacity = (TURNS_A_CALL + 2) * MOST_SEGMENTS
         kept = budget.work.copy()
-        while True:
-            changes = Changes(
-                np.empty(capacity), np.empty(capacity, np.int64), np.empty(capacity, np.int64),
-                np.zeros(1, np.int64),
-            )  # fmt: skip
-            problem = solver.turn
-            problem.flow.z[:] = z
-            code, row = sample_motion(
-                problem, omega, t, until, self.row, self.table, changes, budget
-            )
-            if code != status.MISSING_CONFIGURATION:
-                break
-            budget.work[:] = kept
-            solver.add_configuration(problem.flow)
+        changes = Changes(
+            np.empty(capacity), np.empty(capacity, np.int64), np.empty(capacity, np.int64),
+            np.zeros(1, np.int64),
+        )  # fmt: skip
+        solver.flow.z[:] = z
+        code, row = sample_motion(
+            solver.whole, solver.scratch, omega, t, until, self.row, self.table, changes, budget
+        )
         if code != status.OK:
             budget.work[:] = kept
             return None
@@ -111,4 +105,4 @@ class Recording:
             changes.state[:count].tolist(),
             strict=True,
         )
-        return problem.flow.z.copy()
+        return solver.flow.z.copy()

@@ -12,10 +12,10 @@ import math
 from typing import NamedTuple
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.flow import contact_state
-from flipflow.dynamics.plan import Int, Real
-from flipflow.transient.unsteady import Equations, slopes, switch, switching
+from flipflow.model.contact_law import MOST_EXITS
+from flipflow.transient.unsteady import Equations, set_regimes, slopes, switch, switching
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.9, 0.2, 5.0
 MOST_TRIALS = 60
@@ -25,6 +25,7 @@ MOST_AT_ONCE = 100
 SLIVER = 1e-9
 STEPS, EVENTS, REJECTED, TRIALS, ROWS, CHANGES, AT_ONCE = range(7)
 SMALLEST = 1e-12
+WAYS = max(2, MOST_EXITS)  # switching functions of a spring, and of the shaft
 
 
 class Walk(NamedTuple):
@@ -39,7 +40,7 @@ class Walk(NamedTuple):
     longest: float  # longest step
     step: Real  # (1,) next step
     time: Real  # (1,)
-    state: Int  # (m,) contact state of each spring
+    regime: Int  # (m,) of each spring
     s: Real  # (n,) running state
     end: Real  # (n,) state at the end of a trial step
     rows: Real  # (S + 1, n) slopes of the stages, and at the end
@@ -47,9 +48,9 @@ class Walk(NamedTuple):
     t: Real  # (R,) record
     record: Real  # (R, n)
     rate: Real  # (R, n) slopes
-    states: Int  # (R, m)
+    regimes: Int  # (R, m)
     change_time: Real  # (R,)
-    change: Int  # (R, 2) spring and its state then
+    change: Int  # (R, 2) spring and its regime then
 
 
 @kernel(inline=True)
@@ -64,7 +65,7 @@ def attempt(eq: Equations, walk: Walk, h: float) -> None:
                 weight = walk.a[i, j] if i < stages else walk.b[j]
                 total += weight * walk.rows[j, k]
             walk.end[k] = walk.s[k] + h * total
-        slopes(eq, walk.state, walk.end, walk.rows, i)
+        slopes(eq, walk.regime, walk.end, walk.rows, i)
 
 
 @kernel(inline=True)
@@ -131,14 +132,14 @@ def _first(eq: Equations, walk: Walk, h: float, skip: int) -> tuple[int, float]:
     stages = walk.b.shape[0]
     found = -1
     soonest = 2.0
-    for number in range(2 * walk.state.shape[0] + 2):
+    for number in range(WAYS * walk.regime.shape[0] + WAYS):
         if number == skip:
             continue
-        j, which = number // 2, number % 2
-        g1, s1 = switching(eq, walk.state, walk.end, walk.rows, stages, j, which)
+        j, which = number // WAYS, number % WAYS
+        g1, s1 = switching(eq, walk.regime, walk.end, walk.rows, stages, j, which)
         if not g1 > -math.inf:
             continue
-        g0, s0 = switching(eq, walk.state, walk.s, walk.rows, 0, j, which)
+        g0, s0 = switching(eq, walk.regime, walk.s, walk.rows, 0, j, which)
         share = _expected(h, g0, s0, g1, s1)
         if abs(share) < abs(soonest):
             found, soonest = number, share
@@ -153,8 +154,8 @@ def _locate(eq: Equations, walk: Walk, number: int, longest: float, guess: float
     change from not above zero to above.
     """
     stages = walk.b.shape[0]
-    j, which = number // 2, number % 2
-    g, s = switching(eq, walk.state, walk.s, walk.rows, 0, j, which)
+    j, which = number // WAYS, number % WAYS
+    g, s = switching(eq, walk.regime, walk.s, walk.rows, 0, j, which)
     low, high = 0.0, longest
     # What stands above zero already, and rises, acts at once.
     h = 0.0 if g >= 0.0 and s > 0.0 else guess
@@ -163,7 +164,7 @@ def _locate(eq: Equations, walk: Walk, number: int, longest: float, guess: float
         attempt(eq, walk, h)
         if h == 0.0:
             break
-        g, s = switching(eq, walk.state, walk.end, walk.rows, stages, j, which)
+        g, s = switching(eq, walk.regime, walk.end, walk.rows, stages, j, which)
         if g > 0.0:
             high = h
         else:
@@ -180,7 +181,7 @@ def _event(eq: Equations, walk: Walk, h: float) -> tuple[float, int]:
     """Shorten the trial step to its first event: its length, and the switching function or -1."""
     stages = walk.b.shape[0]
     fired = -1
-    for _ in range(2 * walk.state.shape[0] + 2):
+    for _ in range(WAYS * walk.regime.shape[0] + WAYS):
         number, share = _first(eq, walk, h, fired)
         if number < 0:
             break
@@ -188,7 +189,9 @@ def _event(eq: Equations, walk: Walk, h: float) -> tuple[float, int]:
             # It touches and turns back: the step ends at the touch, and is looked at again.
             h *= -share
             attempt(eq, walk, h)
-            g, _ = switching(eq, walk.state, walk.end, walk.rows, stages, number // 2, number % 2)
+            g, _ = switching(
+                eq, walk.regime, walk.end, walk.rows, stages, number // WAYS, number % WAYS
+            )
             fired = -1
             if g <= 0.0:
                 break
@@ -207,8 +210,8 @@ def _write(walk: Walk) -> None:
     for k in range(walk.s.shape[0]):
         walk.record[row, k] = walk.s[k]
         walk.rate[row, k] = walk.rows[0, k]
-    for j in range(walk.state.shape[0]):
-        walk.states[row, j] = walk.state[j]
+    for j in range(walk.regime.shape[0]):
+        walk.regimes[row, j] = walk.regime[j]
 
 
 @kernel(inline=True)
@@ -229,12 +232,12 @@ def _accept(walk: Walk, h: float) -> bool:
 @kernel(inline=True)
 def _change(eq: Equations, walk: Walk, number: int) -> None:
     """Carry out a change of contact and record it, with a second row at the same time."""
-    switch(eq, walk.state, walk.s, number // 2, number % 2)
-    slopes(eq, walk.state, walk.s, walk.rows, 0)
+    switch(eq, walk.regime, walk.s, number // WAYS, number % WAYS)
+    slopes(eq, walk.regime, walk.s, walk.rows, 0)
     event = walk.tally[CHANGES]
     walk.change_time[event] = walk.time[0]
-    walk.change[event, 0] = number // 2
-    walk.change[event, 1] = walk.state[number // 2]
+    walk.change[event, 0] = number // WAYS
+    walk.change[event, 1] = walk.regime[number // WAYS]
     walk.tally[CHANGES] += 1
     walk.tally[EVENTS] += 1
     _write(walk)
@@ -243,15 +246,8 @@ def _change(eq: Equations, walk: Walk, number: int) -> None:
 @kernel(entry=True)
 def begin(eq: Equations, walk: Walk) -> None:
     """Set the contacts at the running state and write the first row."""
-    n = eq.vector.shape[0]
-    for j in range(walk.state.shape[0]):
-        y = 0.0
-        v = 0.0
-        for i in range(n):
-            y += eq.direction[j, i] * walk.s[i]
-            v += eq.direction[j, i] * walk.s[n + i]
-        walk.state[j] = contact_state(eq.contact, j, y, v)
-    slopes(eq, walk.state, walk.s, walk.rows, 0)
+    set_regimes(eq, walk.regime, walk.s)
+    slopes(eq, walk.regime, walk.s, walk.rows, 0)
     _write(walk)
 
 
@@ -284,8 +280,8 @@ def _finish(eq: Equations, walk: Walk, h: float, until: float) -> int:
     if number < 0:
         walk.tally[AT_ONCE] = 0
         return status.OK
-    if number // 2 == walk.state.shape[0]:
-        return status.REACHED_UPPER if number % 2 == 0 else status.REACHED_LOWER
+    if number // WAYS == walk.regime.shape[0]:
+        return status.REACHED_UPPER if number % WAYS == 0 else status.REACHED_LOWER
     _change(eq, walk, number)
     walk.tally[AT_ONCE] = walk.tally[AT_ONCE] + 1 if length <= SLIVER * h else 0
     return status.TOO_MANY_EVENTS if walk.tally[AT_ONCE] > MOST_AT_ONCE else status.OK
@@ -298,7 +294,7 @@ def advance(eq: Equations, walk: Walk, until: float) -> int:
     The slopes at the running state are written anew: what excites the machine may have changed.
     """
     adaptive = walk.relative > 0.0
-    slopes(eq, walk.state, walk.s, walk.rows, 0)
+    slopes(eq, walk.regime, walk.s, walk.rows, 0)
     while walk.time[0] < until:
         if walk.tally[ROWS] + 2 > walk.t.shape[0]:
             return status.POINT_LIMIT

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.solver import STEP_SHARE, Point, Real
+from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import STABLE, stability_words
 
 MOST_TURNS = 4000
@@ -132,7 +133,7 @@ class Settling:
 
     def phases(self, point: Point) -> Real:
         """States of a motion after 1, 2, ... all of its forcing periods, the last its own."""
-        return self.solver.section(point.u, point.omega, point.solver.turns)
+        return self.solver.section(point.u, point.omega, point.formulation.turns)
 
     def same(self, z: Real, other: Real, omega: float) -> bool:
         """Whether two states differ by less than 1e-6 of the motion's size."""
@@ -143,8 +144,8 @@ class Settling:
         """The same motion with the least number of forcing periods after which it repeats."""
         phases = self.phases(point)
         repeats = (n for n, z in enumerate(phases, 1) if self.same(point.u, z, point.omega))
-        periods = next(repeats, point.solver.turns)
-        if periods == point.solver.turns:
+        periods = next(repeats, point.formulation.turns)
+        if periods == point.formulation.turns:
             return point
         return self.solver_of(periods).solve(point.u, point.omega) or point
 
@@ -167,7 +168,7 @@ class Settling:
             low, high, high - low, STEP_SHARE, math.copysign(1.0, omega - point.omega),
             arclength.QUICK,
         )  # fmt: skip
-        solver = self.solver_of(point.solver.turns)
+        solver = self.solver_of(point.formulation.turns)
         traced = solver.trace(point.u, point.omega, course)
         reached = traced.code in (status.REACHED_UPPER, status.REACHED_LOWER)
         if not reached or traced.omega[-1] != omega:
@@ -191,7 +192,7 @@ class Settling:
     def _turns_to_go(point: Point, distance: float, aim: float) -> int:
         """Turns after which the leading multiplier has brought the distance down to ``aim``."""
         rho = float(np.abs(point.eigenvalues).max())
-        periods = point.solver.turns
+        periods = point.formulation.turns
         if rho == 0.0 or distance <= aim:
             return periods
         return min(periods * (1 + math.ceil(math.log(aim / distance) / math.log(rho))), 4 * RECENT)

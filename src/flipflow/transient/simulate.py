@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_speed
+from flipflow.model.contact_law import engaged_side
 from flipflow.model.disturbance import Disturbance, Impulse, LoadStep
 from flipflow.model.elements import Unbalance
 from flipflow.model.monitor import Monitor
@@ -211,8 +212,10 @@ class _Run:
     def events(self) -> tuple[ContactChange, ...]:
         """Every change of contact."""
         return tuple(
-            ContactChange(t, self.kept[spring], state if abs(state) == 1 else 0)
-            for t, spring, state in self.recording.changes
+            ContactChange(
+                t, self.kept[j], int(engaged_side(self.springs[self.kept[j]].law, regime))
+            )
+            for t, j, regime in self.recording.changes
         )
 
     def _strike(self, blow: Disturbance) -> None:

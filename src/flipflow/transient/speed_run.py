@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.model.contact_law import engaged_side
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
@@ -209,8 +210,8 @@ def _history(
             "friction": float(rubbed[-1]),
         },
         events=tuple(
-            ContactChange(time, columns[j], state if abs(state) == 1 else 0)
-            for time, j, state in changes
+            ContactChange(time, columns[j], int(engaged_side(stepper.springs[j].law, regime)))
+            for time, j, regime in changes
         ),
         status=ended, notes=(), method=f"event-located Runge-Kutta, {stepper.method.formula}",
         counters=stepper.counters,

@@ -13,8 +13,8 @@ from flipflow.errors import Cancelled
 from flipflow.model.arguments import checked_count, checked_speeds
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
-from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.periodic.solver import Formulation
 from flipflow.transient.settle import MOST_TURNS, Settled, Settling
 
 Real = NDArray[np.float64]
@@ -54,8 +54,8 @@ class Sweep:
         Where the motion jumped.
     max_periods, most_turns
         Longest period looked for, and most forcing periods waited at a step.
-    solver
-        The solver of motions of one forcing period.
+    formulation
+        The equations of motions of one forcing period.
     version
         Version of flipflow.
     complete
@@ -68,7 +68,7 @@ class Sweep:
     jumps: tuple[Jump, ...]
     max_periods: int
     most_turns: int
-    solver: ExactSolver
+    formulation: Formulation
     version: str
     complete: bool = True
 
@@ -79,7 +79,7 @@ class Sweep:
     @property
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
-        return self.solver.system
+        return self.formulation.system
 
     @property
     def settled(self) -> NDArray[np.bool_]:
@@ -90,7 +90,7 @@ class Sweep:
     def periods(self) -> NDArray[np.int64]:
         """Forcing periods after which the motion repeats; 0 where it did not settle."""
         return np.array(
-            [row.point.solver.turns if row.point is not None and row.settled else 0
+            [row.point.formulation.turns if row.point is not None and row.settled else 0
              for row in self.rows]
         )  # fmt: skip
 
@@ -125,9 +125,8 @@ class Sweep:
         if key not in self._seen:
             turns = [row.recent.shape[0] for row in self.rows]
             states = np.concatenate([row.recent for row in self.rows])
-            low, high, _ = self.solver.extremes(
-                states, np.repeat(self.omega, turns), np.array([key])
-            )
+            solver = self.formulation.solver()
+            low, high, _ = solver.extremes(states, np.repeat(self.omega, turns), np.array([key]))
             starts = np.cumsum([0, *turns[:-1]])
             self._seen[key] = (
                 np.minimum.reduceat(low[:, 0], starts), np.maximum.reduceat(high[:, 0], starts),
@@ -208,7 +207,7 @@ def sweep(
     done = len(rows)
     return Sweep(
         machine, speeds[:done], tuple(rows), tuple(jumps), max_periods, most_turns,
-        settling.solver, __version__, complete=done == speeds.size,
+        settling.solver.formulation, __version__, complete=done == speeds.size,
     )  # fmt: skip
 
 
@@ -216,7 +215,7 @@ def _kept(row: Settled) -> Settled:
     """A row with the states of one period only where the motion repeats."""
     if row.point is None or not row.settled:
         return row
-    return replace(row, recent=row.recent[-row.point.solver.turns :])
+    return replace(row, recent=row.recent[-row.point.formulation.turns :])
 
 
 def _jumped(settling: Settling, before: Settled, after: Settled, omega: float) -> bool:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.dynamics.contact_search import Contact
+from flipflow.dynamics.machine import stops_of
 from flipflow.errors import InputError
+from flipflow.model.contact_law import stored_energy
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.elements import Unbalance
 from flipflow.model.system import MechanicalSystem
@@ -129,7 +130,7 @@ class Stepper:
         self._acceleration = np.zeros(1)
         self.equations = Equations(
             inverse_mass=inverse, damping=C, stiffness=K,
-            direction=self._directions(), contact=_contact(linear), vector=vector,
+            direction=self._directions(), stops=stops_of(linear.springs), vector=vector,
             unbalance=int(unbalance), shaft=_shaft(drive, end_speeds, self._acceleration),
             pull=np.zeros(self.size), lever=np.zeros(self.size), push=np.zeros(self.size),
             answer=np.zeros(self.size),
@@ -185,12 +186,10 @@ class Stepper:
         n = self.size
         x, v, angle, speed = state[:n], state[n : 2 * n], state[2 * n], state[2 * n + 1]
         energy = 0.5 * float(v @ self.M @ v + x @ self.K @ x)
-        for j, spring in enumerate(self.springs):
-            if abs(contacts[j]) == 1:
-                plus, minus = spring.gaps
-                gap = plus if contacts[j] > 0 else -minus
-                depth = spring.direction @ x[: spring.direction.size] - gap
-                energy += 0.5 * spring.stiffness * float(depth) ** 2
+        for spring, regime in zip(self.springs, contacts, strict=True):
+            y = np.asarray(spring.direction @ x[: spring.direction.size])
+            held = stored_energy(spring.law, spring.stiffness, spring.gaps, np.asarray(regime), y)
+            energy += float(held)
         if self.drive is not None:
             lever = (self.vector * np.exp(1j * angle)).imag if self.unbalance else np.zeros(n)
             energy += 0.5 * self.drive.inertia * speed**2 - speed * float(lever @ v)
@@ -212,7 +211,7 @@ class Stepper:
         walk.tally[runge_kutta.ROWS] = 0
         return Stretch(
             walk.t[:rows].copy(), walk.record[:rows].copy(), walk.rate[:rows].copy(),
-            walk.states[:rows].copy(),
+            walk.regimes[:rows].copy(),
         )  # fmt: skip
 
     def _directions(self) -> Real:
@@ -237,10 +236,10 @@ class Stepper:
             relative=method.tolerance if adaptive else 0.0,
             absolute=self._absolute(s, fastest), longest=longest,
             step=np.array([method.step or longest]), time=np.zeros(1),
-            state=np.zeros(m, np.int64), s=s.copy(), end=np.zeros(s.size),
+            regime=np.zeros(m, np.int64), s=s.copy(), end=np.zeros(s.size),
             rows=np.zeros((stages + 1, s.size)), tally=np.zeros(7, np.int64), t=np.zeros(rows),
             record=np.zeros((rows, s.size)), rate=np.zeros((rows, s.size)),
-            states=np.zeros((rows, m), np.int64), change_time=np.zeros(rows),
+            regimes=np.zeros((rows, m), np.int64), change_time=np.zeros(rows),
             change=np.zeros((rows, 2), np.int64),
         )  # fmt: skip
 
@@ -275,17 +274,6 @@ def _longest_step(M: Real, K: Real, fastest: float) -> float:
     """A fortieth of the fastest turn or of the fastest vibration of the open machine."""
     highest = math.sqrt(max(float(np.linalg.eigvals(np.linalg.solve(M, K)).real.max()), 0.0))
     return 2.0 * math.pi / STEPS_PER_TURN / max(fastest, highest)
-
-
-def _contact(system: MechanicalSystem) -> Contact:
-    springs = system.springs
-    return Contact(
-        gap_plus=np.array([s.gaps[0] for s in springs]),
-        gap_minus=np.array([s.gaps[1] for s in springs]),
-        stiffness=np.array([s.stiffness for s in springs]),
-        damping=np.array([s.damping for s in springs]),
-        clipped=np.array([s.law == "compression-only" for s in springs], np.int64),
-    )
 
 
 def _shaft(drive: Drive | None, end_speeds: tuple[float, float], acceleration: Real) -> Shaft:

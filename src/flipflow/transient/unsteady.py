@@ -9,9 +9,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.contact_search import OPEN, Contact
-from flipflow.dynamics.plan import Complex, Int, Real
+from flipflow.dynamics.law import (
+    Stops,
+    damping_share,
+    exit_of,
+    force,
+    regime_at,
+    signed_gap,
+    stored_energy,
+)
+from flipflow.model.contact_law import ENTERED, NO_EXIT, OPEN
 
 SHAFT_STATES = 5  # phi, phi', work put in, work dissipated, work of friction
 
@@ -39,7 +48,7 @@ class Equations(NamedTuple):
     damping: Real  # (N, N)
     stiffness: Real  # (N, N)
     direction: Real  # (m, N)
-    contact: Contact
+    stops: Stops
     vector: Complex  # (N,) unbalance in kg m, or force in N
     unbalance: int  # 1: an unbalance, which reacts on the shaft; 0: a force of constant size
     shaft: Shaft
@@ -66,8 +75,8 @@ def friction_torque(shaft: Shaft, speed: float) -> float:
 
 
 @kernel(inline=True)
-def slopes(eq: Equations, state: Int, point: Real, rows: Real, row: int) -> None:
-    """Write ds/dt at ``point`` to ``rows[row]``, with the contacts as ``state`` has them.
+def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> None:
+    """Write ds/dt at ``point`` to ``rows[row]``, with the springs in their regimes.
 
     M a + C v + K x + sum d H = p phi'^2 + q phi'' with p + i q = vector exp(i phi), and
     J phi'' - q a = T - T_friction: phi'' follows after eliminating a.
@@ -75,7 +84,7 @@ def slopes(eq: Equations, state: Int, point: Real, rows: Real, row: int) -> None
     n = eq.vector.shape[0]
     speed = point[2 * n + 1]
     _excite(eq, point)
-    dissipated = _carry(eq, point) + _press(eq, state, point)
+    dissipated = _carry(eq, point) + _press(eq, regime, point)
     against = 0.0
     reach = 0.0
     for i in range(n):
@@ -136,84 +145,84 @@ def _carry(eq: Equations, point: Real) -> float:
 
 
 @kernel(inline=True)
-def _press(eq: Equations, state: Int, point: Real) -> float:
-    """Take the engaged stops' forces off ``eq.push``; returns the power of their dampers."""
+def gap_motion(eq: Equations, point: Real, j: int) -> tuple[float, float]:
+    """Position and rate at spring j."""
     n = eq.vector.shape[0]
-    contact = eq.contact
+    y = 0.0
+    v = 0.0
+    for i in range(n):
+        y += eq.direction[j, i] * point[i]
+        v += eq.direction[j, i] * point[n + i]
+    return y, v
+
+
+@kernel(inline=True)
+def set_regimes(eq: Equations, regime: Int, point: Real) -> None:
+    """Regime of each spring at a state."""
+    for j in range(regime.shape[0]):
+        y, v = gap_motion(eq, point, j)
+        regime[j] = regime_at(eq.stops, j, y, v)
+
+
+@kernel(inline=True)
+def _press(eq: Equations, regime: Int, point: Real) -> float:
+    """Take the engaged stops' forces off ``eq.push``; returns the power of their dampers."""
     power = 0.0
-    for j in range(state.shape[0]):
-        if abs(state[j]) != 1:
+    for j in range(regime.shape[0]):
+        if regime[j] == OPEN:
             continue
-        gap = contact.gap_plus[j] if state[j] > 0 else -contact.gap_minus[j]
-        y = 0.0
-        v = 0.0
-        for i in range(n):
-            y += eq.direction[j, i] * point[i]
-            v += eq.direction[j, i] * point[n + i]
-        force = contact.stiffness[j] * (y - gap) + contact.damping[j] * v
-        power += contact.damping[j] * v * v
-        for i in range(n):
-            eq.push[i] -= eq.direction[j, i] * force
+        y, v = gap_motion(eq, point, j)
+        H = force(eq.stops, j, regime[j], y, v)
+        power += damping_share(eq.stops, j, regime[j]) * eq.stops.damping[j] * v * v
+        for i in range(eq.vector.shape[0]):
+            eq.push[i] -= eq.direction[j, i] * H
     return power
 
 
 @kernel(inline=True)
 def switching(
-    eq: Equations, state: Int, point: Real, rows: Real, row: int, j: int, which: int
+    eq: Equations, regime: Int, point: Real, rows: Real, row: int, j: int, which: int
 ) -> tuple[float, float]:
     """Value and rate of a switching function: something changes where it rises through zero.
 
-    Each spring has two; j beyond the springs names the shaft, whose speed may end the run.
+    Each spring has as many as its law has exits, or sides to enter; j beyond the springs names
+    the shaft, whose speed may end the run.
     """
     n = eq.vector.shape[0]
-    if j == state.shape[0]:
+    if j == regime.shape[0]:
         speed, alpha = point[2 * n + 1], rows[row, 2 * n + 1]
         if which == 0:
             return speed - eq.shaft.speed_high, alpha
         return eq.shaft.speed_low - speed, -alpha
-    y = 0.0
-    v = 0.0
+    y, v = gap_motion(eq, point, j)
+    if regime[j] == OPEN:
+        return (y - eq.stops.gap[j, 0], v) if which == 0 else (-eq.stops.gap[j, 1] - y, -v)
+    alpha, beta, target = exit_of(eq.stops, j, regime[j], which)
+    if target == NO_EXIT:
+        return -math.inf, 0.0
+    side = 1.0 if regime[j] > OPEN else -1.0
+    gap = signed_gap(eq.stops, j, regime[j])
     a = 0.0
     for i in range(n):
-        y += eq.direction[j, i] * point[i]
-        v += eq.direction[j, i] * point[n + i]
         a += eq.direction[j, i] * rows[row, n + i]
-    plus, minus = eq.contact.gap_plus[j], eq.contact.gap_minus[j]
-    if state[j] == OPEN:
-        return (y - plus, v) if which == 0 else (-minus - y, -v)
-    side = 1.0 if state[j] > 0 else -1.0
-    gap = plus if state[j] > 0 else -minus
-    clipped = eq.contact.clipped[j] == 1
-    if which == 0 and not (clipped and abs(state[j]) == 1):
-        return side * (gap - y), -side * v
-    if which == 0 or not clipped:
-        return -math.inf, 0.0
-    k, c = eq.contact.stiffness[j], eq.contact.damping[j]
-    push, rate = side * (k * (y - gap) + c * v), side * (k * v + c * a)
-    return (-push, -rate) if abs(state[j]) == 1 else (push, rate)
+    return -side * (alpha * (y - gap) + beta * v), -side * (alpha * v + beta * a)
 
 
 @kernel(inline=True)
-def switch(eq: Equations, state: Int, point: Real, j: int, which: int) -> None:
+def switch(eq: Equations, regime: Int, point: Real, j: int, which: int) -> None:
     """Carry out the change of spring j that its switching function has called.
 
-    A clipped stop that lets go while compressed gives up what its spring holds, and gets it back
-    if it takes hold again.
+    A stop that lets go while compressed gives up what its spring holds, and gets it back if it
+    takes hold again.
     """
     n = eq.vector.shape[0]
-    before = state[j]
+    before = regime[j]
     if before == OPEN:
-        state[j] = 1 if which == 0 else -1
-    elif which == 0:
-        state[j] = OPEN
-    elif abs(before) == 1:
-        state[j] = 2 * before if eq.contact.damping[j] > 0.0 else OPEN
-    else:
-        state[j] = before // 2
-    if which == 1 and before != OPEN:
-        gap = eq.contact.gap_plus[j] if before > 0 else -eq.contact.gap_minus[j]
-        depth = -gap
-        for i in range(n):
-            depth += eq.direction[j, i] * point[i]
-        sign = 1.0 if abs(before) == 1 else -1.0
-        point[2 * n + 3] += sign * 0.5 * eq.contact.stiffness[j] * depth * depth
+        regime[j] = ENTERED if which == 0 else -ENTERED
+        return
+    _, _, target = exit_of(eq.stops, j, before, which)
+    regime[j] = target if before > OPEN else -target
+    if regime[j] != OPEN:
+        y, _ = gap_motion(eq, point, j)
+        held = stored_energy(eq.stops, j, before, y)
+        point[2 * n + 3] += held - stored_energy(eq.stops, j, regime[j], y)

@@ -1,0 +1,297 @@
+r"""Modes of the contact states that a motion meets, each prepared when it is first met.
+
+Within one contact state the machine is linear. With the state z = (x, x'), right and left vectors
+v_i and l_i of the state's matrix A,
+
+    exp(A t) = Re sum_i weight_i v_i exp(rate_i t) l_i,
+
+one term for a conjugate pair (weight 2) and one for a real eigenvalue (weight 1), so that
+overdamped machines need no special case. Which side of a stop is engaged does not change the
+matrix: a contact state is told by the kinds of force that its springs have, and the place where it
+would stand still follows from the gaps on whichever side.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import lu_factor, lu_solve
+from flipflow.compiled.eigen import Schur, eigenvector, new_schur, real_schur
+from flipflow.dynamics.law import kind
+from flipflow.dynamics.machine import MachineArrays
+from flipflow.errors import InputError
+from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
+
+NEARLY_DEFECTIVE = 1e6  # condition of the basis of eigenvectors from which it has lost six digits
+NUDGE, MOST_NUDGES = 1e-10, 3  # relative change of damping that splits a double eigenvalue
+MOST_STATES = 2**12
+MOST_BYTES = 2**32  # of tables, of which only what is met is ever touched
+
+
+class Modes(NamedTuple):
+    """Tables over S contact states, of up to R modes; ``ready`` tells which are filled."""
+
+    place: Int  # (m,) the state's number is sum_j place_j kind_j
+    ready: Int  # (S,) 0 not met yet, 1 filled, -1 no modes could be found
+    mode_count: Int  # (S,) number of modes
+    rate: Complex  # (S, R) eigenvalues in 1/s
+    weight: Real  # (S, R)
+    right: Complex  # (S, 2 N, R) v_i as columns
+    left: Complex  # (S, R, 2 N) l_i as rows
+    force: Complex  # (S, R) l_i (0, M^-1 f) with f the force vector
+    force_conj: Complex  # (S, R) the same for the conjugate mode
+    gap_shape: Complex  # (S, m, R) d_j phi_i: modes seen at the gaps
+    gap_pick: Complex  # (S, R, m) l_i (0, M^-1 d_j)
+    rest: Real  # (S, m, N) where spring j, engaged at a gap of 1 m, would hold the machine
+    schur: Schur  # scratch
+    held: Real  # (N, N) scratch
+    basis: Real  # (2 N, 2 N) scratch
+    factors: Real  # (2 N, 2 N) scratch
+    pivot: Int  # (2 N,) scratch
+    column: Real  # (2 N,) scratch
+
+
+def new_modes(machine: MachineArrays) -> Modes:
+    """Empty tables for a machine.
+
+    Raises
+    ------
+    InputError
+        For more springs than contact states can be kept of.
+    """
+    m, n = machine.direction.shape
+    kinds = KINDS[machine.stops.law]
+    states = math.prod(kinds.tolist())
+    modes = 2 * n
+    if states > MOST_STATES or states * (2 * modes + 2 * m) * modes * 16 > MOST_BYTES:
+        raise InputError("springs", m, "so many springs with a gap have too many contact states")
+    table = (states, modes)
+    return Modes(
+        place=np.concatenate([[1], np.cumprod(kinds[:-1])]).astype(np.int64)[:m],
+        ready=np.zeros(states, np.int64),
+        mode_count=np.zeros(states, np.int64),
+        rate=np.zeros(table, np.complex128),
+        weight=np.zeros(table),
+        right=np.zeros((states, modes, modes), np.complex128),
+        left=np.zeros((states, modes, modes), np.complex128),
+        force=np.zeros(table, np.complex128),
+        force_conj=np.zeros(table, np.complex128),
+        gap_shape=np.zeros((states, m, modes), np.complex128),
+        gap_pick=np.zeros((states, modes, m), np.complex128),
+        rest=np.zeros((states, m, n)),
+        schur=new_schur(modes),
+        held=np.zeros((n, n)),
+        basis=np.zeros((modes, modes)),
+        factors=np.zeros((modes, modes)),
+        pivot=np.zeros(modes, np.int64),
+        column=np.zeros(modes),
+    )
+
+
+@kernel
+def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
+    """Number of the contact state of regimes (m,), its modes prepared; negative: there are none."""
+    number = 0
+    for j in range(regime.shape[0]):
+        number += modes.place[j] * kind(machine.stops, j, regime[j])
+    if modes.ready[number] == 0:
+        prepare(machine, modes, number)
+    return number if modes.ready[number] == 1 else -1
+
+
+@kernel
+def prepare(machine: MachineArrays, modes: Modes, number: int) -> int:
+    """Fill the tables of one contact state; returns a status.
+
+    Exactly critical damping has no full set of eigenvectors; a damping changed in its tenth digit
+    has one, and costs less than the digits a defective basis would.
+    """
+    modes.ready[number] = -1
+    for nudge in range(MOST_NUDGES + 1):
+        if not _state_matrix(machine, modes, number, 1.0 + nudge * NUDGE):
+            return status.SINGULAR
+        if not real_schur(modes.schur, True):
+            return status.NO_CONVERGENCE
+        condition = _vectors(modes, number)
+        if condition < NEARLY_DEFECTIVE:
+            break
+    if not math.isfinite(condition):
+        return status.SINGULAR
+    _seen_from_outside(machine, modes, number)
+    modes.ready[number] = 1
+    return status.OK
+
+
+@kernel
+def _shares(machine: MachineArrays, modes: Modes, number: int, j: int) -> tuple[float, float]:
+    """f_k k and f_c c of spring j in a contact state."""
+    law = machine.stops.law[j]
+    k = number // modes.place[j] % KINDS[law]
+    for piece in range(MOST_PIECES + 1):
+        if KIND[law, piece] == k:
+            f_k, f_c = FORCE[law, piece, 0], FORCE[law, piece, 1]
+            return f_k * machine.stops.stiffness[j], f_c * machine.stops.damping[j]
+    return 0.0, 0.0
+
+
+@kernel
+def _state_matrix(machine: MachineArrays, modes: Modes, number: int, stretch: float) -> bool:
+    """A = [[0, I], [-M^-1 K, -M^-1 C]] of a contact state, and where it would stand still.
+
+    False when nothing holds it. ``stretch`` is a factor on the damping.
+    """
+    m, n = machine.direction.shape
+    T = modes.schur.T
+    for r in range(n):
+        for s in range(n):
+            T[r, s] = 0.0
+            T[r, n + s] = 1.0 if r == s else 0.0
+            stiffness, damping = machine.stiffness[r, s], machine.damping[r, s]
+            for j in range(m):
+                k, c = _shares(machine, modes, number, j)
+                stiffness += k * machine.reach[j, r] * machine.direction[j, s]
+                damping += c * machine.reach[j, r] * machine.direction[j, s]
+            T[n + r, s] = -stiffness
+            T[n + r, n + s] = -damping * stretch
+            modes.held[r, s] = stiffness
+    if not lu_factor(modes.held, modes.pivot):
+        return False
+    for j in range(m):
+        k, _ = _shares(machine, modes, number, j)
+        for r in range(n):
+            modes.column[r] = k * machine.reach[j, r]
+        lu_solve(modes.held, modes.pivot, modes.column)
+        for r in range(n):
+            modes.rest[number, j, r] = modes.column[r]
+    return True
+
+
+@kernel
+def _vectors(modes: Modes, number: int) -> float:
+    """Right and left vectors from the Schur form; the condition of their basis.
+
+    The basis is real: v itself, or Re v and Im v of a pair. With its inverse's rows a and b the
+    left vector is a, or (a - i b) / 2. All of it is done on the balanced matrix.
+    """
+    schur, basis = modes.schur, modes.basis
+    size = schur.T.shape[0]
+    count, column, square = 0, 0, 0.0
+    for k in range(size):
+        value = schur.value[k]
+        if value.imag < 0.0:
+            continue
+        eigenvector(schur, k)
+        modes.rate[number, count] = value
+        modes.weight[number, count] = 2.0 if value.imag > 0.0 else 1.0
+        for r in range(size):
+            v = schur.vector[r]
+            modes.right[number, r, count] = v * schur.scale[r]
+            basis[r, column] = v.real
+            square += v.real * v.real + v.imag * v.imag
+            if value.imag > 0.0:
+                basis[r, column + 1] = v.imag
+        column += 2 if value.imag > 0.0 else 1
+        count += 1
+    modes.mode_count[number] = count
+    return math.sqrt(square) * _inverted(modes, number) / size
+
+
+@kernel
+def _inverted(modes: Modes, number: int) -> float:
+    """Left vectors from the inverse of the basis; its norm, infinite where there is none."""
+    factors, schur = modes.factors, modes.schur
+    size = factors.shape[0]
+    for r in range(size):
+        for c in range(size):
+            factors[r, c] = modes.basis[r, c]
+    if not lu_factor(factors, modes.pivot):
+        return math.inf
+    square = 0.0
+    for c in range(size):
+        for r in range(size):
+            modes.column[r] = 1.0 if r == c else 0.0
+        lu_solve(factors, modes.pivot, modes.column)
+        row = 0
+        for i in range(modes.mode_count[number]):
+            a = modes.column[row]
+            square += a * a
+            left = a + 0j
+            if modes.weight[number, i] == 2.0:
+                b = modes.column[row + 1]
+                square += b * b
+                left = 0.5 * complex(a, -b)
+                row += 1
+            row += 1
+            modes.left[number, i, c] = left / schur.scale[c]
+    return math.sqrt(square)
+
+
+@kernel
+def _seen_from_outside(machine: MachineArrays, modes: Modes, number: int) -> None:
+    """What the modes take up from the exciter and the gaps, and show at the gaps."""
+    m, n = machine.direction.shape
+    for i in range(modes.mode_count[number]):
+        force = 0j
+        force_conj = 0j
+        for r in range(n):
+            left = modes.left[number, i, n + r]
+            force += left * machine.push[r]
+            force_conj += left.conjugate() * machine.push[r]
+        modes.force[number, i] = force
+        modes.force_conj[number, i] = force_conj
+        for j in range(m):
+            shape = 0j
+            pick = 0j
+            for r in range(n):
+                shape += machine.direction[j, r] * modes.right[number, r, i]
+                pick += modes.left[number, i, n + r] * machine.reach[j, r]
+            modes.gap_shape[number, j, i] = shape
+            modes.gap_pick[number, i, j] = pick
+
+
+@kernel(inline=True)
+def open_answer(modes: Modes, power: int, omega: float, k: int) -> complex:
+    """X_k in x = Re(X exp(i omega t)) of the machine with all springs open."""
+    total = 0j
+    for i in range(modes.mode_count[0]):
+        v = modes.right[0, k, i]
+        total += v * modes.force[0, i] / (1j * omega - modes.rate[0, i])
+        if modes.weight[0, i] == 2.0:
+            gap = 1j * omega - modes.rate[0, i].conjugate()
+            total += v.conjugate() * modes.force_conj[0, i] / gap
+    return total * omega**power
+
+
+@kernel(entry=True)
+def contact_free(
+    machine: MachineArrays, modes: Modes, omega: Real, answer: Complex, stop_at_contact: bool
+) -> int:
+    """X (n, N) in x = Re(X exp(i omega t)) without contact; the first index that meets a gap.
+
+    ``stop_at_contact``: nothing is written beyond it. n where no gap is met, negative where the
+    open machine has no modes.
+    """
+    if modes.ready[0] == 0:
+        prepare(machine, modes, 0)
+    if modes.ready[0] < 0:
+        return -1
+    m, n = machine.direction.shape
+    first = omega.shape[0]
+    for p in range(omega.shape[0]):
+        for k in range(n):
+            answer[p, k] = open_answer(modes, machine.power, omega[p], k)
+        for j in range(m):
+            y = 0j
+            for k in range(n):
+                y += machine.direction[j, k] * answer[p, k]
+            if abs(y) >= min(machine.stops.gap[j, 0], machine.stops.gap[j, 1]):
+                first = min(first, p)
+        if stop_at_contact and first <= p:
+            return first
+    return first

@@ -1,0 +1,152 @@
+r"""The contact laws, as a table of pieces: force, when a piece is left, energy.
+
+With p the penetration, positive in contact, and p' its rate, a stop of stiffness k and damping c
+carries in each piece of its law the force
+
+.. math:: H = f_k k p + f_c c p',
+
+and leaves the piece when a switching function
+
+.. math:: h = (a + a_k k) p + (b + b_c c) p'
+
+falls through zero. Between two changes the machine is therefore linear, whatever the law. A
+regime is a piece with its side: 0 open, q or -q piece q on the plus or minus side. A side is
+entered at the gap with piece 1, where the force jumps by f_c c p'.
+
+=================  ==================================  ==========================================
+law                force in contact                    source
+=================  ==================================  ==========================================
+paper              k p + c p', pulls before release    Lin et al., Minerals 14 (2024) 406, Eq. (2)
+compression-only   max(0, k p + c p')                  the same, its pull cut off
+=================  ==================================  ==========================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Int = NDArray[np.int64]
+ContactLaw = Literal["paper", "compression-only"]
+OPEN, ENTERED, NO_EXIT = 0, 1, -1
+
+
+@dataclass(frozen=True)
+class Exit:
+    """A switching function h = (a + a_k k) p + (b + b_c c) p', and the piece that follows it."""
+
+    to: int
+    a: float = 0.0
+    a_k: float = 0.0
+    b: float = 0.0
+    b_c: float = 0.0
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Shares of k p and c p' in the force of one piece, and how it is left."""
+
+    stiffness: float
+    damping: float
+    exits: tuple[Exit, ...]
+
+
+AT_THE_GAP = Exit(OPEN, a=1.0)
+LAWS: dict[str, tuple[Piece, ...]] = {
+    "paper": (Piece(1.0, 1.0, (AT_THE_GAP,)),),
+    # Its force is gone before it reaches the gap, and returns where it would push again.
+    "compression-only": (
+        Piece(1.0, 1.0, (Exit(2, a_k=1.0, b_c=1.0),)),
+        Piece(0.0, 0.0, (AT_THE_GAP, Exit(1, a_k=-1.0, b_c=-1.0))),
+    ),
+}
+NUMBER = {name: number for number, name in enumerate(get_args(ContactLaw))}
+
+MOST_PIECES = max(map(len, LAWS.values()))
+MOST_EXITS = max(len(piece.exits) for pieces in LAWS.values() for piece in pieces)
+
+
+def _flattened() -> tuple[Real, Real, Int, Int, Int]:
+    """The table as arrays over law and piece; piece 0 is open: no force, no exit of its own."""
+    shape = (len(NUMBER), MOST_PIECES + 1)
+    force, exits = np.zeros((*shape, 2)), np.zeros((*shape, MOST_EXITS, 4))
+    target = np.full((*shape, MOST_EXITS), NO_EXIT)
+    kind, kinds = np.zeros(shape, np.int64), np.zeros(len(NUMBER), np.int64)
+    for name, law in NUMBER.items():
+        known = [(0.0, 0.0)]
+        for q, piece in enumerate(LAWS[name], start=1):
+            shares = piece.stiffness, piece.damping
+            known += [shares] if shares not in known else []
+            force[law, q], kind[law, q] = shares, known.index(shares)
+            for e, way in enumerate(piece.exits):
+                exits[law, q, e] = way.a, way.a_k, way.b, way.b_c
+                target[law, q, e] = way.to
+        kinds[law] = len(known)
+    return force, exits, target, kind, kinds
+
+
+# What kernels read: f_k and f_c; a, a_k, b, b_c; the piece that follows; pieces of equal force
+# have one number, since the machine is the same linear one in all of them; how many there are.
+FORCE, EXITS, TARGET, KIND, KINDS = _flattened()
+
+
+def shares(law: ContactLaw, regime: Int | int) -> tuple[Real, Real]:
+    """f_k and f_c of regimes, in the shape of ``regime``."""
+    force = FORCE[NUMBER[law], np.abs(regime)]
+    return force[..., 0], force[..., 1]
+
+
+def carries_force(law: ContactLaw, regime: Int | int) -> NDArray[np.bool_]:
+    """Where a regime has a force at all."""
+    f_k, f_c = shares(law, regime)
+    return np.asarray((f_k != 0.0) | (f_c != 0.0))
+
+
+def engaged_side(law: ContactLaw, regime: Int | int) -> Int:
+    """Side (+1, -1) on which regimes carry a force, 0 where there is none."""
+    return np.where(carries_force(law, regime), np.sign(regime), 0)
+
+
+def signed_gap(regime: Int, gaps: tuple[float, float]) -> Real:
+    """Position of the gap that a regime lies beyond: e+ or -e-; 0 where it is open."""
+    return np.select([regime > OPEN, regime < OPEN], [gaps[0], -gaps[1]], 0.0)
+
+
+def force_in(
+    law: ContactLaw, k: float, c: float, gaps: tuple[float, float], regime: Int, y: Real, v: Real
+) -> Real:
+    """H in N, positive against +d, of a stop in known regimes at positions y and rates v."""
+    f_k, f_c = shares(law, regime)
+    held = carries_force(law, regime)
+    depth = np.where(held, y - np.where(held, signed_gap(regime, gaps), 0.0), 0.0)
+    return np.asarray(f_k * k * depth + f_c * c * v)
+
+
+def stored_energy(
+    law: ContactLaw, k: float, gaps: tuple[float, float], regime: Int, y: Real
+) -> Real:
+    """Energy in J of a stop's spring in known regimes."""
+    f_k, _ = shares(law, regime)
+    depth = np.where(f_k != 0.0, y - np.where(f_k != 0.0, signed_gap(regime, gaps), 0.0), 0.0)
+    return np.asarray(0.5 * f_k * k * depth**2)
+
+
+def regime_at(
+    law: ContactLaw, k: float, c: float, gaps: tuple[float, float], y: ArrayLike, v: ArrayLike
+) -> Int:
+    """Regime of a stop at positions y and rates v; exactly at the gap it is open."""
+    y, v = np.broadcast_arrays(np.asarray(y, float), np.asarray(v, float))
+    side = np.where(y > gaps[0], 1, np.where(y < -gaps[1], -1, 0))
+    depth = np.where(side != 0, side * (y - np.where(side != 0, signed_gap(side, gaps), 0.0)), 0.0)
+    piece = np.abs(side)
+    for _ in range(MOST_PIECES):
+        for e in range(MOST_EXITS):
+            a, a_k, b, b_c = np.moveaxis(EXITS[NUMBER[law], piece, e], -1, 0)
+            target = TARGET[NUMBER[law], piece, e]
+            h = (a + a_k * k) * depth + (b + b_c * c) * side * v
+            piece = np.where((target > OPEN) & (h < 0.0), target, piece)
+    return np.asarray(side * piece)
