@@ -178,4 +178,6 @@ def describe_code(code: CodeType) -> str:
         else sorted(map(repr, each)) if isinstance(each, frozenset) else repr(each)
         for each in code.co_consts
     ]  # fmt: skip
-    return repr((code.co_code, code.co_names, code.co_varnames, code.co_freevars, constants))
+    names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    arguments = (code.co_argcount, code.co_kwonlyargcount, code.co_flags)
+    return repr((code.co_code, code.co_exceptiontable, names, arguments, constants))

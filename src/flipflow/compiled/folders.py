@@ -92,14 +92,10 @@ class CacheFolders:
         """The first folder of this digest that takes a file; None, with a word, without one."""
         refused = "there is none"
         for root in self.roots:
-            folder = root / digest
-            try:
-                _write_whole(folder / "probe", b"")
-                (folder / "probe").unlink(missing_ok=True)
-            except OSError as error:
-                refused = f"{root}: {error.strerror or error}"
-                continue
-            return folder
+            why = _refusal(root / digest)
+            if not why:
+                return root / digest
+            refused = f"{root}: {why}"
         self._tell(refused)
         return None
 
@@ -121,7 +117,9 @@ class CacheFolders:
         if self._temporary is None:
             return False
         if any(self._temporary.iterdir()):
-            self._tell(f"{', '.join(map(str, self.roots))}: read-only or full")
+            # Where a small file still goes in, what the workers compiled was too large.
+            why = [f"{root}: {_refusal(root) or 'full'}" for root in self.roots]
+            self._tell(", ".join(why) or "there is none")
             return True
         self._temporary.rmdir()
         self._temporary = None
@@ -159,6 +157,16 @@ def _write_whole(path: Path, stored: bytes) -> None:
         with contextlib.suppress(OSError):
             unfinished.unlink(missing_ok=True)
         raise
+
+
+def _refusal(folder: Path) -> str:
+    """Why a folder takes no file; empty if it does."""
+    try:
+        _write_whole(folder / "probe", b"")
+        (folder / "probe").unlink(missing_ok=True)
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
 
 
 def _mark_used(folder: Path) -> None:
