@@ -1,34 +1,38 @@
-"""The one decorator through which every kernel is compiled, and where compiled code is kept.
+"""The one decorator through which every kernel is compiled.
 
-A numba cache entry is renewed when its own file changes, not when a kernel it calls in another
-file does. The cache folder is therefore named after a digest of all kernel sources: any change
-moves to a new folder, and stale code cannot run.
+Compiled code is kept on disk under a digest of all sources that the kernel's module imports, the
+versions that compile it and the options: any change moves to a new folder, and stale code cannot
+run.
+
+With versions of numba on whose inside this has not been tried kernels are compiled as numba
+compiles any function: slower, and kept by numba's own cache, which needs a folder that can be
+written and does not notice damaged files.
 """
 
 from __future__ import annotations
 
 import functools
-import hashlib
 import logging
-import os
-import shutil
 import sys
-import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast, overload
 
+import llvmlite
 import numba
+import numpy as np
 from numba import config
 from numba.extending import overload as numba_overload
 
-from flipflow.compiled.parts import PartCompiler
+from flipflow.compiled.digest import module_digest
+from flipflow.compiled.folders import FOLDERS
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-KEPT_CACHES = 4
+# The oldest and the newest numba with which parts.py and cache.py have been tried.
+TRIED = ((0, 61), (0, 68))
+OWN_CACHE = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 logger = logging.getLogger("flipflow")
 
 
@@ -58,88 +62,61 @@ def kernel(
     return _compile(function, entry=entry, inline=inline)
 
 
+_LANGUAGE: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+_ENTRY = _PART = _LANGUAGE
+_COMPILED_BY = "numba alone"
+if OWN_CACHE:
+    from flipflow.compiled.cache import KernelCache
+    from flipflow.compiled.parts import OPTIMISATION, EntryCompiler, PartCompiler
+
+    _ENTRY = _LANGUAGE | {"no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": EntryCompiler}
+    _PART = _ENTRY | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler}
+    _COMPILED_BY = f"optimised {OPTIMISATION}"
+else:
+    logger.debug("numba %s has not been tried: kernels compile slower", numba.__version__)
+
+# Of numba's own settings those that change the code it makes; OPT by the making of machine code,
+# whose level numba takes when it is first used, and not from parts.py.
+_SETTINGS = (
+    "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "DISABLE_INTEL_SVML", "DISABLE_JIT",
+    "BOUNDSCHECK", "DEBUGINFO_DEFAULT",
+)  # fmt: skip
+
+
 def _compile(function: Callable[P, R], *, entry: bool, inline: bool) -> Callable[P, R]:
-    options: dict[str, Any] = _OPTIONS if entry else _PART_OPTIONS
-    with _CacheFolder():
-        compiled = numba.njit(cache=entry, forceinline=inline, **options)(function)
+    if not OWN_CACHE:
+        plain = _by_numba_alone(function) if entry else numba.njit(**_PART)(function)
+        return cast("Callable[P, R]", plain)
+    compiled = numba.njit(forceinline=inline, **(_ENTRY if entry else _PART))(function)
+    if entry and not config.DISABLE_JIT:
+        compiled._cache = KernelCache(function, compiled_by())  # noqa: SLF001  numba offers no other way
     return cast("Callable[P, R]", compiled)
 
 
-_OPTIONS: dict[str, Any] = {
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": {"contract"},
-    "no_cfunc_wrapper": True,
-    "_nrt": False,
-}
-_PART_OPTIONS = _OPTIONS | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler}
+def _by_numba_alone(function: Callable[..., Any]) -> Any:
+    """Compile an entry with numba's own cache, in our folder."""
+    digest = module_digest(function.__module__, compiled_by())
+    # What lies in an archive numba would keep elsewhere, under the digest of this file alone.
+    filed = Path(function.__code__.co_filename).exists()
+    folder = FOLDERS.writable(digest) if digest is not None and filed else None
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(folder or before)
+    try:
+        return numba.njit(cache=folder is not None, **_ENTRY)(function)
+    finally:
+        config.CACHE_DIR = before
 
 
 def chosen_by_type(function: Callable[P, R]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Let kernels call a plain function: decorates what returns the one to run for given types."""
-    decorate = numba_overload(function, jit_options=_PART_OPTIONS)
+    decorate = numba_overload(function, jit_options=_PART)
     return cast("Callable[[Callable[..., Any]], Callable[..., Any]]", decorate)
 
 
-def cache_folder() -> Path:
-    """Folder of the compiled kernels of exactly these sources; created, writable."""
-    return _cache_folder()
-
-
-def source_digest(folder: Path) -> str:
-    """Digest of all Python sources in ``folder`` and of the versions they are compiled with."""
-    digest = hashlib.sha256(f"{sys.version_info[:3]} numba {numba.__version__}".encode())
-    for source in sorted(folder.rglob("*.py")):
-        digest.update(str(source.relative_to(folder)).encode())
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 @functools.cache
-def _cache_folder() -> Path:
-    digest = source_digest(Path(__file__).parent.parent)
-    for root in _cache_roots():
-        folder = root / digest
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                pass
-        except OSError:
-            continue
-        _drop_old(root, keep=folder)
-        return folder
-    folder = Path(tempfile.mkdtemp(prefix="flipflow-kernels-"))
-    logger.warning("no writable cache folder: kernels are compiled anew in every process")
-    return folder
-
-
-def _cache_roots() -> list[Path]:
-    if given := os.environ.get("FLIPFLOW_CACHE_DIR"):
-        return [Path(given)]
-    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    roots = [Path(home) / "flipflow"] if home else []
-    try:
-        roots.append(Path.home() / ".cache" / "flipflow")
-    except RuntimeError:
-        logger.debug("this user has no home folder")
-    return roots
-
-
-def _drop_old(root: Path, keep: Path) -> None:
-    """Remove all but the newest few caches; one in use by another version may still be wanted."""
-    month = 30 * 86400.0
-    folders = sorted((f for f in root.iterdir() if f.is_dir()), key=lambda f: f.stat().st_mtime)
-    for folder in folders[:-KEPT_CACHES]:
-        if folder != keep and time.time() - folder.stat().st_mtime > month:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-class _CacheFolder:
-    """Point numba at our folder while a kernel is decorated, and only then."""
-
-    def __enter__(self) -> None:
-        self._before = config.CACHE_DIR
-        config.CACHE_DIR = str(_cache_folder())
-
-    def __exit__(self, *_: object) -> None:
-        config.CACHE_DIR = self._before
+def compiled_by() -> str:
+    """All that changes compiled code, besides sources: versions, options, numba's settings."""
+    versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
+    options = sorted((name, repr(value)) for name, value in _ENTRY.items())
+    settings = [repr(getattr(config, name, None)) for name in _SETTINGS]
+    return repr((versions, options, _COMPILED_BY, settings))

@@ -1,23 +1,13 @@
-"""Compile the kernels of an analysis ahead, in processes side by side.
-
-numba compiles under one lock in a process, and the first analysis needs several large kernels.
-Each part is compiled by a process of its own into the shared cache, once per version.
-"""
+"""Compile the kernels of an analysis ahead, in processes side by side, once per version."""
 
 from __future__ import annotations
 
-import logging
-import os
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 
 import numpy as np
 
 from flipflow.batch.lanes import Lanes
-from flipflow.compiled.compile import cache_folder
+from flipflow.compiled.workers import compile_parts, work
 from flipflow.continuation import arclength
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.elements import ClearanceSpring, Unbalance
@@ -25,9 +15,6 @@ from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE
 from flipflow.transient.time_stepping import Stepper
-
-logger = logging.getLogger("flipflow")
-POLL_SECONDS = 0.2
 
 
 def compile_ahead(tell: Callable[[float], None]) -> None:
@@ -38,30 +25,7 @@ def compile_ahead(tell: Callable[[float], None]) -> None:
     tell
         Called every fraction of a second with the seconds passed.
     """
-    marks = {part: cache_folder() / f"{part}-compiled" for part in PARTS}
-    parts = [part for part, mark in marks.items() if not mark.exists()]
-    if not parts:
-        return
-    command = [sys.executable, "-m", "flipflow.studies.compile_ahead"]
-    # The kernels run as fast with light optimisation, and are compiled in four fifths of the time.
-    environment = {**os.environ, "NUMBA_OPT": "1"}
-    workers = [
-        subprocess.Popen([*command, part], stdout=subprocess.DEVNULL, env=environment)  # noqa: S603  our own module
-        for part in parts
-    ]
-    begin = time.monotonic()
-    try:
-        while any(worker.poll() is None for worker in workers):
-            tell(time.monotonic() - begin)
-            time.sleep(POLL_SECONDS)
-    finally:
-        for worker in workers:
-            worker.kill()
-    for part, worker in zip(parts, workers, strict=True):
-        if worker.returncode == 0:
-            marks[part].touch()
-    if any(worker.returncode != 0 for worker in workers):
-        logger.warning("compiling ahead failed; kernels are compiled as they are needed")
+    compile_parts("flipflow.studies.compile_ahead", PARTS, tell)
 
 
 def _trace_part() -> None:
@@ -107,7 +71,4 @@ PARTS: dict[str, tuple[Callable[[], None], ...]] = {
 }
 
 if __name__ == "__main__":
-    # Ctrl-C is the parent's to answer, which ends its workers.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for compile_part in PARTS[sys.argv[1]]:
-        compile_part()
+    work(PARTS)
