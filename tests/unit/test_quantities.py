@@ -121,12 +121,17 @@ def test_bounds_follow_the_direction_of_the_limit():
     assert limit_bounds(LIMITS, "stop_force") == (-math.inf, 1e5)
 
 
+@pytest.mark.parametrize("alike", [(), (0, 1), (0, 2), (1, 2)])
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
-def test_the_contact_free_response_solves_its_equation(size):
-    """Many machines at many frequencies: the residual of every one is zero to the last digits."""
+def test_the_contact_free_response_solves_its_equation(size, alike):
+    """Many machines at many frequencies: the residual of every one is zero to the last digits.
+
+    Machines may differ in all three matrices or in one of them alone.
+    """
     rng = np.random.default_rng(size)
     parts = rng.normal(size=(3, 7, 1, size, size))
     M, C, K = parts @ np.swapaxes(parts, -1, -2) + size * np.eye(size)
+    M, C, K = (one[0, 0] if k in alike else one for k, one in enumerate((M, C, K)))
     omega = np.linspace(0.3, 3.0, 11)
     force = rng.normal(size=(11, size)) + 1j * rng.normal(size=(11, size))
     X = contact_free(M, C, K, force, omega)

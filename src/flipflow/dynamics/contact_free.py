@@ -68,7 +68,7 @@ def _of_two(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) -> Co
 
 def _impedance(M: Real, C: Real, K: Real, omega: Real, at: tuple[int, int]) -> Complex:
     """One entry of K - omega^2 M + i omega C, (...)."""
-    real = K[..., *at] - omega**2 * M[..., *at]
-    Z = np.empty(real.shape, np.complex128)
-    Z.real, Z.imag = real, omega * C[..., *at]
+    real, imaginary = K[..., *at] - omega**2 * M[..., *at], omega * C[..., *at]
+    Z = np.empty(np.broadcast_shapes(real.shape, imaginary.shape), np.complex128)
+    Z.real, Z.imag = real, imaginary
     return Z
