@@ -78,7 +78,10 @@ class Motions(Protocol):
         ...
 
     def jump_margin(self) -> Values:
-        """Distance from the nearest fold as a share of its frequency; infinite without folds."""
+        """Distance from the nearest fold as a share of its frequency.
+
+        0 between the two folds of a jump, infinite without folds.
+        """
         ...
 
 

@@ -49,7 +49,7 @@ class Sensitivity:
     screen
         The machine about which the fields vary.
     quantity
-        Name of the quantity, a key of the registry.
+        Name of the quantity, one of the table in :mod:`flipflow.model.quantities`.
     branch
         Which motion is meant where several exist.
     names, distributions
