@@ -83,12 +83,9 @@ def _omega(
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
     from flipflow.errors import InputError  # noqa: PLC0415
-    from flipflow.studies.response_quantities import (  # noqa: PLC0415
-        ResponseQuantity,
-        quantity_named,
-    )
+    from flipflow.model.quantities import quantity_named  # noqa: PLC0415
 
-    whole = isinstance(quantity_named(quantity), ResponseQuantity)
+    whole = quantity_named(quantity).of == "response"
     if speed is not None and (speeds is not None or whole):
         other = f"{quantity} belongs to the whole response" if whole else "--speeds is given, too"
         raise InputError("--speed", speed, f"{other}, leave it out")

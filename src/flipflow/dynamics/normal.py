@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.dynamics.contact_free import contact_free
 from flipflow.model.screen import FlipFlowScreen
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,25 @@ def normal_motion(screen: FlipFlowScreen, omega: float) -> NormalMotion | None:
     if k is None or c is None:
         return None
     mass = screen.main_mass + screen.floating_mass
-    force = -1j * screen.eccentric_moment * omega**2
-    Y = force / (k - mass * omega**2 + 1j * c * omega)
-    return NormalMotion(omega, Y, k, c)
+    Y = normal_amplitude(mass, c, k, screen.eccentric_moment, omega)
+    return NormalMotion(omega, complex(Y), k, c)
+
+
+def normal_amplitude(
+    mass: ArrayLike,
+    damping: ArrayLike,
+    stiffness: ArrayLike,
+    eccentric_moment: ArrayLike,
+    omega: ArrayLike,
+) -> Complex:
+    """Y of y = Re(Y exp(i omega t)) in m; all arguments are broadcast."""
+    M, C, K = (np.asarray(one, float)[..., None, None] for one in (mass, damping, stiffness))
+    w = np.asarray(omega, float)
+    force = -1j * np.asarray(eccentric_moment, float) * w**2
+    return np.asarray(contact_free(M, C, K, force[..., None], w)[..., 0])
+
+
+def peak_of_both(along: Complex, across: Complex) -> Real:
+    """Largest length over a turn of (Re(A e), Re(B e)): the half axis of an ellipse."""
+    squares = np.abs(along) ** 2 + np.abs(across) ** 2
+    return np.asarray(np.sqrt(0.5 * (squares + np.abs(along**2 + across**2))))

@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 
 from flipflow.io.derived import Derived, derive
-from flipflow.io.layout import SECTIONS, SPEED, Entry
+from flipflow.io.layout import SECTIONS, SPEED, Entry, unchecked_without
 from flipflow.io.units import in_unit
 from flipflow.io.values import read_interval, read_number
 from flipflow.model.fields import FIELD, FIELDS
 from flipflow.model.limits import LIMIT_FIELDS
 from flipflow.model.project import Project
+from flipflow.model.quantities import QUANTITIES, needing
 
 
 @dataclass(frozen=True)
@@ -168,19 +169,20 @@ def _cases(project: Project) -> Iterator[Case]:
 
 
 def _missing(project: Project) -> Iterator[Gap]:
+    """What is left out and what falls away with it; what only stops need, where there are any."""
     screen = project.screen
     for field in FIELDS:
-        idle = field.name == "stop_pieces" and not screen.has_stop
-        if field.needed_for and getattr(screen, field.name) is None and not idle:
-            yield Gap(field.key, field.needed_for)
+        idle = not screen.has_stop and all(one.of_stops for one in needing(field.name))
+        if getattr(screen, field.name) is None and not idle and (lost := unchecked_without(field)):
+            yield Gap(field.key, lost)
     if project.speed is None:
-        yield Gap(SPEED.key, SPEED.needed_for)
+        yield Gap(SPEED.key, unchecked_without(SPEED))
     for limit in LIMIT_FIELDS:
-        idle = limit.name in {"stop_force", "jump_margin"} and not screen.has_stop
+        quantity = QUANTITIES[limit.name]
         if getattr(project.limits, limit.name) is None:
-            if not idle:
+            if screen.has_stop or not quantity.of_stops:
                 yield Gap(limit.key, "this limit")
-        elif lacking := [FIELD[n].key for n in limit.needs if getattr(screen, n) is None]:
+        elif lacking := [FIELD[name].key for name in quantity.missing(screen)]:
             yield Gap(", ".join(lacking), limit.key)
     dampers = (screen.isolation_damping, screen.shear_damping)
     if math.isclose(sum(dampers), 0.0):

@@ -16,6 +16,7 @@ from flipflow.model.contact_law import ContactLaw
 from flipflow.model.drive import DRIVE_FIELDS
 from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS
+from flipflow.model.quantities import needing
 
 FORMAT = 1
 
@@ -86,7 +87,6 @@ SPEED = Field(
     "speed", "omega", "rad/s", "rpm", "operation.speed",
     "Shaft speed the machine is run at.",
     lower_open=True, default=None, plausible=(2.0 * math.pi, 100.0 * math.pi), example="850 rpm",
-    needed_for="the verdict at the operating speed",
 )  # fmt: skip
 
 # fmt: off
@@ -118,6 +118,13 @@ MATERIAL_PER_AREA = Field(
     "material", "", "kg/m^2", "kg/m^2", "load_cases.material", MATERIAL.sentence,
     default=None, plausible=(0.0, 1e3), example="30 kg/m^2",
 )  # fmt: skip
+
+
+def unchecked_without(field: Field) -> str:
+    """What is not checked where a field is left out, in words; empty where nothing needs it."""
+    if field is SPEED:
+        return "the verdict at the operating speed"
+    return ", ".join(quantity.label for quantity in needing(field.name))
 
 
 def entry_of(field: Field) -> Entry:

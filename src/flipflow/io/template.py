@@ -8,7 +8,7 @@ import textwrap
 from pathlib import Path
 
 from flipflow.errors import InputError
-from flipflow.io.layout import FORMAT, SECTION_SENTENCES, SECTIONS, Entry
+from flipflow.io.layout import FORMAT, SECTION_SENTENCES, SECTIONS, Entry, unchecked_without
 
 _HEAD = f"""\
 # A machine file of flipflow. The values are those of no real machine: replace every one.
@@ -88,8 +88,8 @@ def _lines(entry: Entry) -> list[str]:
         words += f" One of {', '.join(map(json.dumps, entry.choices))}."
     if entry.field is not None and entry.field.count is not None:
         words += f" Or {entry.key}_each, of one piece."
-    if entry.field is not None and entry.field.needed_for:
-        words += f" Left out, not checked: {entry.field.needed_for}."
+    if entry.field is not None and (lost := unchecked_without(entry.field)):
+        words += f" Left out, not checked: {lost}."
     off = "# " if entry.label in _ALTERNATIVES else ""
     return [*_comment(words), f"{off}{entry.key} = {_toml(entry.example)}"]
 

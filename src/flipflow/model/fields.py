@@ -46,8 +46,6 @@ class Field:
         Whether only whole numbers make sense.
     infinite
         Whether infinity is a value.
-    needed_for
-        What cannot be checked where the field is left out.
     """
 
     name: str
@@ -65,7 +63,6 @@ class Field:
     count: str | None = None
     whole: bool = False
     infinite: bool = False
-    needed_for: str = ""
 
     @property
     def required(self) -> bool:
@@ -179,21 +176,18 @@ FIELDS: tuple[Field, ...] = (
         "Stiffness of all isolation springs together, normal to the screen surface.",
         lower_open=True, default=None, plausible=(1e3, 50e6),
         example="700 kN/m", count="supports",
-        needed_for="throw number, and the limits on g and foundation force",
     ),
     Field(
         "normal_damping", "c1n", "N s/m", "kN s/m", "isolation.normal_damping",
         "Viscous damping of all isolation springs together, normal to the screen surface.",
         default=None, plausible=(0.0, 2e6),
         example="10 kN s/m", count="supports",
-        needed_for="throw number, and the limits on g and foundation force",
     ),
     Field(
         "deck_angle", "alpha", "rad", "deg", "frames.deck_angle",
         "Inclination of the screen surface to the horizontal.",
         lower=-math.pi / 2, upper=math.pi / 2, default=None, plausible=(0.0, math.radians(45.0)),
         example="15 deg",
-        needed_for="throw number",
     ),
     Field(
         "deck_area", "A", "m^2", "m^2", "frames.deck_area",
@@ -206,35 +200,30 @@ FIELDS: tuple[Field, ...] = (
         "Rubber height of a shear spring; relative amplitude over height is its shear strain.",
         lower_open=True, default=None, plausible=(5e-3, 0.5),
         example="50 mm",
-        needed_for="the limit on shear strain",
     ),
     Field(
         "shear_pieces", "n2", "", "", "shear_springs.pieces",
         "Number of shear springs.",
         lower=1.0, default=None, plausible=(1.0, 500.0),
         example=12, whole=True,
-        needed_for="force and power of one shear spring",
     ),
     Field(
         "stop_pieces", "n3", "", "", "stops.pieces_per_side",
         "Number of stop springs on each side.",
         lower=1.0, default=None, plausible=(1.0, 200.0),
         example=4, whole=True,
-        needed_for="force on one stop spring",
     ),
     Field(
         "supports", "n1", "", "", "isolation.supports",
         "Number of supports that carry the isolation springs.",
         lower=1.0, default=None, plausible=(1.0, 100.0),
         example=4, whole=True,
-        needed_for="force on one support",
     ),
     Field(
         "bearings", "nb", "", "", "exciter.bearings",
         "Number of exciter bearings that share the unbalance force.",
         lower=1.0, default=None, plausible=(1.0, 32.0),
         example=2, whole=True,
-        needed_for="force on one bearing",
     ),
 )
 # fmt: on

@@ -3,89 +3,48 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from flipflow.errors import InputError
-from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import Field
+from flipflow.model.quantities import QUANTITIES, Direction
 
 Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class LimitField(Field):
-    """One limit: a field whose value is an upper bound or, as ``interval``, (least, most).
+    """One limit as a field of the machine file: a number, or (least, greatest).
 
     Parameters
     ----------
-    interval
-        Whether the limit has two ends.
-    needs
-        Fields of the screen without which the limit cannot be checked.
+    direction
+        Which side of the limit is allowed.
     """
 
-    interval: bool = False
-    needs: tuple[str, ...] = ()
+    direction: Direction = "at most"
+
+    @property
+    def interval(self) -> bool:
+        """Whether the limit has two ends."""
+        return self.direction == "between"
 
 
-_NORMAL = ("normal_stiffness", "normal_damping")
+def _fields() -> Iterator[LimitField]:
+    """A field for each quantity that may be limited, in the order of the table."""
+    for quantity in QUANTITIES.values():
+        limit = quantity.limit
+        if limit is not None:
+            yield LimitField(
+                quantity.name, quantity.symbol, quantity.unit, quantity.shown_unit,
+                f"limits.{quantity.name}", limit.sentence, upper=limit.upper,
+                lower_open=limit.direction == "at most", plausible=limit.plausible, default=None,
+                example=limit.example, direction=limit.direction,
+            )  # fmt: skip
 
-# A table reads as a table: one line for the names, one for the sentence, one for the numbers.
-# fmt: off
-LIMIT_FIELDS: tuple[LimitField, ...] = (
-    LimitField(
-        "relative_amplitude", "|x2|", "m", "mm", "limits.relative_amplitude",
-        "Least and greatest relative amplitude, half peak to peak.",
-        default=None, plausible=(0.0, 0.1), example=("4 mm", "8 mm"), interval=True,
-    ),
-    LimitField(
-        "main_frame_acceleration", "a1", "m/s^2", "g", "limits.main_frame_acceleration",
-        "Greatest acceleration of the main frame, peak, in any direction.",
-        lower_open=True, default=None, plausible=(0.5 * GRAVITY, 100.0 * GRAVITY), example="4 g",
-        needs=_NORMAL,
-    ),
-    LimitField(
-        "floating_frame_acceleration", "af", "m/s^2", "g", "limits.floating_frame_acceleration",
-        "Greatest acceleration of the floating frame, peak, in any direction.",
-        lower_open=True, default=None, plausible=(0.5 * GRAVITY, 100.0 * GRAVITY), example="10 g",
-        needs=_NORMAL,
-    ),
-    LimitField(
-        "speed", "omega", "rad/s", "rpm", "limits.speed",
-        "Least and greatest shaft speed of the drive.",
-        default=None, plausible=(0.0, 320.0), example=("600 rpm", "1000 rpm"), interval=True,
-    ),
-    LimitField(
-        "shear_strain", "gamma", "", "%", "limits.shear_strain",
-        "Greatest relative amplitude over the rubber height of a shear spring.",
-        lower_open=True, default=None, plausible=(0.005, 3.0), example="20 %",
-        needs=("shear_height",),
-    ),
-    LimitField(
-        "stop_force", "H", "N", "kN", "limits.stop_force",
-        "Greatest force on the stop springs of one side together, peak.",
-        lower_open=True, default=None, plausible=(100.0, 10e6), example="15 kN",
-    ),
-    LimitField(
-        "foundation_force", "F1", "N", "kN", "limits.foundation_force",
-        "Greatest dynamic force on the foundation, peak, in any direction.",
-        lower_open=True, default=None, plausible=(50.0, 5e6), example="8 kN",
-        needs=_NORMAL,
-    ),
-    LimitField(
-        "dissipated_power", "P", "W", "kW", "limits.dissipated_power",
-        "Greatest power that the dampers turn into heat, mean over a turn.",
-        lower_open=True, default=None, plausible=(20.0, 1e6), example="2 kW",
-    ),
-    LimitField(
-        "jump_margin", "s", "", "%", "limits.jump_margin",
-        "Least distance of the speed from the jump, as a share of the jump speed.",
-        upper=1.0, default=None, plausible=(0.0, 0.9), example="20 %",
-    ),
-)
-# fmt: on
 
+LIMIT_FIELDS: tuple[LimitField, ...] = tuple(_fields())
 LIMIT_FIELD: Mapping[str, LimitField] = {field.name: field for field in LIMIT_FIELDS}
 
 
@@ -136,6 +95,15 @@ class Limits:
     def given(self) -> tuple[str, ...]:
         """Names of the limits that were given, in the order of the table."""
         return tuple(f.name for f in LIMIT_FIELDS if getattr(self, f.name) is not None)
+
+
+def limit_bounds(limits: Limits, name: str) -> Interval:
+    """(least, most) of a limit that was given, SI; infinite where there is no such end."""
+    value = getattr(limits, name)
+    direction = LIMIT_FIELD[name].direction
+    if direction == "between":
+        return float(value[0]), float(value[1])
+    return (float(value), math.inf) if direction == "at least" else (-math.inf, float(value))
 
 
 def _interval(field: LimitField, value: object) -> Interval | None:

@@ -23,7 +23,7 @@ from flipflow.plotting.family import BALANCE, beneath_traces, branch_traces, spe
 from flipflow.plotting.parts import Axis, Band, Figure, Line, Panel, Trace
 from flipflow.plotting.response import LABELS
 from flipflow.plotting.scales import MM
-from flipflow.studies.operating_region import Landmarks, analysed_range, landmarks
+from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.transient.sweep import Jump, Sweep, sweep
 
 Real = NDArray[np.float64]

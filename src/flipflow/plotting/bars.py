@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.palette import CASES, HATCHES, case_colour
 from flipflow.plotting.parts import Axis, Band, Bar, Figure, Line, Note, Panel
 from flipflow.plotting.scales import RPM
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.feasible import CaseWindow
 from flipflow.studies.operating_region import OperatingRegion
-from flipflow.studies.quantities import QUANTITIES
 
 TAKERS = {
     "isolation": "isolation (c1)",
@@ -136,9 +136,9 @@ def _case_bars(
 
 
 def _word(name: str) -> str:
-    if name in QUANTITIES:
-        return QUANTITIES[name].label
-    return LIMIT_WORDS.get(name, name)
+    if name in LIMIT_WORDS:
+        return LIMIT_WORDS[name]
+    return QUANTITIES[name].label if name in QUANTITIES else name
 
 
 def _landmarks(region: OperatingRegion) -> tuple[tuple[str, float | None], ...]:

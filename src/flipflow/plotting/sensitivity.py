@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import FIELD
+from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.plotting.parts import Axis, Bar, Figure, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
-from flipflow.studies.response_quantities import REGISTRY
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
 Real = NDArray[np.float64]
@@ -73,7 +73,7 @@ def index_order(result: Sensitivity) -> list[int]:
 
 def changes(result: Sensitivity | OneAtATime, at: int | None) -> tuple[Real, Real]:
     """Change at the low and the high end of each field, (D,) each, in the quantity's shown unit."""
-    scale = SHOWN[REGISTRY[result.quantity].shown_unit]
+    scale = SHOWN[QUANTITIES[result.quantity].shown_unit]
     pick = slice(None) if at is None else at
     nominal = np.asarray(result.nominal)[() if at is None else at]
     low, high = result.at_low[pick], result.at_high[pick]
@@ -136,7 +136,7 @@ def _index_panel(result: Sensitivity) -> Panel:
 
 
 def _tornado_panel(result: Sensitivity | OneAtATime, at: int | None) -> Panel:
-    quantity = REGISTRY[result.quantity]
+    quantity = QUANTITIES[result.quantity]
     ends = np.stack(changes(result, at))
     order = [int(i) for i in np.argsort(-np.nan_to_num(np.abs(ends)).max(axis=0), kind="stable")]
     bars = list(_tornado_bars(ends, order))
@@ -180,7 +180,7 @@ def _name(field: str) -> str:
 
 
 def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:
-    label = REGISTRY[result.quantity].label
+    label = QUANTITIES[result.quantity].label
     if isinstance(result.omega, float):
         return f"Sensitivity of {label} at {result.omega * RPM:.4g} rpm"
     if at is None:

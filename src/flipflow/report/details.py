@@ -8,6 +8,7 @@ from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
+from flipflow.model.quantities import quantities_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.bars import energy_figure, region_figure
 from flipflow.plotting.drawing import Drawing
@@ -29,7 +30,6 @@ from flipflow.report.first_page import overleaf
 from flipflow.report.numbers import four_digits, named, rpm
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
-from flipflow.studies.quantities import QUANTITIES
 
 SCHEMATIC = (
     "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "
@@ -112,8 +112,8 @@ def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
 def _quantities(title: str, cases: Sequence[CaseAssessment]) -> Table:
     columns = (Column("Quantity"), Column("Symbol"), *(Column(c.name, numeric=True) for c in cases))
     rows = []
-    for name, one in QUANTITIES.items():
-        values = [named(name, case.values.get(name)) for case in cases]
+    for one in quantities_of("motion"):
+        values = [named(one.name, case.values.get(one.name)) for case in cases]
         label = one.label[:1].upper() + one.label[1:]
         rows.append((Cell(label, one.sentence), Cell(one.symbol), *cells(*values)))
     return Table(title, columns, tuple(rows))

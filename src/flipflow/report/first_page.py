@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 
+from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
 from flipflow.plotting.response import LEGEND_WITHIN, cases_figure
@@ -24,17 +25,23 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, rpm, span, speed
 from flipflow.report.registry import Part, section
-from flipflow.studies.assessment import Assessment, CaseAssessment
-from flipflow.studies.feasible import REGION, STABILITY, Bound, missing_words
-from flipflow.studies.limit_row import ATTENTION, FAIL, NOT_CHECKED, PASS, LimitRow
+from flipflow.studies.assessment import (
+    ATTENTION,
+    FAIL,
+    NO_LIMIT,
+    NOT_CHECKED,
+    PASS,
+    Assessment,
+    CaseAssessment,
+    LimitRow,
+)
+from flipflow.studies.feasible import REGION, STABILITY, Bound
 from flipflow.studies.operating_region import OperatingRegion
-from flipflow.studies.quantities import QUANTITIES
 
 NO_NORMAL = (
     "Orbits are not drawn: isolation.normal_stiffness or isolation.normal_damping is missing in "
     "the machine file."
 )
-NO_LIMIT = (-math.inf, math.inf)
 # What an A4 page has room for beside all that stands there always: rows of load cases, a line of
 # a note being as high as so many rows; lines of notes when the table of load cases is overleaf.
 MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 118
@@ -319,8 +326,8 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     found = [(v, c) for c in assessment.cases if (v := c.values.get(first)) is not None]
     if not found:
         screen = assessment.project.screen
-        needs = tuple(name for name in QUANTITIES[first].needs if getattr(screen, name) is None)
-        return f"not checked, {missing_words(needs)}" if needs else "not checked"
+        missing = QUANTITIES[first].missing(screen)
+        return f"not checked, {missing_words(missing)}" if missing else "not checked"
     _, case = (min if lowest else max)(found, key=lambda one: one[0])
     if first == "stop_force" and not case.stop_reached:
         return "stop not reached" if case.screen.has_stop else "none fitted"

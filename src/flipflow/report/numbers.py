@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from flipflow.io.units import in_unit
-from flipflow.studies.quantities import QUANTITIES
+from flipflow.model.quantities import QUANTITIES
 
 NOTHING = "-"
 LEAST_KILO = 100.0  # N or W; what is less is shown without kilo

@@ -15,29 +15,58 @@ from flipflow.dynamics.normal import NormalMotion
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
-from flipflow.model.limits import LIMIT_FIELD
+from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
+from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, PiecewiseExact
 from flipflow.periodic.orbit import Orbit
-from flipflow.studies.feasible import limit_bounds, missing_for, missing_words, working_motion
-from flipflow.studies.limit_row import (
-    ATTENTION,
-    CLOSE,
-    FAIL,
-    NO_LIMIT,
-    NOT_CHECKED,
-    PASS,
-    LimitRow,
-    relative_margin,
-)
-from flipflow.studies.operating_region import OperatingRegion, analysed_range, operating_region
-from flipflow.studies.quantities import QUANTITIES, Working
+from flipflow.studies.feasible import working_motion
+from flipflow.studies.landmarks import analysed_range
+from flipflow.studies.operating_region import OperatingRegion, operating_region
+from flipflow.studies.quantities import Working
 from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
 from flipflow.studies.start_and_blows import Transients, transients
 
 TORNADO_SHARE = 0.05
+PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
+CLOSE = 0.05
+NO_LIMIT = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class LimitRow:
+    """One limit over all load cases.
+
+    Parameters
+    ----------
+    name, label, unit, shown_unit
+        Limit, its words, SI unit and unit to show.
+    limit
+        (least, most) in SI; infinite where there is no such end.
+    worst
+        The value nearest to or farthest beyond the limit, SI; None when not checked.
+    case
+        The load case in which it occurs.
+    margin
+        Distance from the limit as a share of the limit; negative when it is broken.
+    state
+        "pass", "attention" (met, but within 5 %), "fail" or "not checked".
+    reason
+        Why it was not checked.
+    """
+
+    name: str
+    label: str
+    unit: str
+    shown_unit: str
+    limit: tuple[float, float]
+    worst: float | None = None
+    case: str = ""
+    margin: float | None = None
+    state: str = NOT_CHECKED
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +200,7 @@ def assess(
         assess_case(project.screen.loaded(load), load, branch, project.speed)
         for load, branch in zip(project.load_cases, region.branches, strict=True)
     )
-    rows = tuple(limit_row(project, cases, name) for name in LIMIT_FIELD)
+    rows = tuple(limit_row(project, cases, limit.name) for limit in LIMIT_FIELDS)
     return Assessment(
         project=project,
         region=region,
@@ -209,7 +238,7 @@ def assess_case(
     working = None if omega is None else working_motion(screen, branch, omega)
     values: dict[str, float | None] = {}
     if working is not None:
-        values = {name: quantity.evaluate(working) for name, quantity in QUANTITIES.items()}
+        values = {one.name: working.value(one.name) for one in quantities_of("motion")}
     return CaseAssessment(
         name=load.name or "empty",
         load=load,
@@ -259,29 +288,35 @@ def _let_go_power(screen: FlipFlowScreen, orbit: Orbit) -> float:
 
 def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) -> LimitRow:
     """The worst case of one limit."""
-    quantity = QUANTITIES.get(name)
-    label = "speed" if quantity is None else quantity.label
-    unit = LIMIT_FIELD[name].unit
-    shown = LIMIT_FIELD[name].file_unit
+    quantity = QUANTITIES[name]
+    row = LimitRow(name, quantity.label, quantity.unit, quantity.shown_unit, NO_LIMIT)
     if getattr(project.limits, name) is None:
-        return LimitRow(name, label, unit, shown, NO_LIMIT, reason="no limit in the machine file")
+        return dataclasses.replace(row, reason="no limit in the machine file")
     low, high = limit_bounds(project.limits, name)
-    row = LimitRow(name, label, unit, shown, (low, high))
-    missing = missing_for(project.screen, name)
+    row = dataclasses.replace(row, limit=(low, high))
+    missing = quantity.missing(project.screen)
     if missing:
         return dataclasses.replace(row, reason=missing_words(missing))
     if project.speed is None:
         return dataclasses.replace(row, reason="no operating speed in the machine file")
+    given = project.speed if quantity.of == "operation" else None
     judged = [
         (relative_margin(value, low, high), value, case.name)
         for case in cases
-        if (value := project.speed if quantity is None else case.values.get(name)) is not None
+        if (value := given if given is not None else case.values.get(name)) is not None
     ]
     if not judged:
         return dataclasses.replace(row, reason="no motion found at working speed")
     margin, worst, case_name = min(judged, key=lambda one: one[0])
     state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
     return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
+
+
+def relative_margin(value: float, low: float, high: float) -> float:
+    """Distance from the nearer end as a share of that end; negative beyond it."""
+    to_low = (value - low) / abs(low) if math.isfinite(low) and low != 0.0 else math.inf
+    to_high = (high - value) / abs(high) if math.isfinite(high) and high != 0.0 else math.inf
+    return min(to_low, to_high)
 
 
 def verdict(

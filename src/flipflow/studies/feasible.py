@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from scipy.optimize import brentq
@@ -12,15 +12,14 @@ from scipy.optimize import brentq
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.special_points import STABILITY_CHANGES
 from flipflow.errors import IncompleteError
-from flipflow.model.fields import FIELD
-from flipflow.model.limits import LIMIT_FIELD, Limits
+from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.orbit import Orbit
-from flipflow.studies.quantities import QUANTITIES, Working
+from flipflow.studies.quantities import Working
 
 Interval = tuple[float, float]
 Intervals = tuple[Interval, ...]
-AT_LEAST = ("jump_margin",)
 STABILITY = "stability"
 REGION = "operating region"
 
@@ -55,27 +54,6 @@ class Bound:
     case: str
 
 
-def limit_bounds(limits: Limits, name: str) -> Interval:
-    """(least, most) of a limit in SI."""
-    value = getattr(limits, name)
-    if LIMIT_FIELD[name].interval:
-        return float(value[0]), float(value[1])
-    if name in AT_LEAST:
-        return float(value), math.inf
-    return -math.inf, float(value)
-
-
-def missing_for(screen: FlipFlowScreen, name: str) -> tuple[str, ...]:
-    """Fields a limit needs and the screen does not have."""
-    needs = {*LIMIT_FIELD[name].needs, *(QUANTITIES[name].needs if name in QUANTITIES else ())}
-    return tuple(sorted(need for need in needs if getattr(screen, need) is None))
-
-
-def missing_words(fields: tuple[str, ...]) -> str:
-    """Where in the machine file the missing fields belong, in words."""
-    return "missing in the machine file: " + ", ".join(FIELD[name].key for name in fields)
-
-
 def case_window(
     screen: FlipFlowScreen, load: Load, branch: Branch, limits: Limits, span: Interval
 ) -> CaseWindow:
@@ -83,7 +61,7 @@ def case_window(
     unchecked = {
         name: missing_words(missing)
         for name in limits.given
-        if (missing := missing_for(screen, name))
+        if (missing := QUANTITIES[name].missing(screen))
     }
     runs = _runs(branch, screen, span)
     intervals: dict[str, Intervals] = {
@@ -94,11 +72,10 @@ def case_window(
         if name in unchecked:
             continue
         low, high = limit_bounds(limits, name)
-        if name == "speed":
+        if QUANTITIES[name].of == "operation":
             intervals[name] = intersect(((low, high),), (span,))
             continue
-        evaluate = QUANTITIES[name].evaluate
-        met = [_met(run, evaluate, low, high) for run in runs]
+        met = [_met(run, name, low, high) for run in runs]
         intervals[name] = _joined([parts for parts, _ in met], span)
         notes += [
             f"{QUANTITIES[name].label} is not known between {_rpm(a)} and {_rpm(b)} rpm, and its "
@@ -227,19 +204,18 @@ def _speed_of(orbit: Orbit) -> float:
     return orbit.omega
 
 
-def _met(
-    run: _Run, evaluate: Callable[[Working], float | None], low: float, high: float
-) -> tuple[list[Interval], list[Interval]]:
+def _met(run: _Run, name: str, low: float, high: float) -> tuple[list[Interval], list[Interval]]:
     """Parts of a run in which low <= quantity <= high, their ends solved for.
 
     Besides, the gaps in which an end lies and no motion is found; they are left out.
     """
 
-    def clearance(value: float | None) -> float:
+    def clearance(motion: Working) -> float:
+        value = motion.value(name)
         number = math.nan if value is None else min(value, 1e30)
         return min(number - low, high - number)
 
-    values = [clearance(evaluate(node)) for node in run.nodes]
+    values = [clearance(node) for node in run.nodes]
     parts: list[Interval] = []
     gaps: list[Interval] = []
     begin = run.nodes[0].omega if values[0] >= 0.0 else None
@@ -250,7 +226,7 @@ def _met(
         ends = {a: values[k - 1], b: values[k]}
 
         def height(omega: float, ends: dict[float, float] = ends) -> float:
-            return ends[omega] if omega in ends else clearance(evaluate(run.at(omega)))
+            return ends[omega] if omega in ends else clearance(run.at(omega))
 
         try:
             root = float(brentq(height, a, b, xtol=1e-9 * b, rtol=1e-12))

@@ -15,7 +15,7 @@ from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method
-from flipflow.studies.operating_region import Landmarks, analysed_range, landmarks
+from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 
 Real = NDArray[np.float64]
 Start = Literal["unloaded", "loaded"]

@@ -2,33 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
-import numpy as np
-
-from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.continuation.special_points import CONTACT_BEGIN
-from flipflow.dynamics.linear_response import (
-    antiresonance_frequency,
-    bonded_natural_frequencies,
-    equal_amplitude_frequency,
-    linear_response,
-)
 from flipflow.errors import InputError
 from flipflow.model.arguments import check_interval
 from flipflow.model.limits import Limits
 from flipflow.model.monitor import Monitor, silent
+from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method
 from flipflow.studies.feasible import Bound, CaseWindow, Intervals, case_window, common_window
-from flipflow.studies.quantities import QUANTITIES
+from flipflow.studies.landmarks import analysed_range, landmarks
 
-LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
-MAIN_SHARE = 0.25  # of the peak: folds of smaller motions are not those of the main resonance
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
 JUMP_WORDS = "jump when the speed falls (w_lb)"
 ANTIRESONANCE_WORDS = "antiresonance of the main frame (w_ar)"
@@ -198,105 +187,3 @@ def _unchecked_notes(cases: Sequence[CaseWindow]) -> Iterator[str]:
         *others, last = labels
         named = f"limits on {', '.join(others)} and {last} are" if others else f"limit on {last} is"
         yield f"The {named} not checked: {why}."
-
-
-def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[float, float]:
-    """From well below the first natural frequency to well above the last with stops engaged.
-
-    A working speed in rad/s that lies outside widens the range.
-    """
-    low = LOWEST_SHARE * float(linear_response(screen, 1.0).natural_frequencies[0])
-    high = HIGHEST_SHARE * float(bonded_natural_frequencies(screen)[-1])
-    if speed is None:
-        return low, high
-    return min(low, 0.9 * speed), max(high, 1.1 * speed)
-
-
-@dataclass(frozen=True)
-class Landmarks:
-    """Characteristic frequencies of a screen and its operating region, all in rad/s.
-
-    Parameters
-    ----------
-    omega_ea, omega_ar, omega_cs, omega_lb, omega_ub
-        As in :class:`OperatingRegion`.
-    lower, upper
-        The paper's operating region.
-    notes
-        What is to be kept in mind.
-    """
-
-    omega_ea: float | None
-    omega_ar: float | None
-    omega_cs: float | None
-    omega_lb: float | None
-    omega_ub: float | None
-    lower: float
-    upper: float
-    notes: tuple[str, ...] = ()
-
-
-def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
-    """Read w_ea, w_ar, w_cs, w_lb, w_ub and the region between them off a screen's branch.
-
-    Raises
-    ------
-    IncompleteError
-        When the branch has no points.
-    """
-    ea, ar = equal_amplitude_frequency(screen), antiresonance_frequency(screen)
-    works = screen.has_stop and not screen.stop().bonded
-    peak = _main_peak(branch, ar)
-    touched = peak.orbit.touches and works
-    begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.position < peak.position]
-    cs = begins[-1] if begins and touched else None
-    lb, ub = _main_folds(branch, peak)
-    span = (float(branch.omega.min()), float(branch.omega.max()))
-    upper = peak.omega if lb is None else lb
-    if cs is not None:
-        return Landmarks(ea, ar, cs, lb, ub, cs, upper)
-    if touched:
-        note = "Contact begins below the speeds analysed: the region starts with them."
-        return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
-    notes = tuple(_untouched_notes(branch)) if works else ()
-    lower, upper = ea or span[0], ar or span[1]
-    if lower >= upper:
-        notes += ("Equal amplitudes come above the antiresonance: the region is empty.",)
-    return Landmarks(ea, ar, cs, lb, ub, lower, upper, notes)
-
-
-def _untouched_notes(branch: Branch) -> Iterator[str]:
-    """What to say of a stop that is not reached where it shall work."""
-    if np.any(branch.traced.signature != 0):
-        yield (
-            "The stop is not reached at the main resonance, only elsewhere: the region is that of "
-            "a screen without stop."
-        )
-    else:
-        yield "The stop is not reached at any speed analysed."
-
-
-def _main_peak(branch: Branch, antiresonance: float | None) -> SpecialPoint:
-    """The largest relative motion above the antiresonance, which parts the two resonances."""
-    peak = branch.peak("relative")
-    if antiresonance is None or peak.omega >= antiresonance:
-        return peak
-    higher = [one for one in branch.peaks("relative") if one.omega >= antiresonance]
-    return max(higher, key=lambda one: one.amplitude("relative"), default=peak)
-
-
-def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
-    """(w_lb, w_ub): the first two folds on the way down from the main peak.
-
-    A fold beyond a trough belongs to another resonance, as do those before the peak.
-    """
-    size = branch.amplitude("relative")
-    for first, second in pairwise(branch.folds):
-        # A peak and the fold beside it may stand in one step of the branch.
-        if first.position <= peak.position - 1.0:
-            continue
-        way = size[math.ceil(peak.position) : math.floor(first.position) + 1]
-        if np.any(way < first.amplitude("relative")):
-            break
-        return min(first.omega, second.omega), max(first.omega, second.omega)
-    return None, None

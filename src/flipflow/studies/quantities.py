@@ -1,7 +1,7 @@
-"""Quantities of a working machine: one registry behind limits, tables and reports.
+"""Quantities of motions, evaluated: one formula each, for one motion or for arrays of them.
 
-Each is read off one motion of the machine (a :class:`Working`). Acceleration and foundation force
-are judged on both directions together; without the normal direction's data they are None.
+What each quantity is and needs stands in :mod:`flipflow.model.quantities`. Acceleration and
+foundation force are judged on both directions together.
 """
 
 from __future__ import annotations
@@ -10,31 +10,107 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, NamedTuple, TypeVar
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.dynamics.normal import NormalMotion, normal_motion
+from flipflow.dynamics.contact_free import contact_free
+from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
 from flipflow.model.constants import GRAVITY
+from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
 
 Real = NDArray[np.float64]
-Subject = TypeVar("Subject")
+Complex = NDArray[np.complex128]
+Values = float | Real
+Frame = Literal["main", "floating"]
+Coordinate = Literal["main", "floating", "relative"]
 
 
-class _States(NamedTuple):
-    """Displacement, velocity and acceleration, (K, N) each."""
+class Motions(Protocol):
+    """What a quantity is read off: one motion of a screen, or many of many screens.
 
-    x: Real
-    v: Real
-    a: Real
+    Every answer is a number for one motion and an array over motions for many; NaN where the
+    screen lacks data.
+    """
+
+    @property
+    def omega(self) -> Values:
+        """Frequency in rad/s."""
+        ...
+
+    def field(self, name: str) -> Values:
+        """A field of the screen, SI."""
+        ...
+
+    def amplitude(self, which: Coordinate) -> Values:
+        """Half peak-to-peak of a coordinate in m."""
+        ...
+
+    def phase(self, which: Coordinate) -> Values:
+        """Phase of the first harmonic against the exciting force in rad; positive: it leads."""
+        ...
+
+    def reach(self) -> Values:
+        """Greatest size of the relative displacement in m."""
+        ...
+
+    def normal_amplitude(self) -> Values:
+        """Amplitude normal to the surface in m."""
+        ...
+
+    def peak_acceleration(self, frame: Frame) -> Values:
+        """Greatest acceleration of a frame in m/s^2, both directions together."""
+        ...
+
+    def foundation_force(self) -> Values:
+        """Greatest force of the isolation springs in N, both directions together."""
+        ...
+
+    def stop_force(self) -> Values:
+        """Greatest force of the stop springs of one side in N."""
+        ...
+
+    def dissipated_power(self) -> Values:
+        """Mean power that all dampers take, both directions together, in W."""
+        ...
+
+    def jump_margin(self) -> Values:
+        """Distance from the nearest fold as a share of its frequency.
+
+        0 between the two folds of a jump, infinite without folds.
+        """
+        ...
+
+
+MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
+    "relative_amplitude": lambda m: m.amplitude("relative"),
+    "stroke": lambda m: 2.0 * m.amplitude("relative"),
+    "main_amplitude": lambda m: m.amplitude("main"),
+    "floating_amplitude": lambda m: m.amplitude("floating"),
+    "relative_phase": lambda m: m.phase("relative"),
+    "main_frame_acceleration": lambda m: m.peak_acceleration("main"),
+    "floating_frame_acceleration": lambda m: m.peak_acceleration("floating"),
+    "shear_strain": lambda m: m.reach() / m.field("shear_height"),
+    "stop_force": lambda m: m.stop_force(),
+    "stop_piece_force": lambda m: m.stop_force() / m.field("stop_pieces"),
+    "foundation_force": lambda m: m.foundation_force(),
+    "support_force": lambda m: m.foundation_force() / m.field("supports"),
+    "exciter_force": lambda m: m.field("eccentric_moment") * m.omega**2,
+    "bearing_force": lambda m: m.field("eccentric_moment") * m.omega**2 / m.field("bearings"),
+    "dissipated_power": lambda m: m.dissipated_power(),
+    "jump_margin": lambda m: m.jump_margin(),
+    "throw_number": lambda m: (
+        m.omega**2 * m.normal_amplitude() / (GRAVITY * np.cos(m.field("deck_angle")))
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Working:
-    """A screen in one periodic motion.
+    """A screen in one periodic motion, solved for.
 
     Parameters
     ----------
@@ -50,6 +126,12 @@ class Working:
     orbit: Orbit
     jumps: tuple[float, ...] = ()
 
+    def value(self, name: str) -> float | None:
+        """A quantity by name, SI; None where the screen lacks data that it needs."""
+        if QUANTITIES[name].missing(self.screen):
+            return None
+        return float(MOTION_VALUES[name](self))
+
     @property
     def omega(self) -> float:
         """Frequency in rad/s."""
@@ -60,190 +142,157 @@ class Working:
         """Motion normal to the surface, None where its data are missing."""
         return normal_motion(self.screen, self.omega)
 
-    def peak_with_normal(
+    def field(self, name: str) -> float:
+        return _number(getattr(self.screen, name))
+
+    def amplitude(self, which: Coordinate) -> float:
+        return self.orbit.amplitude(which)
+
+    def phase(self, which: Coordinate) -> float:
+        return self.orbit.phase(which)
+
+    def reach(self) -> float:
+        return self.orbit.amplitude("relative") + abs(self.orbit.mean("relative"))
+
+    def normal_amplitude(self) -> float:
+        return math.nan if self.normal is None else self.normal.amplitude
+
+    def peak_acceleration(self, frame: Frame) -> float:
+        degree = 0 if frame == "main" else 1
+        return self._peak(lambda _, __, a: a[:, degree], NormalMotion.acceleration)
+
+    def foundation_force(self) -> float:
+        k, c = self.screen.isolation_stiffness, self.screen.isolation_damping
+        return self._peak(lambda x, v, _: k * x[:, 0] + c * v[:, 0], NormalMotion.foundation_force)
+
+    def stop_force(self) -> float:
+        return self.orbit.stop_force_peak() if self.screen.has_stop else 0.0
+
+    def dissipated_power(self) -> float:
+        return math.nan if self.normal is None else self.orbit.input_power() + self.normal.power
+
+    def jump_margin(self) -> float:
+        zones = zip(self.jumps[::2], self.jumps[1::2], strict=False)
+        if any(min(zone) <= self.omega <= max(zone) for zone in zones):
+            return 0.0
+        return min((abs(self.omega - jump) / jump for jump in self.jumps), default=math.inf)
+
+    def _peak(
         self,
-        along: Callable[[_States], Real],
+        along: Callable[[Real, Real, Real], Real],
         across: Callable[[NormalMotion, Real], Real],
-    ) -> float | None:
+    ) -> float:
         """Peak over the turn of the vector (along the surface, normal to it)."""
         normal = self.normal
         if normal is None:
-            return None
-        return self.orbit.peak(
-            lambda t, x, v, a: np.hypot(along(_States(x, v, a)), across(normal, t))
-        )
+            return math.nan
+        return self.orbit.peak(lambda t, x, v, a: np.hypot(along(x, v, a), across(normal, t)))
 
 
-@dataclass(frozen=True)
-class Quantity(Generic[Subject]):
-    """One number that says how a machine works, read off one of its motions.
+@dataclass(frozen=True, eq=False)
+class ContactFree:
+    """S screens that touch no stop, at K frequencies, in closed form; every answer is (S, K).
 
     Parameters
     ----------
-    name, label, symbol
-        Key, words for people, symbol.
-    unit, shown_unit
-        SI unit and the unit it is shown in.
-    sentence
-        What it is.
-    evaluate
-        Its value in SI for a :class:`Working`, None where data are missing or there is none.
-    needs
-        Fields of the screen without which it is None.
+    fields
+        Fields of the screens in SI, each (S, 1) or one number; NaN where there is none.
+    omega
+        Frequencies in rad/s, (K,).
     """
 
-    name: str
-    label: str
-    symbol: str
-    unit: str
-    shown_unit: str
-    sentence: str
-    evaluate: Callable[[Subject], float | None]
-    needs: tuple[str, ...] = ()
+    fields: Mapping[str, Real]
+    omega: Real
+
+    @cached_property
+    def force(self) -> Real:
+        """m0r w^2 in N."""
+        return np.asarray(self.fields["eccentric_moment"] * self.omega**2)
+
+    @cached_property
+    def receptance(self) -> Complex:
+        """X1 and X2 = X1 - Xf over the force on the main frame in m/N, (S, K, 2).
+
+        These are what isolation and shear springs see; each stiffness stands in one entry of the
+        matrix, so that stiff springs cost no digits.
+        """
+        f = self.fields
+        m1, m2 = f["main_mass"], f["floating_mass"]
+        M = _symmetric(m1 + m2, -m2, m2)
+        C = _symmetric(f["isolation_damping"], 0.0, f["shear_damping"])
+        K = _symmetric(f["isolation_stiffness"], 0.0, f["shear_stiffness"])
+        return contact_free(M, C, K, np.array([1.0, 0.0]), self.omega)
+
+    @cached_property
+    def main(self) -> Complex:
+        """X1 in m."""
+        return np.asarray(self.receptance[..., 0] * self.force)
+
+    @cached_property
+    def relative(self) -> Complex:
+        """X2 = X1 - Xf in m."""
+        return np.asarray(self.receptance[..., 1] * self.force)
+
+    @cached_property
+    def normal(self) -> Complex:
+        """Y in m, both frames as one mass normal to the surface."""
+        f = self.fields
+        mass, moment = f["main_mass"] + f["floating_mass"], f["eccentric_moment"]
+        return normal_amplitude(
+            mass, f["normal_damping"], f["normal_stiffness"], moment, self.omega
+        )
+
+    def field(self, name: str) -> Real:
+        return self.fields[name]
+
+    def coordinate(self, which: Coordinate) -> Complex:
+        """Complex amplitude of a coordinate in m."""
+        if which == "floating":
+            return np.asarray(self.main - self.relative)
+        return self.main if which == "main" else self.relative
+
+    def amplitude(self, which: Coordinate) -> Real:
+        return np.abs(self.coordinate(which))
+
+    def phase(self, which: Coordinate) -> Real:
+        return np.angle(self.coordinate(which))
+
+    def reach(self) -> Real:
+        return self.amplitude("relative")
+
+    def normal_amplitude(self) -> Real:
+        return np.abs(self.normal)
+
+    def peak_acceleration(self, frame: Frame) -> Real:
+        return np.asarray(self.omega**2 * peak_of_both(self.coordinate(frame), self.normal))
+
+    def foundation_force(self) -> Real:
+        f, rate = self.fields, 1j * self.omega
+        along = f["isolation_stiffness"] + rate * f["isolation_damping"]
+        across = f["normal_stiffness"] + rate * f["normal_damping"]
+        return peak_of_both(along * self.main, across * self.normal)
+
+    def stop_force(self) -> Real:
+        return np.zeros(self.force.shape)
+
+    def dissipated_power(self) -> Real:
+        parts = (
+            ("isolation_damping", self.main),
+            ("shear_damping", self.relative),
+            ("normal_damping", self.normal),
+        )
+        taken = sum(self.fields[name] * np.abs(X) ** 2 for name, X in parts)
+        return np.asarray(0.5 * self.omega**2 * taken)
+
+    def jump_margin(self) -> Real:
+        return np.full(self.force.shape, math.inf)
 
 
-def _main_acceleration(w: Working) -> float | None:
-    return w.peak_with_normal(lambda s: s.a[:, 0], NormalMotion.acceleration)
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
-def _floating_acceleration(w: Working) -> float | None:
-    return w.peak_with_normal(lambda s: s.a[:, 1], NormalMotion.acceleration)
-
-
-def _foundation_force(w: Working) -> float | None:
-    k, c = w.screen.isolation_stiffness, w.screen.isolation_damping
-    return w.peak_with_normal(
-        lambda s: k * s.x[:, 0] + c * s.v[:, 0], NormalMotion.foundation_force
-    )
-
-
-def _stop_force(w: Working) -> float:
-    return w.orbit.stop_force_peak() if w.screen.has_stop else 0.0
-
-
-def _dissipated_power(w: Working) -> float | None:
-    return None if w.normal is None else w.orbit.input_power() + w.normal.power
-
-
-def _shear_strain(w: Working) -> float | None:
-    height = w.screen.shear_height
-    if height is None:
-        return None
-    reach = w.orbit.amplitude("relative") + abs(w.orbit.mean("relative"))
-    return reach / height
-
-
-def _jump_margin(w: Working) -> float:
-    if not w.jumps:
-        return math.inf
-    zones = zip(w.jumps[::2], w.jumps[1::2], strict=False)
-    if any(min(zone) <= w.omega <= max(zone) for zone in zones):
-        return 0.0
-    return min(abs(w.omega - jump) / jump for jump in w.jumps)
-
-
-def _throw_number(w: Working) -> float | None:
-    if w.normal is None or w.screen.deck_angle is None:
-        return None
-    return w.omega**2 * w.normal.amplitude / (GRAVITY * math.cos(w.screen.deck_angle))
-
-
-def _share(value: float | None, pieces: float | None) -> float | None:
-    return None if value is None or pieces is None else value / pieces
-
-
-def _exciter_force(w: Working) -> float:
-    return w.screen.eccentric_moment * w.omega**2
-
-
-_NORMAL = ("normal_stiffness", "normal_damping")
-
-_ALL: tuple[Quantity[Working], ...] = (
-    Quantity(
-        "relative_amplitude", "relative amplitude", "|x2|", "m", "mm",
-        "Half the peak-to-peak motion between the frames; it tightens and slackens the panels.",
-        lambda w: w.orbit.amplitude("relative"),
-    ),
-    Quantity(
-        "stroke", "stroke", "2|x2|", "m", "mm",
-        "Full travel between the frames, twice the relative amplitude.",
-        lambda w: 2.0 * w.orbit.amplitude("relative"),
-    ),
-    Quantity(
-        "main_amplitude", "main frame amplitude", "|x1|", "m", "mm",
-        "Half the peak-to-peak motion of the main frame along the surface.",
-        lambda w: w.orbit.amplitude("main"),
-    ),
-    Quantity(
-        "floating_amplitude", "floating frame amplitude", "|xf|", "m", "mm",
-        "Half the peak-to-peak motion of the floating frame along the surface.",
-        lambda w: w.orbit.amplitude("floating"),
-    ),
-    Quantity(
-        "relative_phase", "relative phase", "phi2", "rad", "deg",
-        "First harmonic of the relative motion against the unbalance force; positive: it leads.",
-        lambda w: w.orbit.phase("relative"),
-    ),
-    Quantity(
-        "main_frame_acceleration", "main frame acceleration", "a1", "m/s^2", "g",
-        "Greatest acceleration of the main frame over a turn, in any direction.",
-        _main_acceleration, _NORMAL,
-    ),
-    Quantity(
-        "floating_frame_acceleration", "floating frame acceleration", "af", "m/s^2", "g",
-        "Greatest acceleration of the floating frame over a turn, in any direction.",
-        _floating_acceleration, _NORMAL,
-    ),
-    Quantity(
-        "stop_force", "stop force", "H", "N", "kN",
-        "Greatest force on the stop springs of one side together.",
-        _stop_force,
-    ),
-    Quantity(
-        "stop_piece_force", "force per stop spring", "H/n3", "N", "kN",
-        "The stop force shared by the stop springs of one side.",
-        lambda w: _share(_stop_force(w), w.screen.stop_pieces), ("stop_pieces",),
-    ),
-    Quantity(
-        "shear_strain", "shear strain", "gamma", "", "%",
-        "Greatest relative displacement over the rubber height of the shear springs.",
-        _shear_strain, ("shear_height",),
-    ),
-    Quantity(
-        "foundation_force", "foundation force", "F1", "N", "kN",
-        "Greatest dynamic force of all isolation springs on the foundation, in any direction.",
-        _foundation_force, _NORMAL,
-    ),
-    Quantity(
-        "support_force", "force per support", "F1/n1", "N", "kN",
-        "The dynamic foundation force shared by the supports.",
-        lambda w: _share(_foundation_force(w), w.screen.supports), (*_NORMAL, "supports"),
-    ),
-    Quantity(
-        "exciter_force", "exciter force", "m0r w^2", "N", "kN",
-        "Centrifugal force of the unbalance.",
-        _exciter_force,
-    ),
-    Quantity(
-        "bearing_force", "force per exciter bearing", "m0r w^2/nb", "N", "kN",
-        "The exciter force shared by the bearings.",
-        lambda w: _share(_exciter_force(w), w.screen.bearings), ("bearings",),
-    ),
-    Quantity(
-        "dissipated_power", "dissipated power", "P", "W", "kW",
-        "Mean power that all dampers turn into heat; the motor must be larger.",
-        _dissipated_power, _NORMAL,
-    ),
-    Quantity(
-        "jump_margin", "margin to the jump", "", "", "%",
-        "Distance of the speed from the nearest jump speed, as a share of the jump speed.",
-        _jump_margin,
-    ),
-    Quantity(
-        "throw_number", "throw number", "Kv", "", "",
-        "Greatest acceleration normal to the deck over gravity's share; beyond 1 material flies.",
-        _throw_number, (*_NORMAL, "deck_angle"),
-    ),
-)  # fmt: skip
-
-QUANTITIES: Mapping[str, Quantity[Working]] = {quantity.name: quantity for quantity in _ALL}
+def _symmetric(first: Real, off: Real | float, last: Real) -> Real:
+    """Matrices of two degrees of freedom, (..., 2, 2)."""
+    a, b, d = np.broadcast_arrays(first, off, last)
+    return np.stack([np.stack([a, b], axis=-1), np.stack([b, d], axis=-1)], axis=-2)

@@ -17,8 +17,8 @@ from flipflow.model.arguments import check_interval
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.options import Method
+from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.studies.loading import relative_from_below
-from flipflow.studies.operating_region import Landmarks, analysed_range, landmarks
 
 Real = NDArray[np.float64]
 FREQUENCIES = 9

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,24 +15,22 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
+from flipflow.model.quantities import BranchWord, Quantity
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import system_of
 from flipflow.periodic.options import PiecewiseExact
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
-from flipflow.studies.linear_motions import LINEAR, LinearMotions
-from flipflow.studies.quantities import Quantity, Working
-from flipflow.studies.response_quantities import Response, ResponseQuantity
+from flipflow.studies.landmarks import RESPONSE_VALUES, Response
+from flipflow.studies.quantities import MOTION_VALUES, ContactFree, Working
 
 Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
-BranchWord = Literal["from-below", "upper", "lower"]
 STOP_FIELDS = {"stop_stiffness", "stop_damping", "clearance", "clearance_minus", "stop_law"}
-NEEDS_FOLDS = "jump_margin"
 CHUNK_ROWS = 16
 # Complex numbers in a chunk of the closed form: its temporaries stay in the cache.
-CHUNK_VALUES = 50_000
+CHUNK_VALUES = 12_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,34 +52,28 @@ class Question:
     """
 
     screen: FlipFlowScreen
-    quantity: Quantity[Working] | ResponseQuantity
+    quantity: Quantity
     omega: Real
     span: tuple[float, float]
     branch: BranchWord
 
     def in_closed_form(self, names: Sequence[str]) -> bool:
-        """Whether no sample can touch a stop and the quantity has a formula."""
+        """Whether no sample can touch a stop, so that every motion has a formula."""
         free = not self.screen.has_stop and not STOP_FIELDS & set(names)
-        return free and self.quantity.name in LINEAR
+        return free and self.quantity.of == "motion"
 
 
 def closed_form_values(question: Question, columns: Columns, omega: Real) -> Real:
     """The quantity of S samples at frequencies (K,), (S, K); NaN where physics forbids a value."""
-    names = ("normal_stiffness", "normal_damping", "shear_height")
-    nominal = {f.name: getattr(question.screen, f.name) for f in FIELD.values()}
-    fields: dict[str, Any] = {
-        name: np.asarray(value, dtype=float)
-        for name, value in nominal.items()
-        if value is not None or name in names
-    }
+    nominal = {name: np.asarray(getattr(question.screen, name), float) for name in FIELD}
+    evaluate = MOTION_VALUES[question.quantity.name]
     rows = len(next(iter(columns.values())))
     values = np.empty((rows, omega.size))
     step = max(CHUNK_VALUES // omega.size, 1)
     for begin in range(0, rows, step):
         part = slice(begin, begin + step)
         own = {name: np.asarray(column[part], float)[:, None] for name, column in columns.items()}
-        motions = LinearMotions(fields | own, omega)
-        values[part] = LINEAR[question.quantity.name](motions)
+        values[part] = evaluate(ContactFree(nominal | own, omega))
     for name, column in columns.items():
         values[~_allowed(name, np.asarray(column, dtype=float))] = np.nan
     return values
@@ -143,21 +135,21 @@ def values_of(question: Question, screen: FlipFlowScreen) -> Iterator[float | No
         When a branch could not be followed.
     """
     quantity = question.quantity
-    if isinstance(quantity, ResponseQuantity):
-        yield quantity.evaluate(Response(screen, question.span))
+    if quantity.of == "response":
+        yield RESPONSE_VALUES[quantity.name](Response(screen, question.span))
         return
     for working in _workings(question, screen):
-        yield None if working is None else quantity.evaluate(working)
+        yield None if working is None else working.value(quantity.name)
 
 
 def _workings(question: Question, screen: FlipFlowScreen) -> Iterator[Working | None]:
     """The motion that is meant at each frequency."""
     omega = question.omega.tolist()
     below = question.branch == "from-below"
-    if below and question.quantity.name != NEEDS_FOLDS and len(omega) == 1:
+    narrow = below and not question.quantity.of_folds
+    if narrow and len(omega) == 1:
         yield _reached(screen, omega[0])
         return
-    narrow = below and question.quantity.name != NEEDS_FOLDS
     branch = Response(screen, (min(omega), max(omega)) if narrow else question.span).branch
     for one in omega:
         if below:
@@ -190,7 +182,8 @@ def _allowed(name: str, column: Real) -> NDArray[np.bool_]:
     """Where physics allows the values of a field."""
     field = FIELD[name]
     low = column > field.lower if field.lower_open else column >= field.lower
-    return np.asarray(low & (column <= field.upper))
+    whole = column == np.rint(column) if field.whole else np.full(column.shape, True)
+    return np.asarray(low & (column <= field.upper) & np.isfinite(column) & whole)
 
 
 def _number(value: float | None) -> float:

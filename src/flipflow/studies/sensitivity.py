@@ -14,16 +14,13 @@ from flipflow import __version__
 from flipflow.errors import IncompleteError, InputError, StoreError
 from flipflow.model.arguments import check_interval, checked_count, checked_generator
 from flipflow.model.monitor import Monitor
+from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Choice, Distribution, Interval, Normal, Variation, Vary, variations
 from flipflow.results.codec import array, plain
 from flipflow.studies.documents import Document, machine_document, screen_from
-from flipflow.studies.feasible import missing_words
-from flipflow.studies.operating_region import analysed_range
-from flipflow.studies.quantities import Quantity, Working
-from flipflow.studies.response_quantities import ResponseQuantity, quantity_named
+from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.samples import (
-    BranchWord,
     Columns,
     Question,
     closed_form_values,
@@ -52,7 +49,7 @@ class Sensitivity:
     screen
         The machine about which the fields vary.
     quantity
-        Name of the quantity, a key of the registry.
+        Name of the quantity, one of the table in :mod:`flipflow.model.quantities`.
     branch
         Which motion is meant where several exist.
     names, distributions
@@ -360,7 +357,7 @@ def _question(machine: object, name: str, omega: object, branch: BranchWord) -> 
     if branch not in get_args(BranchWord):
         raise InputError("branch", branch, f"choose one of {', '.join(get_args(BranchWord))}")
     span = analysed_range(machine)
-    if isinstance(quantity, ResponseQuantity):
+    if quantity.of == "response":
         wanted = span if omega is None else check_interval(omega)
         return Question(machine, quantity, np.array([np.nan]), wanted, branch)
     _require_data(machine, quantity)
@@ -379,8 +376,8 @@ def _nominal(question: Question) -> Real:
     return np.array(values, dtype=float)
 
 
-def _require_data(machine: FlipFlowScreen, quantity: Quantity[Working]) -> None:
-    absent = tuple(need for need in quantity.needs if getattr(machine, need) is None)
+def _require_data(machine: FlipFlowScreen, quantity: Quantity) -> None:
+    absent = quantity.missing(machine)
     if absent:
         raise InputError("quantity", quantity.name, missing_words(absent))
 
@@ -464,7 +461,7 @@ def _result(
     ends: Real,
     omega: object,
 ) -> Sensitivity:
-    response = isinstance(question.quantity, ResponseQuantity)
+    response = question.quantity.of == "response"
     one = response or np.ndim(omega) == 0  # type: ignore[arg-type]
 
     def over(table: Real) -> Any:
