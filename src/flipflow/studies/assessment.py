@@ -19,7 +19,7 @@ from flipflow.model.limits import LIMIT_FIELD
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.periodic.options import Method, PiecewiseExact
+from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.feasible import limit_bounds, missing_for, missing_words, working_motion
 from flipflow.studies.limit_row import (
@@ -159,12 +159,13 @@ def assess(
     if not isinstance(project, Project):
         remedy = "give a project, such as ff.load_project('ffs0827')"
         raise InputError("project", type(project).__name__, remedy)
+    span = analysed_range(project.screen, project.speed)
     region = operating_region(
         project.screen,
         project.limits,
         project.load_cases,
         monitor,
-        omega=omega or analysed_range(project.screen, project.speed),
+        omega=span if omega is None else omega,
         method=method,
     )
     cases = tuple(
@@ -182,7 +183,7 @@ def assess(
         tornado=None if project.speed is None else tornado(project.screen, project.speed),
         transients=None if project.speed is None else transients(project, project.speed),
         notes=(*project.warnings, *region.notes, *coexisting(cases)),
-        method=method or PiecewiseExact(),
+        method=checked_method(method),
         version=__version__,
         input_hash=input_hash(project),
     )

@@ -19,11 +19,11 @@ from flipflow.dynamics.linear_response import (
     linear_response,
 )
 from flipflow.errors import InputError
-from flipflow.model.arguments import check_interval
+from flipflow.model.arguments import checked_all, checked_interval, checked_monitor
 from flipflow.model.limits import Limits
-from flipflow.model.monitor import Monitor, silent
+from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.periodic.options import Method
+from flipflow.periodic.options import Method, checked_method
 from flipflow.studies.feasible import Bound, CaseWindow, Intervals, case_window, common_window
 from flipflow.studies.quantities import QUANTITIES
 
@@ -150,11 +150,10 @@ def operating_region(
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
     if limits is not None and not isinstance(limits, Limits):
         raise InputError("limits", limits, "give an ff.Limits, or None for no limits")
-    if isinstance(load_cases, Load) or not all(isinstance(load, Load) for load in load_cases):
-        raise InputError("load_cases", load_cases, "give a list of ff.Load, such as [ff.Load()]")
-    say = monitor or silent
-    loads = tuple(load_cases) or (Load(name="empty"),)
-    span = analysed_range(screen) if omega is None else check_interval(omega)
+    remedy = "give a list of ff.Load, such as [ff.Load()]"
+    loads = checked_all("load_cases", load_cases, Load, remedy) or (Load(name="empty"),)
+    say, method = checked_monitor(monitor), checked_method(method)
+    span = analysed_range(screen) if omega is None else checked_interval("omega", omega)
     say("empty machine", 0.0)
     branch = frequency_response(screen, span, method)
     wanted = limits or Limits()
