@@ -11,10 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.plan import Plan
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_count, checked_numbers
 from flipflow.model.system import MechanicalSystem
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+TIMES = "give finite times in s"
+MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class Motion(ABC):
 
     def piece(self, t: ArrayLike) -> NDArray[np.intp]:
         """Index of the piece in which each time lies."""
-        inside = np.mod(np.asarray(t, float), self.period)
+        inside = np.mod(checked_numbers("t", t, TIMES), self.period)
         after = np.searchsorted(self.pieces.start, inside, side="right")
         return np.asarray(np.maximum(after - 1, 0))
 
@@ -77,6 +81,7 @@ class Motion(ABC):
 
         Where a contact changes, the same time stands twice, once for each piece.
         """
+        checked_count("least", least, MOST_SAMPLES)
         times, owner = [], []
         for e, (start, length) in enumerate(
             zip(self.pieces.start, self.pieces.length, strict=True)
@@ -89,6 +94,15 @@ class Motion(ABC):
     @abstractmethod
     def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
         """x, x' or x'' at times t taken from the given pieces, (K, N)."""
+
+    def _checked_pieces(self, t: object, piece: object) -> tuple[Real, NDArray[np.intp]]:
+        """Times in one row, and as many indices of pieces."""
+        remedy = "give the index of a piece for each time"
+        times, given = checked_numbers("t", t, TIMES), checked_numbers("piece", piece, remedy)
+        known = (given >= 0) & (given < self.pieces.start.size) & (given == np.floor(given))
+        if times.ndim != 1 or given.shape != times.shape or not known.all():
+            raise InputError("piece", piece, remedy)
+        return times, given.astype(np.intp)
 
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""
@@ -110,11 +124,13 @@ class PiecewiseMotion(Motion):
     drive: Complex  # (S, 2 N)
 
     def derivative(self, t: ArrayLike, order: int) -> Real:
-        times = np.mod(np.asarray(t, float), self.period)
+        times = np.mod(checked_numbers("t", t, TIMES), self.period)
         flat = self.piece_derivative(times.ravel(), self.piece(times).ravel(), order)
         return flat.reshape(*times.shape, self.system.size)
 
     def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
+        t, piece = self._checked_pieces(t, piece)
+        order = checked_count("order", order, 2, least=0)
         n = self.system.size
         slot = self.pieces.slot[piece]
         turn = np.exp(1j * self.omega * t) * (1j * self.omega) ** order
@@ -136,13 +152,14 @@ class SeriesMotion(Motion):
     series: Complex  # (n_h, N)
 
     def derivative(self, t: ArrayLike, order: int) -> Real:
-        times = np.asarray(t, float)
+        times = checked_numbers("t", t, TIMES)
+        order = checked_count("order", order, 2, least=0)
         rate = 1j * self.omega * self.harmonics
         turn = np.exp(rate * times[..., None]) * rate**order
         return np.asarray((turn @ self.series).real, dtype=float)
 
-    def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:  # noqa: ARG002
-        return self.derivative(t, order)
+    def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
+        return self.derivative(self._checked_pieces(t, piece)[0], order)
 
 
 def _joined(

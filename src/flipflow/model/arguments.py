@@ -24,7 +24,10 @@ from flipflow.model.monitor import Monitor, silent
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Kind = TypeVar("Kind")
-OMEGA_MOST = 1e6
+OMEGA_LEAST, OMEGA_MOST = 1e-9, 1e6
+WITHIN = (
+    f"no screen runs below {OMEGA_LEAST:g} or above {OMEGA_MOST:g} rad/s; give a frequency between"
+)
 # The square of a number beyond it overflows, and with it whatever is worked out from it.
 LARGEST = 1e150
 TOO_LARGE = f"no machine has a number beyond {LARGEST:g}; give a smaller one"
@@ -75,10 +78,10 @@ def checked_at_least_zero(name: str, value: object, unit: str = "") -> float:
 def checked_speed(omega: object, name: str = "omega") -> float:
     """One frequency in rad/s."""
     number = checked_number(name, omega, "give a finite frequency above 0 rad/s")
-    if not 0.0 < number <= OMEGA_MOST:
-        most = f"{OMEGA_MOST:g} rad/s"
-        remedy = f"no screen runs above {most}; give a frequency above 0 and up to {most}"
-        raise InputError(name, omega, remedy)
+    if number <= 0.0:
+        raise InputError(name, omega, "give a finite frequency above 0 rad/s")
+    if not OMEGA_LEAST <= number <= OMEGA_MOST:
+        raise InputError(name, omega, WITHIN)
     return number
 
 
@@ -91,8 +94,8 @@ def checked_speeds(
         raise InputError("omega", omega, remedy)
     if not (np.isfinite(speeds).all() and (speeds > 0.0).all()):
         raise InputError("omega", omega, remedy)
-    if speeds.max() > OMEGA_MOST:
-        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
+    if speeds.min() < OMEGA_LEAST or speeds.max() > OMEGA_MOST:
+        raise InputError("omega", omega, WITHIN)
     return speeds
 
 
@@ -111,8 +114,8 @@ def checked_interval(name: str, value: object) -> tuple[float, float]:
         raise InputError(name, value, "give two finite speeds above 0 rad/s")
     if high <= low:
         raise InputError(name, value, "the interval is empty or reversed; give the lower end first")
-    if high > OMEGA_MOST:
-        raise InputError(name, value, f"no screen runs above {OMEGA_MOST:g} rad/s")
+    if low < OMEGA_LEAST or high > OMEGA_MOST:
+        raise InputError(name, value, WITHIN)
     return low, high
 
 
