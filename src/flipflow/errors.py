@@ -2,13 +2,40 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import numbers
+import reprlib
+from collections.abc import Iterable
+from typing import Any, ClassVar, cast
+
+WIDTH = 60  # characters of a value that a sentence shows
+PLAIN = (type(None), bool, int, float, complex, str, bytes)
 
 
 class FlipflowError(Exception):
     """Base of every error that flipflow raises on purpose."""
 
     exit_code: ClassVar[int] = 1
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled and copied by what it holds: errors of a worker reach the process that waits."""
+        state = {name: _portable(value) for name, value in self.__dict__.items()}
+        return _revived, (type(self), self.args), state
+
+
+def _revived(kind: type[FlipflowError], args: tuple[object, ...]) -> FlipflowError:
+    """An error with its sentence as it stood; a constructor may take other arguments."""
+    error = kind.__new__(kind, *args)
+    super(FlipflowError, error).__init__(*args)
+    return error
+
+
+class Shown(str):
+    """A value that cannot travel between processes, as the words that a sentence shows of it."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
 
 
 class InputError(FlipflowError, ValueError):
@@ -61,6 +88,37 @@ class SampledContactWarning(UserWarning):
     """A contact force was sampled at fixed times: the answer reproduces that method, no more."""
 
 
+class _Words(reprlib.Repr):
+    """Shortened values: of a container the first few members, of a large array its ends."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxfrozenset = 20
+        self.maxstring = self.maxother = self.maxlong = 10 * WIDTH
+
+
+_WORDS = _Words()
+
+
 def _shown(value: object) -> str:
-    text = repr(value) if isinstance(value, str) else str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    """A value on one line, shortened."""
+    if isinstance(value, (str, bytes)):
+        text = repr(value[:WIDTH])
+    elif isinstance(value, numbers.Integral) and abs(int(value)) >= 10**WIDTH:
+        text = f"a number of {int(value).bit_length() * 3 // 10} digits"
+    elif isinstance(value, numbers.Number):
+        text = str(value)
+    else:
+        text = " ".join(_WORDS.repr(value).split())
+    return text if len(text) <= WIDTH else text[: WIDTH - 3] + "..."
+
+
+def _portable(value: object) -> object:
+    """What can be pickled wherever an error may go; anything else as it is shown."""
+    known = type(value).__module__ in ("numpy", "fractions", "decimal")
+    if type(value) in PLAIN or (known and isinstance(value, numbers.Number)):
+        return value
+    row = type(value) in (list, tuple)
+    if row and all(type(one) in PLAIN for one in cast("Iterable[object]", value)):
+        return value
+    return Shown(_shown(value))

@@ -66,7 +66,7 @@ def test_jacobians_by_differences_of_the_residual(screen, exact, kind) -> None:
     """At points off the solution; 1e-5 of each row's size."""
     orbit = exact.orbits_at(203.0)[0]
     equations = kind(
-        lambda e: screen.replace(clearance=e).system(), (2e-3, 9e-3), 203.0,
+        lambda e: screen.replace(clearance=e).system(), (2e-3, 9e-3), 6e-3, 203.0,
         half_turn=True, turns=1,
     )  # fmt: skip
     extra = [203.0, 6e-3] if kind is FoldEquations else [6e-3]

@@ -106,12 +106,12 @@ def speed_of(project: Project, written: str | None) -> float:
 def speeds_of(written: tuple[str, str]) -> tuple[float, float]:
     """Speeds (low, high) in rad/s as asked for."""
     from flipflow.io.units import parse_quantity  # noqa: PLC0415
-    from flipflow.model.arguments import check_interval  # noqa: PLC0415  quick --help
+    from flipflow.model.arguments import checked_interval  # noqa: PLC0415  quick --help
 
     low, high = (parse_quantity(one, "rad/s", field="--speeds") for one in written)
     both = " to ".join(written)
     with as_written("--speeds", both):
-        check_interval((low, high))
+        checked_interval("omega", (low, high))
     for omega in (low, high):
         _check_speed("--speeds", both, omega)
     return low, high

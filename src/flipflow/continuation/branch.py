@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,13 @@ from scipy.optimize import minimize_scalar
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
 from flipflow.continuation.special_points import FOLD
 from flipflow.errors import IncompleteError, InputError
+from flipflow.model.arguments import (
+    checked_index,
+    checked_kind,
+    checked_number,
+    checked_speed,
+    checked_text,
+)
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
@@ -170,6 +176,7 @@ class Branch:
 
     def points_of(self, kind: str) -> tuple[SpecialPoint, ...]:
         """Special points of one kind, in branch order."""
+        checked_text("kind", kind)
         return tuple(point for point in self.special_points if point.kind == kind)
 
     def amplitude(self, which: Coordinate) -> Real:
@@ -183,8 +190,8 @@ class Branch:
 
     def orbit(self, i: int) -> Orbit:
         """The motion at point i of the branch."""
-        if not -self.omega.size <= i < self.omega.size:
-            raise InputError("i", i, f"the branch has points 0 to {self.omega.size - 1}")
+        n = self.omega.size
+        i = checked_index("i", i, n, f"the branch has points 0 to {n - 1}", least=-n)
         u, omega = self.traced.u[i], float(self.omega[i])
         point = Point(self.formulation, u, omega, known_map=self.return_maps[i])
         return Orbit(self.machine, point, str(self.stability[i]))
@@ -202,10 +209,10 @@ class Branch:
         ends = self.omega
         if ends.size == 0:
             raise IncompleteError(f"The branch has no points. {self.status.value}")
-        if not isinstance(omega, numbers.Real) or not ends.min() <= omega <= ends.max():
-            remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
+        remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
+        if not ends.min() <= checked_number("omega", omega, remedy) <= ends.max():
             raise InputError("omega", omega, remedy)
-        solver = self.formulation.solver()
+        solver, omega = self.formulation.solver(), float(omega)
         hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
         found: list[Orbit] = []
         for p in hits:
@@ -240,6 +247,7 @@ class Branch:
 
     def orbit_from_below(self, omega: float) -> Orbit | None:
         """The motion met at ``omega`` when the speed is raised slowly from below."""
+        omega = checked_speed(omega)
         for k, run in enumerate(self.rising_path):
             low = self.omega[run.start] if k == 0 else self._end_of(self.rising_path[k - 1])
             if low <= omega <= self._end_of(run):
@@ -254,6 +262,11 @@ class Branch:
 
     def solve_in(self, run: slice, omega: float) -> Orbit | None:
         """The motion at exactly ``omega`` near a run of rising points."""
+        omega, n = checked_speed(omega), self.omega.size
+        remedy = "give one of the branch's rising_path"
+        checked_kind("run", run, slice, remedy)
+        checked_index("run", run.start, n, remedy)
+        checked_index("run", run.stop, n + 1, remedy)
         if run.stop - run.start < 2:
             return None
         at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, run.stop - 1)

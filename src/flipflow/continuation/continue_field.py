@@ -33,7 +33,9 @@ from flipflow.continuation.special_points import (
 )
 from flipflow.continuation.switching import image
 from flipflow.errors import InputError
+from flipflow.model.arguments import checked_monitor, checked_pair, checked_word
 from flipflow.model.fields import MOTION_FIELDS
+from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Formulation, Point
@@ -42,7 +44,13 @@ from flipflow.periodic.stability import UNDETERMINED, determinant_plus, neimark_
 CUSP = "cusp"
 
 
-def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float]) -> FieldBranch:
+def continue_fold(
+    fold: SpecialPoint,
+    field: str,
+    interval: tuple[float, float],
+    *,
+    monitor: Monitor | None = None,
+) -> FieldBranch:
     """Follow a fold over a field of the machine: the jump speed as the machine is changed.
 
     Unknowns are the motion, omega and the field; the equations those of the motion and
@@ -57,6 +65,9 @@ def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float])
         A field of the screen, such as "clearance".
     interval
         (low, high) in the field's SI unit; it holds the machine's own value.
+    monitor
+        Called before each step with a sentence and the share of the interval that has been passed;
+        raise from it to cancel.
 
     Returns
     -------
@@ -70,17 +81,18 @@ def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float])
         For a point that is not a fold, a field that is not known or has no finite value, and an
         interval that is empty or does not hold it.
     """
-    if getattr(fold, "kind", None) != FOLD:
+    if not isinstance(fold, SpecialPoint) or fold.kind != FOLD:
         raise InputError("fold", fold, "give a fold of a branch, such as branch.folds[0]")
+    say = checked_monitor(monitor)
     orbit = fold.orbit
     screen, value = _screen_and_value(orbit, field)
     bounds = _check_bounds(screen, field, value, interval)
     own = orbit.point.formulation
     equations = FoldEquations(
-        _system_of(screen, field), bounds, orbit.omega,
+        _system_of(screen, field), bounds, value, orbit.omega,
         half_turn=own.half_turn and _stays_symmetric(screen, field, bounds), turns=own.turns,
     )  # fmt: skip
-    path = follow_both_ways(equations, np.concatenate([orbit.state, [orbit.omega, value]]))
+    path = follow_both_ways(equations, np.concatenate([orbit.state, [orbit.omega, value]]), say)
     tangents = np.array([point.tangent[-1] for point in path.points])
     tests = [Test(CUSP, tangents, lambda point: point.omega_tangent)]
     found, notes = zeros_of(tests, FieldFollower(equations), path)
@@ -92,16 +104,17 @@ def continue_fold(fold: SpecialPoint, field: str, interval: tuple[float, float])
 
 
 def field_branch(
-    orbit: Orbit, field: str, interval: tuple[float, float], sought: Formulation
+    orbit: Orbit, field: str, interval: tuple[float, float], sought: Formulation, monitor: Monitor
 ) -> FieldBranch:
     """The branch of a motion over a field, sought as a formulation has it."""
     screen, value = _screen_and_value(orbit, field)
     bounds = _check_bounds(screen, field, value, interval)
     half_turn = sought.half_turn and _stays_symmetric(screen, field, bounds)
     equations = FieldEquations(
-        _system_of(screen, field), bounds, orbit.omega, half_turn=half_turn, turns=sought.turns
-    )
-    path = follow_both_ways(equations, np.append(orbit.state, value))
+        _system_of(screen, field), bounds, value, orbit.omega,
+        half_turn=half_turn, turns=sought.turns,
+    )  # fmt: skip
+    path = follow_both_ways(equations, np.append(orbit.state, value), monitor)
     found, notes = zeros_of(_tests(equations, path), FieldFollower(equations), path)
     special = [
         _special(screen, field, one.kind, one.point, one.index + one.share, one.spring, one.side)
@@ -121,8 +134,7 @@ def _screen_and_value(orbit: Orbit, field: str) -> tuple[FlipFlowScreen, float]:
     if not isinstance(machine, FlipFlowScreen):
         remedy = "only a FlipFlowScreen has fields; a MechanicalSystem is followed over 'omega'"
         raise InputError("field", field, remedy)
-    if field not in MOTION_FIELDS:
-        raise InputError("field", field, f"choose one of omega, {', '.join(MOTION_FIELDS)}")
+    checked_word("field", field, ("omega", *MOTION_FIELDS))
     value = getattr(machine, field)
     if value is None or math.isinf(value):
         raise InputError(field, value, "give the machine a finite value of it first")
@@ -133,11 +145,8 @@ def _check_bounds(
     screen: FlipFlowScreen, field: str, value: float, interval: object
 ) -> tuple[float, float]:
     """The interval (low, high) of the field, or a sentence that says what is wrong with it."""
-    try:
-        low, high = (float(x) for x in cast("tuple[float, float]", interval))
-    except (TypeError, ValueError):
-        raise InputError("interval", interval, f"give (low, high) of {field} in SI") from None
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+    low, high = checked_pair("interval", interval, f"give (low, high) of {field} in SI")
+    if low >= high:
         raise InputError("interval", interval, "give two finite values, the lower one first")
     for end in (low, high):
         screen.replace(**{field: end})
@@ -199,7 +208,7 @@ def _meeting(
     """The motion at which an end of the branch meets the one from which it comes."""
     even = equations.turns % 2 == 0
     parent = FieldEquations(
-        equations.system_at, (equations.lower, equations.upper), equations.omega,
+        equations.system_at, (equations.lower, equations.upper), equations.own, equations.omega,
         half_turn=not even, turns=equations.turns // 2 if even else equations.turns,
     )  # fmt: skip
     w = path.points[p].w

@@ -23,19 +23,28 @@ from flipflow.continuation.switching import (
     meeting,
 )
 from flipflow.errors import InputError, SampledContactWarning
-from flipflow.model.arguments import check_interval
+from flipflow.model.arguments import checked_interval, checked_monitor, checked_word
+from flipflow.model.fields import MOTION_FIELDS
+from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine
 from flipflow.periodic.balance_solver import SampledSolver
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.options import Method, PiecewiseExact
-from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.orbit import Orbit, checked_orbit
 from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Solver
 from flipflow.periodic.stability import UNDETERMINED
 
 SYMMETRIC = 1e-9
+SPECIAL_SHARE = 0.8  # of the work is done where the special points are sought
 
 
-def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> Branch | FieldBranch:
+def continue_orbit(
+    orbit: Orbit,
+    field: str,
+    interval: tuple[float, float],
+    *,
+    monitor: Monitor | None = None,
+) -> Branch | FieldBranch:
     """Follow a periodic motion over frequency or over a field of the machine, both ways.
 
     The motion may repeat after any number of forcing periods, be stable or not, and lie on a
@@ -54,6 +63,9 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
         then stays that of ``orbit``, and the motions are exact.
     interval
         (low, high) in rad/s or in the field's SI unit; it holds the motion's own value.
+    monitor
+        Called with a sentence and the share done: before each step over a field, before each way
+        over omega. Raise from it to cancel.
 
     Returns
     -------
@@ -72,11 +84,12 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
     SampledContactWarning
         When the orbit's own method samples the contact force.
     """
-    if not isinstance(orbit, Orbit):
-        raise InputError("orbit", orbit, "give a motion, for example one of ff.periodic_orbits")
+    checked_orbit("orbit", orbit)
+    checked_word("field", field, ("omega", *MOTION_FIELDS))
+    say = checked_monitor(monitor)
     if field != "omega":
-        return field_branch(orbit, field, interval, formulation_like(orbit, ExactSolver))
-    low, high = check_interval(interval)
+        return field_branch(orbit, field, interval, formulation_like(orbit, ExactSolver), say)
+    low, high = checked_interval("interval", interval)
     if not low <= orbit.omega <= high:
         remedy = f"the motion is one at {orbit.omega:.9g} rad/s; give an interval that holds it"
         raise InputError("interval", interval, remedy)
@@ -87,11 +100,14 @@ def continue_orbit(orbit: Orbit, field: str, interval: tuple[float, float]) -> B
     method = method_of(sought)
     if isinstance(solver, SampledSolver):
         warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
-    followed = follow_both_ways(solver, u, orbit.omega, _course(low, high, method))
+    followed = follow_both_ways(solver, u, orbit.omega, _course(low, high, method), say)
+    say("special points", SPECIAL_SHARE)
     return _branch(orbit.machine, method, solver, followed)
 
 
-def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
+def switch_branch(
+    point: SpecialPoint, interval: tuple[float, float], *, monitor: Monitor | None = None
+) -> Branch:
     """Follow the motions that branch off at a period doubling or a symmetry breaking.
 
     From a period doubling those of twice the periods, from a symmetry breaking those that lean to
@@ -106,6 +122,8 @@ def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
         A special point of a branch over frequency, of one of these two kinds.
     interval
         (low, high) in rad/s; it holds the point.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
 
     Returns
     -------
@@ -120,8 +138,9 @@ def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
     IncompleteError
         When no motion was found beside the point.
     """
-    low, high = check_interval(interval)
-    if getattr(point, "kind", None) not in (DOUBLING, SYMMETRY):
+    low, high = checked_interval("interval", interval)
+    say = checked_monitor(monitor)
+    if not isinstance(point, SpecialPoint) or point.kind not in (DOUBLING, SYMMETRY):
         raise InputError("point", point, f"give a special point: {DOUBLING} or {SYMMETRY}")
     if not low < point.omega < high:
         remedy = f"the point stands at {point.omega:.9g} rad/s; give an interval around it"
@@ -130,8 +149,11 @@ def switch_branch(point: SpecialPoint, interval: tuple[float, float]) -> Branch:
     child = child_of(parent.formulation)
     method = PiecewiseExact()
     course = _course(low, high, method)
+    say("the first motion", 0.0)
     first = beside(child, parent, course)
+    say(f"away from {point.omega:.6g} rad/s", 0.1)
     followed = follow_away(child, first, course, parent)
+    say("special points", SPECIAL_SHARE)
     return _branch(point.orbit.machine, method, child, followed)
 
 

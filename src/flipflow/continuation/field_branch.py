@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import FOLD
-from flipflow.errors import InputError
+from flipflow.model.arguments import checked_index, checked_text
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
@@ -115,6 +115,7 @@ class FieldBranch:
 
     def points_of(self, kind: str) -> tuple[FieldSpecialPoint, ...]:
         """Special points of one kind, in branch order."""
+        checked_text("kind", kind)
         return tuple(point for point in self.special_points if point.kind == kind)
 
     def amplitude(self, which: Coordinate) -> Real:
@@ -127,6 +128,6 @@ class FieldBranch:
 
     def orbit(self, i: int) -> Orbit:
         """The motion at point i of the branch."""
-        if not -len(self.orbits) <= i < len(self.orbits):
-            raise InputError("i", i, f"the branch has points 0 to {len(self.orbits) - 1}")
-        return self.orbits[i]
+        n = len(self.orbits)
+        remedy = f"the branch has points 0 to {n - 1}"
+        return self.orbits[checked_index("i", i, n, remedy, least=-n)]

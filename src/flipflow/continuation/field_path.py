@@ -20,8 +20,10 @@ from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import determinant_plus
 
 POINTS = 200
+# Differences are shares of an unknown's own size: a share of a wide interval would swamp the value.
 DIFFERENCE = 1e-6
-OMEGA_SHARE = 0.02
+# A step moves the frequency, and the field, by no more than these shares of their own size.
+OMEGA_SHARE, VALUE_SHARE = 0.02, 0.05
 SOLVERS_KEPT = 8
 SystemAt = Callable[[float], MechanicalSystem]
 
@@ -42,6 +44,8 @@ class FieldEquations(Equations):
         The machine's system for a value of the field.
     bounds
         (lower, upper) values.
+    own
+        The machine's own value, which says how large values of the field are.
     omega
         Frequency in rad/s.
     half_turn, turns
@@ -49,13 +53,12 @@ class FieldEquations(Equations):
     """
 
     def __init__(
-        self, system_at: SystemAt, bounds: tuple[float, float], omega: float, *,
+        self, system_at: SystemAt, bounds: tuple[float, float], own: float, omega: float, *,
         half_turn: bool, turns: int,
     ) -> None:  # fmt: skip
         self.lower, self.upper = bounds
         self.omega, self.half_turn, self.turns = omega, half_turn, turns
-        self.system_at = system_at
-        self.step = DIFFERENCE * (self.upper - self.lower)
+        self.system_at, self.own = system_at, own
         self._segments = 0
 
         @lru_cache(maxsize=SOLVERS_KEPT)
@@ -77,9 +80,19 @@ class FieldEquations(Equations):
         self._segments = int(solver.flow.segments[0])
         return found
 
+    def size(self, value: float) -> float:
+        """Size of the field: the value's or the machine's own, and the interval at most."""
+        width = self.upper - self.lower
+        return min(width, max(abs(value), abs(self.own)) if self.own else width)
+
+    def value_step(self, value: float) -> float:
+        """Length of one step in the field."""
+        return min((self.upper - self.lower) / POINTS, VALUE_SHARE * self.size(value))
+
     def slope(self, z: Real, omega: float, value: float) -> Real | None:
         """dr/d value by a central difference, one-sided at a bound."""
-        ends = min(value + self.step, self.upper), max(value - self.step, self.lower)
+        step = DIFFERENCE * self.size(value)
+        ends = min(value + step, self.upper), max(value - step, self.lower)
         ahead, behind = (self.shooting(z, omega, end) for end in ends)
         if ahead is None or behind is None:
             return None
@@ -95,7 +108,7 @@ class FieldEquations(Equations):
 
     def scale(self, w: Real) -> Real:
         sizes = self.sizes(w[:-1], self.omega, float(w[-1]))
-        return np.append(STEP_SHARE * sizes, (self.upper - self.lower) / POINTS)
+        return np.append(STEP_SHARE * sizes, self.value_step(float(w[-1])))
 
     def sizes(self, z: Real, omega: float, value: float) -> Real:
         """Size of each unknown of the state: the amplitude (m), that times omega."""
@@ -146,7 +159,7 @@ class FoldEquations(FieldEquations):
     def _gradient(self, w: Real) -> Real | None:
         """Derivatives of det(dr/dz) by central differences, one-sided at a bound."""
         sizes = self.sizes(w[:-2], float(w[-2]), float(w[-1]))
-        steps = DIFFERENCE * np.append(sizes, [w[-2], self.upper - self.lower])
+        steps = DIFFERENCE * np.append(sizes, [w[-2], self.size(float(w[-1]))])
         gradient = np.empty(w.size)
         for k, step in enumerate(steps):
             ahead, behind = w.copy(), w.copy()
@@ -161,7 +174,7 @@ class FoldEquations(FieldEquations):
 
     def scale(self, w: Real) -> Real:
         sizes = self.sizes(w[:-2], float(w[-2]), float(w[-1]))
-        steps = [OMEGA_SHARE * w[-2], (self.upper - self.lower) / POINTS]
+        steps = [OMEGA_SHARE * w[-2], self.value_step(float(w[-1]))]
         return np.append(STEP_SHARE * sizes, steps)
 
     def apart(self, w: Real) -> float:  # noqa: ARG002
@@ -204,7 +217,8 @@ def meeting_over_field(parent: FieldEquations, z: Real, value: float) -> FieldPo
         last.append(None if point is None else point.u)
         return np.nan if point is None else float(determinant_plus(point.return_map))
 
-    away = parent.step if value + parent.step < parent.upper else -parent.step
+    step = DIFFERENCE * parent.size(value)
+    away = step if value + step < parent.upper else -step
     answer = root_scalar(
         height, method="secant", x0=value, x1=value + away,
         xtol=1e-12 * (parent.upper - parent.lower), maxiter=30,

@@ -15,7 +15,7 @@ from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
 from flipflow.errors import InputError, SampledContactWarning
-from flipflow.model.arguments import check_interval
+from flipflow.model.arguments import checked_interval
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.balance_solver import BalanceSolver, SampledSolver
 from flipflow.periodic.exact_solver import ExactSolver
@@ -24,6 +24,7 @@ from flipflow.periodic.options import (
     Method,
     PiecewiseExact,
     SampledHarmonicBalance,
+    checked_method,
 )
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import STEP_SHARE, Formulation, Solver, Traced
@@ -78,10 +79,8 @@ def frequency_response(
     SampledContactWarning
         When the method samples the contact force; the branch has the same sentence as a note.
     """
-    low, high = check_interval(omega)
-    method = method or PiecewiseExact()
-    if not isinstance(method, Method):
-        raise InputError("method", method, "give ff.PiecewiseExact() or ff.HarmonicBalance(3)")
+    low, high = checked_interval("omega", omega)
+    method = checked_method(method)
     solver = solver_for(system_of(machine), method)
     course = arclength.Course(
         low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK

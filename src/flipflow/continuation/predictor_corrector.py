@@ -32,9 +32,12 @@ from flipflow.continuation.arclength import (
     STRAND_STEP,
     TURN_MOST,
 )
+from flipflow.model.monitor import Monitor, silent
 
 Real = NDArray[np.float64]
-FIRST_STEP, POINTS_MOST = 0.1, 5000
+FIRST_STEP = 0.1
+# Steps tried one way, refused ones too: a curve of folds through two cusps takes about 200.
+TRIES_MOST = 3000
 # A step along the tangent strays farther, and Newton takes longer, than one along the cubic.
 ASTRAY_MOST, NEWTON_MANY = 0.2, 5
 NEAR, CLOSE, SAME = 1e-2, 1e-3, 1e-7
@@ -104,29 +107,45 @@ class Path:
         return corrected(self.equations, guess, border, first.scale, border, SHARP)
 
 
-def follow_both_ways(equations: Equations, w: Real) -> Path:
+class Passed:
+    """Tells a monitor how much of the interval of the parameter has been passed."""
+
+    def __init__(self, equations: Equations, monitor: Monitor) -> None:
+        self.width = equations.upper - equations.lower
+        self.monitor = monitor
+        self.least, self.most = math.inf, -math.inf
+
+    def tell(self, value: float) -> None:
+        """Tell it before a step is tried from a value; what it raises ends the work."""
+        self.least, self.most = min(self.least, value), max(self.most, value)
+        self.monitor(f"at {value:.6g}", (self.most - self.least) / self.width)
+
+
+def follow_both_ways(equations: Equations, w: Real, monitor: Monitor = silent) -> Path:
     """Follow the branch from w until it leaves the bounds, closes, or crosses another branch."""
-    value = float(w[-1])
-    ahead = follow(equations, w, -1.0 if value == equations.upper else 1.0)
+    value, passed = float(w[-1]), Passed(equations, monitor)
+    ahead = follow(equations, w, -1.0 if value == equations.upper else 1.0, passed)
     both = ahead.code in (status.FOLLOWED, status.STEP_TOO_SMALL)
     if not both or value in (equations.lower, equations.upper):
         return ahead
-    back = follow(equations, w, -1.0)
+    back = follow(equations, w, -1.0, passed)
     points = (*(point.backwards() for point in back.points[:0:-1]), *ahead.points)
     code = back.code if back.code != status.FOLLOWED else ahead.code
     return Path(equations, points, code, back.crossed_end, ahead.crossed_end)
 
 
-def follow(equations: Equations, w: Real, direction: float) -> Path:
+def follow(equations: Equations, w: Real, direction: float, passed: Passed | None = None) -> Path:
     """Follow the branch from w one way: predict, correct, accept or halve, record."""
+    passed = passed or Passed(equations, silent)
     plane = np.zeros(w.size)
     plane[-1] = 1.0
     first = corrected(equations, w, plane, equations.scale(w), direction * plane, QUICK)
     if first is None:
         return Path(equations, (), status.NO_CONVERGENCE)
     points, length, travelled = [first], FIRST_STEP, 0.0
-    while len(points) < POINTS_MOST:
+    for _ in range(TRIES_MOST):
         last = points[-1]
+        passed.tell(float(last.w[-1]))
         step = min(length, 0.999 / max(abs(float(last.tangent[-1])), 1e-3))
         guess, border, ends = predicted(equations, last, step)
         new = corrected(equations, guess, border, last.scale, last.tangent, QUICK)

@@ -18,6 +18,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.predictor_corrector import CLOSE, NEAR, SAME
 from flipflow.errors import IncompleteError
+from flipflow.model.monitor import Monitor, silent
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus
@@ -129,14 +130,18 @@ def follow_until_meeting(
     return traced, None
 
 
-def follow_both_ways(solver: Solver, u: Real, omega: float, course: arclength.Course) -> Followed:
+def follow_both_ways(
+    solver: Solver, u: Real, omega: float, course: arclength.Course, monitor: Monitor = silent
+) -> Followed:
     """Follow the branch from (u, omega) both ways; it begins at its end of lower omega."""
+    monitor(f"from {omega:.6g} rad/s", 0.0)
     up, down = course._replace(direction=1.0), course._replace(direction=-1.0)
     if omega == course.upper:
         return _one_way(*follow_until_meeting(solver, u, omega, down), None)
     ahead, end = follow_until_meeting(solver, u, omega, up)
     if ahead.code == status.CLOSED or ahead.omega.size == 0 or omega == course.lower:
         return _one_way(ahead, end, None)
+    monitor(f"back from {omega:.6g} rad/s", 0.4)
     back, start = follow_until_meeting(solver, u, omega, down)
     if ahead.omega[-1] < back.omega[-1]:
         return Followed(ahead.reversed_into(back), end, start)

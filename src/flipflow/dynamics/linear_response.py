@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
 from flipflow.dynamics.contact_free import complex_amplitudes
-from flipflow.errors import InputError
+from flipflow.model.arguments import checked_speeds
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 
@@ -116,12 +116,7 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     InputError
         For frequencies that are not finite or not above 0, and without any damping.
     """
-    try:
-        frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
-    except (TypeError, ValueError):
-        raise InputError("omega", omega, "give frequencies in rad/s, one or (n,)") from None
-    if frequencies.ndim != 1 or not np.all(np.isfinite(frequencies) & (frequencies > 0.0)):
-        raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
+    frequencies = checked_speeds(omega)
     system = system_of(machine).with_bonded()
     system.require_damping()
     return LinearResponse(machine, system, frequencies)

@@ -18,8 +18,13 @@ from flipflow.dynamics.contact_search import (
     prepare_search,
 )
 from flipflow.dynamics.flow import Flow
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_count, checked_numbers
 from flipflow.model.contact_law import engaged_side
 from flipflow.model.system import MechanicalSystem
+
+TIMES = "give finite times in s"
+MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -121,18 +126,20 @@ class Motion:
 
     def derivative(self, t: ArrayLike, order: int) -> Real:
         """x, x' or x'' (order 0, 1, 2) at times t, shape (..., N)."""
-        times = np.mod(np.asarray(t, float), self.period)
+        times = np.mod(checked_numbers("t", t, TIMES), self.period)
         flat = self.piece_derivative(times.ravel(), self.piece(times).ravel(), order)
         return flat.reshape(*times.shape, self.system.size)
 
     def piece(self, t: ArrayLike) -> NDArray[np.intp]:
         """Index of the piece in which each time lies."""
-        inside = np.mod(np.asarray(t, float), self.period)
+        inside = np.mod(checked_numbers("t", t, TIMES), self.period)
         after = np.searchsorted(self.start, inside, side="right")
         return np.asarray(np.maximum(after - 1, 0))
 
     def piece_derivative(self, t: Real, piece: NDArray[np.intp], order: int) -> Real:
         """x, x' or x'' at times t taken from the given pieces, (K, N)."""
+        t, piece = self._checked_pieces(t, piece)
+        order = checked_count("order", order, 2, least=0)
         turning = 1j * self.omega * self.order
         wave = np.exp(turning * t[:, None]) * turning**order
         x = np.einsum("knh,kh->kn", self.harmonic[piece], wave).real
@@ -149,6 +156,7 @@ class Motion:
 
         Where a contact changes, the same time stands twice, once for each piece.
         """
+        checked_count("least", least, MOST_SAMPLES)
         times, owner = [], []
         for e, (start, length) in enumerate(zip(self.start, self.length, strict=True)):
             count = 5 + int(np.ceil(least * length / self.period))
@@ -172,6 +180,15 @@ class Motion:
             self.order, self.omega, scratch, low, high, first,
         )  # fmt: skip
         return low, high, first * (2.0 / self.period)
+
+    def _checked_pieces(self, t: object, piece: object) -> tuple[Real, NDArray[np.intp]]:
+        """Times in one row, and as many indices of pieces."""
+        remedy = "give the index of a piece for each time"
+        times, given = checked_numbers("t", t, TIMES), checked_numbers("piece", piece, remedy)
+        known = (given >= 0) & (given < self.start.size) & (given == np.floor(given))
+        if times.ndim != 1 or given.shape != times.shape or not known.all():
+            raise InputError("piece", piece, remedy)
+        return times, given.astype(np.intp)
 
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""

@@ -14,6 +14,7 @@ from flipflow.io.machine import Tables, read_screen
 from flipflow.io.plausibility import implausible
 from flipflow.io.source import read_source
 from flipflow.io.values import Notes, Table, read_interval, read_number, read_text
+from flipflow.model.arguments import checked_flag
 from flipflow.model.limits import LIMIT_FIELDS, Limits
 from flipflow.model.project import Document, Project
 from flipflow.model.screen import FlipFlowScreen
@@ -63,6 +64,7 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
     InputError
         For a file that cannot be read, or a value in it that is wrong, missing or implausible.
     """
+    checked_flag("force", force)
     source = read_source(name_or_path)
     tables, cases = _sections(source.tables)
     notes = Notes()

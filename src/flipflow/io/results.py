@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from functools import singledispatch
-from pathlib import Path
 from typing import Any
 
 from flipflow.continuation.branch import Branch
@@ -18,6 +17,7 @@ from flipflow.io.assessment import ASSESSMENT, assessment_document
 from flipflow.io.files import write_file
 from flipflow.io.read_off import read_off
 from flipflow.io.response import branch_csv, branch_netcdf
+from flipflow.model.arguments import checked_path
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
@@ -74,7 +74,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     InputError
         For an ending or a result that is not known, and where the file cannot be written.
     """
-    target = Path(path)
+    target = checked_path("path", path)
     if target.suffix == ".json":
         text = json.dumps(document_of(result), indent=1, ensure_ascii=False, allow_nan=False)
         write_file(target, text.encode())
@@ -99,7 +99,7 @@ def open_result(path: str | os.PathLike[str]) -> Any:
     StoreError
         For a file that is no result of flipflow, is damaged, or is of a later version.
     """
-    source = Path(path)
+    source = checked_path("path", path)
     if not source.is_file():
         raise InputError("path", str(path), "there is no such file; give one that ff.save wrote")
     if source.suffix != ".json":

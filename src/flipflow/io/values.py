@@ -20,7 +20,7 @@ ROUNDING = 1e-3
 class _LeftOut:
     """Stands in error sentences for a value that is not there."""
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return "(left out)"
 
 

@@ -1,86 +1,303 @@
-"""Arguments of the public face, checked: a sentence with field, value and remedy, or the value."""
+"""Arguments of the public face, checked: the value, or a sentence with field, value and remedy.
+
+One vocabulary for every public name: what counts as a number, an array of numbers, a word, a
+sequence, a callable is decided here and nowhere else. numpy's scalars and arrays without axes are
+numbers; a boolean is none, and neither is a text that reads as one.
+"""
 
 from __future__ import annotations
 
+import inspect
 import math
-from typing import cast
+import numbers
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from flipflow.errors import InputError
+from flipflow.model.monitor import Monitor, silent
 
 Real = NDArray[np.float64]
-OMEGA_MOST = 1e6
+Complex = NDArray[np.complex128]
+Kind = TypeVar("Kind")
+OMEGA_LEAST, OMEGA_MOST = 1e-9, 1e6
+WITHIN = (
+    f"no screen runs below {OMEGA_LEAST:g} or above {OMEGA_MOST:g} rad/s; give a frequency between"
+)
+# The square of a number beyond it overflows, and with it whatever is worked out from it.
+LARGEST = 1e150
+TOO_LARGE = f"no machine has a number beyond {LARGEST:g}; give a smaller one"
+MOST_AXES = 64  # of an array of numpy
+REAL_KINDS, COMPLEX_KINDS = "iuf", "iufc"
 
 
-def is_number(value: object) -> bool:
-    """Whether a value is one real number; a boolean is none."""
-    numbers = (int, float, np.integer, np.floating)
-    return isinstance(value, numbers) and not isinstance(value, bool)
-
-
-def checked_positive(name: str, value: object, unit: str) -> float:
-    """A finite number above 0."""
-    if not is_number(value) or not 0.0 < cast("float", value) < math.inf:
-        raise InputError(name, value, f"give a finite number above 0 {unit}")
-    return float(cast("float", value))
-
-
-def checked_speed(omega: object) -> float:
-    """One frequency in rad/s."""
-    if not is_number(omega) or not math.isfinite(cast("float", omega)):
-        raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    if not 0.0 < cast("float", omega) <= OMEGA_MOST:
-        most = f"{OMEGA_MOST:g} rad/s"
-        remedy = f"no screen runs above {most}; give a frequency above 0 and up to {most}"
-        raise InputError("omega", omega, remedy)
-    return float(cast("float", omega))
-
-
-def checked_speeds(omega: ArrayLike) -> Real:
-    """Frequencies in rad/s, (n,)."""
+def real(value: object) -> float | None:
+    """A real number as float, None for what is none or does not fit a float."""
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in REAL_KINDS:
+        value = value[()]
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return None
     try:
-        speeds = np.atleast_1d(np.asarray(omega, float))
-    except (TypeError, ValueError):
-        raise InputError("omega", omega, "give an array of frequencies in rad/s") from None
+        return float(value)
+    except OverflowError:
+        return None
+
+
+def checked_number(name: str, value: object, remedy: str = "give a finite number") -> float:
+    """A finite number."""
+    number = real(value)
+    if number is None or not math.isfinite(number):
+        raise InputError(name, value, remedy)
+    if abs(number) > LARGEST:
+        raise InputError(name, value, TOO_LARGE)
+    return number
+
+
+def checked_positive(name: str, value: object, unit: str = "") -> float:
+    """A finite number above 0."""
+    remedy = f"give a finite number above 0 {unit}".strip()
+    number = checked_number(name, value, remedy)
+    if number <= 0.0:
+        raise InputError(name, value, remedy)
+    return number
+
+
+def checked_at_least_zero(name: str, value: object, unit: str = "") -> float:
+    """A finite number of at least 0."""
+    remedy = f"give a finite number of at least 0 {unit}".strip()
+    number = checked_number(name, value, remedy)
+    if number < 0.0:
+        raise InputError(name, value, remedy)
+    return number
+
+
+def checked_speed(omega: object, name: str = "omega") -> float:
+    """One frequency in rad/s."""
+    number = checked_number(name, omega, "give a finite frequency above 0 rad/s")
+    if number <= 0.0:
+        raise InputError(name, omega, "give a finite frequency above 0 rad/s")
+    if not OMEGA_LEAST <= number <= OMEGA_MOST:
+        raise InputError(name, omega, WITHIN)
+    return number
+
+
+def checked_speeds(
+    omega: object, remedy: str = "give at least one finite frequency above 0 rad/s, in one row"
+) -> Real:
+    """Frequencies in rad/s, one or a row, (n,)."""
+    speeds = np.atleast_1d(checked_reals("omega", omega, remedy))
     if speeds.ndim != 1 or speeds.size == 0:
-        raise InputError("omega", omega, "give at least one frequency in rad/s, in one row")
+        raise InputError("omega", omega, remedy)
     if not (np.isfinite(speeds).all() and (speeds > 0.0).all()):
-        raise InputError("omega", omega, "give finite frequencies above 0 rad/s")
-    if speeds.max() > OMEGA_MOST:
-        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
+        raise InputError("omega", omega, remedy)
+    if speeds.min() < OMEGA_LEAST or speeds.max() > OMEGA_MOST:
+        raise InputError("omega", omega, WITHIN)
     return speeds
+
+
+def checked_pair(name: str, value: object, remedy: str) -> tuple[float, float]:
+    """Two numbers, infinite and missing ones too."""
+    pair = checked_reals(name, value, remedy)
+    if pair.shape != (2,):
+        raise InputError(name, value, remedy)
+    return float(pair[0]), float(pair[1])
+
+
+def checked_interval(name: str, value: object) -> tuple[float, float]:
+    """The interval (low, high) in rad/s."""
+    low, high = checked_pair(name, value, "give an interval (low, high) in rad/s")
+    if not (math.isfinite(low) and math.isfinite(high) and low > 0.0):
+        raise InputError(name, value, "give two finite speeds above 0 rad/s")
+    if high <= low:
+        raise InputError(name, value, "the interval is empty or reversed; give the lower end first")
+    if low < OMEGA_LEAST or high > OMEGA_MOST:
+        raise InputError(name, value, WITHIN)
+    return low, high
 
 
 def checked_count(name: str, value: object, most: int, *, least: int = 1) -> int:
     """A whole number from ``least`` to ``most``."""
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or not least <= cast("int", value) <= most:
+    number = _whole(value)
+    if number is None or not least <= number <= most:
         raise InputError(name, value, f"give a whole number from {least} to {most}")
-    return int(cast("int", value))
+    return number
+
+
+def checked_index(name: str, value: object, count: int, remedy: str, *, least: int = 0) -> int:
+    """A whole number from ``least`` to below ``count``."""
+    number = _whole(value)
+    if number is None or not least <= number < count:
+        raise InputError(name, value, remedy)
+    return number
+
+
+def checked_flag(name: str, value: object) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(name, value, "give True or False")
+    return bool(value)
+
+
+def checked_numbers(name: str, value: object, remedy: str) -> Real:
+    """Finite numbers of any shape as an array; texts and booleans are none."""
+    array = checked_reals(name, value, remedy)
+    _check_sizes(name, value, array, remedy)
+    return array
+
+
+def checked_reals(name: str, value: object, remedy: str) -> Real:
+    """Real numbers of any shape as an array, infinite and missing ones too."""
+    array = _array(name, value, remedy)
+    if array.dtype.kind not in REAL_KINDS:
+        raise InputError(name, value, remedy)
+    with np.errstate(all="ignore"):
+        return np.asarray(array, np.float64)
+
+
+def checked_vector(name: str, value: object, remedy: str) -> Complex:
+    """Finite numbers in one row, complex ones too, (n,)."""
+    array = _array(name, value, remedy)
+    if array.dtype.kind not in COMPLEX_KINDS or array.ndim != 1 or array.size == 0:
+        raise InputError(name, value, remedy)
+    _check_sizes(name, value, array.real, remedy)
+    _check_sizes(name, value, array.imag, remedy)
+    return np.asarray(array, np.complex128)
 
 
 def checked_generator(rng: object) -> np.random.Generator:
     """The generator itself, or one of a seed."""
-    try:
-        return np.random.default_rng(rng)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError("rng", rng, "give a whole number of at least 0, or a Generator") from None
+    if isinstance(rng, np.random.Generator):
+        return rng
+    seed = _whole(rng)
+    if seed is None or seed < 0:
+        raise InputError("rng", rng, "give a whole number of at least 0, or a Generator")
+    return np.random.default_rng(seed)
 
 
-def check_interval(omega: object) -> tuple[float, float]:
-    """The interval (low, high) in rad/s, or a sentence that says what is wrong with it."""
+def checked_monitor(monitor: object) -> Monitor:
+    """What is called with a sentence and a share; one that tells nobody where none is given."""
+    if monitor is None:
+        return silent
+    if not takes(monitor, 2):
+        remedy = "give a function that takes a sentence and the share done, or None"
+        raise InputError("monitor", monitor, remedy)
+    return cast("Monitor", monitor)
+
+
+def takes(function: object, count: int) -> bool:
+    """Whether something is a function, not a class, that can be called with ``count`` arguments."""
+    if isinstance(function, type) or not callable(function):
+        return False
     try:
-        low, high = (float(x) for x in cast("tuple[float, float]", omega))
+        inspect.signature(cast("Callable[..., object]", function)).bind(*range(count))
     except (TypeError, ValueError):
-        raise InputError("omega", omega, "give an interval (low, high) in rad/s") from None
-    if not (math.isfinite(low) and math.isfinite(high) and low > 0.0):
-        raise InputError("omega", omega, "give two finite speeds above 0 rad/s")
-    if high <= low:
-        raise InputError(
-            "omega", omega, "the interval is empty or reversed; give the lower end first"
-        )
-    if high > OMEGA_MOST:
-        raise InputError("omega", omega, f"no screen runs above {OMEGA_MOST:g} rad/s")
-    return low, high
+        return False
+    return True
+
+
+def checked_word(name: str, value: object, words: Collection[str], remedy: str = "") -> str:
+    """One of several words."""
+    if not isinstance(value, str) or value not in words:
+        raise InputError(name, value, remedy or f"choose one of {', '.join(words)}")
+    return str(value)
+
+
+def checked_text(name: str, value: object) -> str:
+    """A text, empty or not."""
+    if not isinstance(value, str):
+        raise InputError(name, value, "give a text")
+    return value
+
+
+def checked_path(name: str, value: object) -> Path:
+    """A path of a file, as text or as a path object."""
+    if isinstance(value, (str, os.PathLike)):
+        path = os.fspath(value)
+        if isinstance(path, str) and "\0" not in path:
+            return Path(path)
+    raise InputError(name, value, "give the path of a file, as text or as a Path")
+
+
+def checked_kind(
+    name: str, value: object, kind: type[Kind] | tuple[type[Kind], ...], remedy: str
+) -> Kind:
+    """An object of a kind."""
+    if not isinstance(value, kind):
+        raise InputError(name, value, remedy)
+    return value
+
+
+def checked_all(
+    name: str, values: object, kind: type[Kind] | tuple[type[Kind], ...], remedy: str
+) -> tuple[Kind, ...]:
+    """A sequence whose members are all of a kind.
+
+    An iterator is none: it can be read once, and may have no end.
+    """
+    members = members_of(values)
+    if members is None or not all(isinstance(one, kind) for one in members):
+        raise InputError(name, values, remedy)
+    return members
+
+
+def members_of(values: object) -> tuple[Any, ...] | None:
+    """The members of a list, a tuple or the like; None for texts, mappings, iterators, others."""
+    if isinstance(values, (str, bytes, bytearray, memoryview, Mapping, type, Iterator)):
+        return None
+    if not isinstance(values, Collection) or (isinstance(values, np.ndarray) and values.ndim == 0):
+        return None
+    return tuple(values)
+
+
+def checked_mapping(name: str, value: object, remedy: str) -> Mapping[str, Any]:
+    """A mapping whose keys are texts."""
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise InputError(name, value, remedy)
+    return value
+
+
+def _check_sizes(name: str, value: object, array: NDArray[Any], remedy: str) -> None:
+    if not np.isfinite(array).all():
+        raise InputError(name, value, remedy)
+    if (np.abs(array) > LARGEST).any():
+        raise InputError(name, value, TOO_LARGE)
+
+
+def _whole(value: object) -> int | None:
+    """A whole number as int; a float is none, whatever its value."""
+    if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iu":
+        value = value[()]
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        return None
+    return int(value)
+
+
+def _array(name: str, value: object, remedy: str) -> NDArray[Any]:
+    """What numpy makes of a number or of sequences of numbers.
+
+    numpy takes True among floats for 1.0 and would read an iterator to no end: both are refused.
+    """
+    if isinstance(value, Iterator) or _has_flag(value):
+        raise InputError(name, value, remedy)
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(name, value, remedy) from None
+    if array.dtype.kind != "O":
+        return array
+    # Fractions, and whole numbers beyond 64 bits, come as objects.
+    members = [real(one) for one in array.ravel()]
+    if any(one is None for one in members):
+        raise InputError(name, value, remedy)
+    return np.array(members, np.float64).reshape(array.shape)
+
+
+def _has_flag(value: object, depth: int = 0) -> bool:
+    """Whether a boolean stands among nested numbers; also of a list that holds itself."""
+    if isinstance(value, (list, tuple)):
+        return depth > MOST_AXES or any(_has_flag(one, depth + 1) for one in value)
+    return isinstance(value, (bool, np.bool_))

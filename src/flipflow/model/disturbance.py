@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_at_least_zero,
+    checked_kind,
+    checked_number,
+    checked_positive,
+    checked_word,
+)
 from flipflow.model.screen import Load
-from flipflow.model.system import Coordinate
+from flipflow.model.system import Coordinate, checked_coordinate
 
 MOST_IMPULSE = 1e6
 
@@ -34,11 +40,13 @@ class Impulse:
     impulse: float
 
     def __post_init__(self) -> None:
-        _check_time(self.t)
-        if not (math.isfinite(self.impulse) and abs(self.impulse) <= MOST_IMPULSE):
-            raise InputError(
-                "impulse", self.impulse, f"give a finite impulse of at most {MOST_IMPULSE:g} kg m/s"
-            )
+        object.__setattr__(self, "t", _time(self.t))
+        checked_coordinate(self.which)
+        remedy = f"give a finite impulse of at most {MOST_IMPULSE:g} kg m/s"
+        impulse = checked_number("impulse", self.impulse, remedy)
+        if abs(impulse) > MOST_IMPULSE:
+            raise InputError("impulse", self.impulse, remedy)
+        object.__setattr__(self, "impulse", impulse)
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,8 @@ class LoadStep:
     load: Load
 
     def __post_init__(self) -> None:
-        _check_time(self.t)
+        object.__setattr__(self, "t", _time(self.t))
+        checked_kind("load", self.load, Load, "give an ff.Load, as ff.Load(main_mass=50)")
 
 
 @dataclass(frozen=True)
@@ -86,18 +95,15 @@ class Lump:
     velocity: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_time(self.t)
-        if self.frame not in ("main", "floating"):
-            raise InputError("frame", self.frame, 'choose "main" or "floating"')
-        if not (math.isfinite(self.mass) and self.mass > 0.0):
-            raise InputError("mass", self.mass, "give a mass above 0 kg")
-        if not math.isfinite(self.velocity):
-            raise InputError("velocity", self.velocity, "give a finite velocity in m/s")
+        object.__setattr__(self, "t", _time(self.t))
+        checked_word("frame", self.frame, ("main", "floating"))
+        object.__setattr__(self, "mass", checked_positive("mass", self.mass, "kg"))
+        velocity = checked_number("velocity", self.velocity, "give a finite velocity in m/s")
+        object.__setattr__(self, "velocity", velocity)
 
 
 Disturbance = Impulse | LoadStep | Lump
 
 
-def _check_time(t: float) -> None:
-    if not (math.isfinite(t) and t >= 0.0):
-        raise InputError("t", t, "give a time from 0 s on")
+def _time(t: object) -> float:
+    return checked_at_least_zero("t", t, "s")

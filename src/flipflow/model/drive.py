@@ -12,6 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_all,
+    checked_at_least_zero,
+    checked_kind,
+    checked_number,
+    checked_numbers,
+    checked_positive,
+    checked_reals,
+)
 from flipflow.model.fields import Field
 
 BREAKDOWN_RATIO, BREAKDOWN_SLIP = 2.5, 0.2
@@ -104,19 +113,21 @@ class Motor:
     breakdown_slip: float = BREAKDOWN_SLIP
 
     def __post_init__(self) -> None:
-        _positive("synchronous_speed", self.synchronous_speed)
         if (self.rated_power is None) == (self.breakdown_torque is None):
             raise InputError(
                 "rated_power", self.rated_power, "give either the rated power or breakdown_torque"
             )
-        for name in ("rated_power", "breakdown_torque"):
-            value = getattr(self, name)
-            if value is not None:
-                _positive(name, value)
-        if not 1.0 < self.breakdown_ratio < math.inf:
+        given = "rated_power" if self.breakdown_torque is None else "breakdown_torque"
+        for name in ("synchronous_speed", given):
+            object.__setattr__(self, name, checked_positive(name, getattr(self, name)))
+        ratio = checked_number("breakdown_ratio", self.breakdown_ratio, "give a ratio above 1")
+        slip = checked_number("breakdown_slip", self.breakdown_slip, "give a slip between 0 and 1")
+        if ratio <= 1.0:
             raise InputError("breakdown_ratio", self.breakdown_ratio, "give a ratio above 1")
-        if not 0.0 < self.breakdown_slip < 1.0:
+        if not 0.0 < slip < 1.0:
             raise InputError("breakdown_slip", self.breakdown_slip, "give a slip between 0 and 1")
+        object.__setattr__(self, "breakdown_ratio", ratio)
+        object.__setattr__(self, "breakdown_slip", slip)
 
     @property
     def rated_slip(self) -> float:
@@ -148,7 +159,7 @@ class Motor:
 
     def torque(self, speed: ArrayLike) -> NDArray[np.float64]:
         """Torque in N m at speeds of the motor in rad/s; negative above the synchronous one."""
-        slip = 1.0 - np.asarray(speed, float) / self.synchronous_speed
+        slip = 1.0 - _speeds("speed", speed) / self.synchronous_speed
         s_b = self.breakdown_slip
         return np.asarray(2.0 * self.largest_torque * slip * s_b / (slip**2 + s_b**2))
 
@@ -187,12 +198,14 @@ class Drive:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        _positive("inertia", self.inertia)
-        _positive("ratio", self.ratio)
+        if self.motor is not None:
+            checked_kind("motor", self.motor, Motor, "give an ff.Motor, or None: switched off")
+        for name in ("inertia", "ratio"):
+            object.__setattr__(self, name, checked_positive(name, getattr(self, name)))
         for name in ("friction", "viscous_friction"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(name, value, "give a finite number of at least 0")
+            object.__setattr__(self, name, checked_at_least_zero(name, getattr(self, name)))
+        words = checked_all("assumed", self.assumed, str, "give a tuple of sentences")
+        object.__setattr__(self, "assumed", words)
 
     @property
     def synchronous_speed(self) -> float | None:
@@ -206,14 +219,14 @@ class Drive:
 
     def torque(self, speed: ArrayLike) -> NDArray[np.float64]:
         """Torque of the motor at the shaft in N m at speeds of the shaft in rad/s."""
-        speeds = np.asarray(speed, float)
+        speeds = _speeds("speed", speed)
         if self.motor is None:
             return np.zeros(speeds.shape)
         return np.asarray(self.ratio * self.motor.torque(self.ratio * speeds))
 
     def friction_torque(self, speed: ArrayLike) -> NDArray[np.float64]:
         """Friction in N m at speeds of the shaft in rad/s, against the motion."""
-        speeds = np.asarray(speed, float)
+        speeds = _speeds("speed", speed)
         return np.asarray(self.friction * np.sign(speeds) + self.viscous_friction * speeds)
 
     def switched_off(self) -> Self:
@@ -243,12 +256,9 @@ class SpeedProfile:
     speeds: tuple[float, ...]
 
     def __init__(self, times: Sequence[float], speeds: Sequence[float]) -> None:
-        t, w = tuple(map(float, times)), tuple(map(float, speeds))
+        t, w = _row("times", times), _row("speeds", speeds)
         if len(t) < 2 or len(t) != len(w):
             raise InputError("times", t, "give at least two times, and one speed for each")
-        for name, values in (("times", t), ("speeds", w)):
-            if not all(map(math.isfinite, values)):
-                raise InputError(name, values, "give finite numbers")
         if t[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(t)):
             raise InputError("times", t, "let times start at 0 s and rise from point to point")
         if min(w) < 0.0 or max(w) == 0.0:
@@ -263,12 +273,20 @@ class SpeedProfile:
 
     def speed(self, t: ArrayLike) -> NDArray[np.float64]:
         """Speed in rad/s at times in s."""
-        return np.asarray(np.interp(np.asarray(t, float), self.times, self.speeds))
+        seconds = checked_reals("t", t, "give times in s")
+        return np.asarray(np.interp(seconds, self.times, self.speeds))
 
 
-def _positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(name, value, "give a finite number above 0")
+def _speeds(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    return checked_numbers(name, values, "give finite speeds in rad/s")
+
+
+def _row(name: str, values: object) -> tuple[float, ...]:
+    remedy = "give finite numbers in one row"
+    row = checked_numbers(name, values, remedy)
+    if row.ndim != 1:
+        raise InputError(name, values, remedy)
+    return tuple(row.tolist())
 
 
 def assumed_drive(

@@ -11,6 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
 from flipflow.model import contact_law
+from flipflow.model.arguments import (
+    checked_at_least_zero,
+    checked_number,
+    checked_numbers,
+    checked_vector,
+    checked_word,
+    real,
+)
 from flipflow.model.contact_law import ContactLaw
 
 
@@ -60,24 +68,18 @@ class ClearanceSpring:
         clearance_minus: float | None = None,
         law: ContactLaw = "paper",
     ) -> None:
-        vector = frozen_array(direction)
-        minus = clearance if clearance_minus is None else clearance_minus
-        if vector.ndim != 1 or not np.all(np.isfinite(vector)) or not np.any(vector):
-            raise InputError("direction", direction, "give a finite vector that is not zero")
-        for name, value in (("stiffness", stiffness), ("damping", damping)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(name, value, "give a finite number of at least 0")
-        for name, value in (("clearance", clearance), ("clearance_minus", minus)):
-            if not value >= 0.0:
-                raise InputError(name, value, "give a gap of at least 0 m, or inf for no stop")
-        if law not in get_args(ContactLaw):
-            raise InputError("law", law, f"choose one of {', '.join(get_args(ContactLaw))}")
+        remedy = "give a finite vector that is not zero"
+        vector = frozen_array(checked_numbers("direction", direction, remedy))
+        if vector.ndim != 1 or not np.any(vector):
+            raise InputError("direction", direction, remedy)
+        gap = _checked_gap("clearance", clearance)
+        minus = gap if clearance_minus is None else _checked_gap("clearance_minus", clearance_minus)
         object.__setattr__(self, "direction", vector)
-        object.__setattr__(self, "stiffness", float(stiffness))
-        object.__setattr__(self, "damping", float(damping))
-        object.__setattr__(self, "clearance", float(clearance))
-        object.__setattr__(self, "clearance_minus", float(minus))
-        object.__setattr__(self, "law", law)
+        object.__setattr__(self, "stiffness", checked_at_least_zero("stiffness", stiffness))
+        object.__setattr__(self, "damping", checked_at_least_zero("damping", damping))
+        object.__setattr__(self, "clearance", gap)
+        object.__setattr__(self, "clearance_minus", minus)
+        object.__setattr__(self, "law", checked_word("law", law, get_args(ContactLaw)))
 
     @property
     def gaps(self) -> tuple[float, float]:
@@ -102,7 +104,10 @@ class ClearanceSpring:
 
     def force(self, gap: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
         """H in N at gap coordinate y in m and its rate in m/s; zero exactly at the gap."""
-        y, v = np.asarray(gap, float), np.asarray(rate, float)
+        y = checked_numbers("gap", gap, "give finite numbers in m")
+        v = checked_numbers("rate", rate, "give finite numbers in m/s")
+        if 0 not in (y.ndim, v.ndim) and y.shape != v.shape:
+            raise InputError("rate", rate, f"give one rate, or one a gap: shape {y.shape}")
         of = self.law, self.stiffness, self.damping, self.gaps
         return contact_law.force_in(*of, contact_law.regime_at(*of, y, v), y, v)
 
@@ -144,11 +149,17 @@ class HarmonicForce:
 
 
 def _force_vector(vector: ArrayLike) -> NDArray[np.complex128]:
-    array = np.array(vector, dtype=np.complex128)
-    if array.ndim != 1 or not np.all(np.isfinite(array)):
-        raise InputError("vector", vector, "give a finite vector, one number per degree of freedom")
+    remedy = "give a finite vector, one number per degree of freedom"
+    array = checked_vector("vector", vector, remedy).copy()
     array.setflags(write=False)
     return array
+
+
+def _checked_gap(name: str, value: object) -> float:
+    gap = real(value)
+    if gap is None or not gap >= 0.0:
+        raise InputError(name, value, "give a gap of at least 0 m, or inf for no stop")
+    return gap if math.isinf(gap) else checked_number(name, gap)
 
 
 def frozen_array(values: ArrayLike) -> NDArray[np.float64]:

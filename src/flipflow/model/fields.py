@@ -8,12 +8,12 @@ outside the first a value is refused, outside the second it is questioned.
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import EllipsisType
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import LARGEST, TOO_LARGE, real
 
 
 @dataclass(frozen=True)
@@ -74,14 +74,16 @@ class Field:
         field = label or self.name
         if value is None and not self.required:
             return None
-        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        number = real(value)
+        if number is None:
             raise InputError(field, value, f"a number in {self.unit or 'plain units'} belongs here")
-        number = float(value)
         too_low = number <= self.lower if self.lower_open else number < self.lower
         if math.isnan(number) or too_low or number > self.upper:
             raise InputError(field, value, f"give {self._allowed()}")
         if math.isinf(number) and not self.infinite:
             raise InputError(field, value, "give a finite number")
+        if LARGEST < abs(number) < math.inf:
+            raise InputError(field, value, TOO_LARGE)
         if self.whole and not number.is_integer():
             raise InputError(field, value, "give a whole number")
         return number

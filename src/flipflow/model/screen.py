@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from dataclasses import dataclass
 from typing import Self, get_args
@@ -11,10 +10,21 @@ from typing import Self, get_args
 import numpy as np
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_at_least_zero,
+    checked_kind,
+    checked_number,
+    checked_numbers,
+    checked_positive,
+    checked_text,
+    checked_word,
+)
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring, Unbalance
 from flipflow.model.fields import FIELDS
 from flipflow.model.system import MechanicalSystem
+
+DEGREES = "give a finite number of degrees Celsius, or None"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +52,13 @@ class Load:
 
     def __post_init__(self) -> None:
         for name in ("stiffness_factor", "damping_factor"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise InputError(name, value, "give a finite factor above 0")
+            object.__setattr__(self, name, checked_positive(name, getattr(self, name)))
         for name in ("main_mass", "floating_mass"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(name, value, "give a carried mass of at least 0 kg")
+            object.__setattr__(self, name, checked_at_least_zero(name, getattr(self, name), "kg"))
+        if self.temperature is not None:
+            degrees = checked_number("temperature", self.temperature, DEGREES)
+            object.__setattr__(self, "temperature", degrees)
+        checked_text("name", self.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,16 +120,8 @@ class FlipFlowScreen:
     def __post_init__(self) -> None:
         for field in FIELDS:
             object.__setattr__(self, field.name, field.check(getattr(self, field.name)))
-        if self.stop_law not in get_args(ContactLaw):
-            choices = ", ".join(get_args(ContactLaw))
-            raise InputError("stop_law", self.stop_law, f"choose one of {choices}")
-        temperatures = [t for t, _ in self.temperature_factor]
-        if any(b <= a for a, b in itertools.pairwise(temperatures)):
-            raise InputError(
-                "temperature_factor", temperatures, "list temperatures in rising order"
-            )
-        if any(not (math.isfinite(f) and f > 0.0) for _, f in self.temperature_factor):
-            raise InputError("temperature_factor", self.temperature_factor, "give factors above 0")
+        checked_word("stop_law", self.stop_law, get_args(ContactLaw))
+        object.__setattr__(self, "temperature_factor", _checked_table(self.temperature_factor))
 
     def replace(self, **changes: object) -> Self:
         """Return a new screen with some fields changed; unknown names raise InputError."""
@@ -131,6 +133,7 @@ class FlipFlowScreen:
 
     def loaded(self, load: Load) -> Self:
         """Return the screen as it is under ``load``: softer or stiffer, heavier, warmer."""
+        checked_kind("load", load, Load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
         factor = load.stiffness_factor * self.temperature_stiffness_factor(load.temperature)
         return self.replace(
             main_mass=self.main_mass + load.main_mass,
@@ -148,7 +151,7 @@ class FlipFlowScreen:
                 "temperature", temperature, "add shear_springs.temperature_factor to the machine"
             )
         degrees, factors = zip(*self.temperature_factor, strict=True)
-        if not degrees[0] <= temperature <= degrees[-1]:
+        if not degrees[0] <= checked_number("temperature", temperature, DEGREES) <= degrees[-1]:
             raise InputError(
                 "temperature",
                 temperature,
@@ -185,3 +188,18 @@ class FlipFlowScreen:
             excitation=Unbalance([self.eccentric_moment, 0.0]),
             coordinates={"main": (1.0, 0.0), "floating": (0.0, 1.0), "relative": (1.0, -1.0)},
         )
+
+
+def _checked_table(rows: object) -> tuple[tuple[float, float], ...]:
+    """Pairs (degrees Celsius, factor), rising in temperature; none is a table, too."""
+    name, remedy = "temperature_factor", "give pairs (degrees Celsius, factor above 0)"
+    table = checked_numbers(name, rows, remedy)
+    if table.size == 0:
+        return ()
+    if table.ndim != 2 or table.shape[1] != 2:
+        raise InputError(name, rows, remedy)
+    if (np.diff(table[:, 0]) <= 0.0).any():
+        raise InputError(name, rows, "list temperatures in rising order")
+    if (table[:, 1] <= 0.0).any():
+        raise InputError(name, rows, "give factors above 0")
+    return tuple((float(degrees), float(factor)) for degrees, factor in table)

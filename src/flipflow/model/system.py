@@ -2,26 +2,47 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_all,
+    checked_index,
+    checked_mapping,
+    checked_numbers,
+    checked_reals,
+    takes,
+)
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance, frozen_array
 
 Coordinate = str | int
 
 
 def system_of(machine: object) -> MechanicalSystem:
-    """The system of a screen or a system; anything else is refused with a sentence."""
-    if not isinstance(machine, Machine):
-        remedy = "give a FlipFlowScreen or a MechanicalSystem; of a project, its .screen"
-        raise InputError("machine", type(machine).__name__, remedy)
-    return machine.system()
+    """The system of a screen or a system; anything else is refused with a sentence.
+
+    A result has a ``system``, too, but none that is called for, and a class is no machine yet.
+    """
+    if not isinstance(machine, type) and takes(getattr(machine, "system", None), 0):
+        system = cast("Machine", machine).system()
+        if isinstance(system, MechanicalSystem):
+            return system
+    remedy = "give a FlipFlowScreen or a MechanicalSystem; of a project, its .screen"
+    raise InputError("machine", type(machine).__name__, remedy)
+
+
+def checked_coordinate(which: object) -> Coordinate:
+    """A name or an index, whatever the machine."""
+    if isinstance(which, str):
+        return which
+    return checked_index("coordinate", which, sys.maxsize, "give a coordinate's name or its index")
 
 
 @runtime_checkable
@@ -79,17 +100,17 @@ class MechanicalSystem:
         n = mass.shape[0]
         if np.linalg.eigvalsh(mass)[0] <= 0.0:
             raise InputError("M", M, "the mass matrix must be positive definite")
-        if excitation is None:
-            raise InputError("excitation", None, "give ff.Unbalance(...) or ff.HarmonicForce(...)")
+        remedy = "give ff.Unbalance(...) or ff.HarmonicForce(...)"
+        if not isinstance(excitation, (Unbalance, HarmonicForce)):
+            raise InputError("excitation", excitation, remedy)
         if excitation.vector.shape != (n,):
             raise InputError("excitation", excitation.vector, f"give {n} numbers, one per mass")
+        remedy = "give a list of ff.ClearanceSpring, or none"
+        springs = checked_all("springs", springs, ClearanceSpring, remedy)
         for spring in springs:
             if spring.direction.shape != (n,):
                 raise InputError("direction", spring.direction, f"give {n} numbers, one per mass")
-        named = {name: frozen_array(vector) for name, vector in (coordinates or {}).items()}
-        for name, vector in named.items():
-            if vector.shape != (n,):
-                raise InputError(f"coordinates[{name!r}]", vector, f"give {n} numbers")
+        named = _named(coordinates, n)
         object.__setattr__(self, "M", mass)
         object.__setattr__(self, "C", _square("C", C, n))
         object.__setattr__(self, "K", _square("K", K, n))
@@ -123,9 +144,8 @@ class MechanicalSystem:
                 known = ", ".join(map(repr, self.coordinates)) or "none is named"
                 raise InputError("coordinate", which, f"choose one of {known}, or an index")
             return self.coordinates[which]
-        if isinstance(which, bool) or not 0 <= which < self.size:
-            raise InputError("coordinate", which, f"choose an index from 0 to {self.size - 1}")
-        return np.asarray(np.eye(self.size)[which])
+        remedy = f"choose an index from 0 to {self.size - 1}, or a name"
+        return np.asarray(np.eye(self.size)[checked_index("coordinate", which, self.size, remedy)])
 
     @property
     def named(self) -> tuple[Coordinate, ...]:
@@ -157,14 +177,29 @@ class MechanicalSystem:
         return MechanicalSystem(self.M, C, K, kept, self.excitation, self.coordinates)
 
 
+def _named(coordinates: object, n: int) -> dict[str, NDArray[np.float64]]:
+    """Vectors by name, checked."""
+    if coordinates is None:
+        return {}
+    remedy = 'give names with their vectors, as {"relative": (1, -1)}'
+    named = {}
+    for name, given in checked_mapping("coordinates", coordinates, remedy).items():
+        field, remedy = f"coordinates[{name!r}]", f"give {n} finite numbers"
+        named[name] = frozen_array(checked_numbers(field, given, remedy))
+        if named[name].shape != (n,):
+            raise InputError(field, given, remedy)
+    return named
+
+
 def _square(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
-    array = frozen_array(values)
+    array = frozen_array(checked_reals(name, values, "give a square matrix of numbers"))
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] == 0:
         raise InputError(name, array.shape, "give a square matrix")
     if size is not None and array.shape[0] != size:
         raise InputError(name, array.shape, f"give a {size} x {size} matrix, as M is")
     if not np.all(np.isfinite(array)):
         raise InputError(name, "not finite", "give finite numbers")
+    checked_numbers(name, array, "give finite numbers")
     if np.any(np.abs(array - array.T) > 1e-12 * np.abs(array)):
         raise InputError(name, "not symmetric", "give a symmetric matrix")
     return array

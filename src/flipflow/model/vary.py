@@ -7,7 +7,6 @@ between 0 and 1 into values of its field.
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_number,
+    checked_numbers,
+    checked_positive,
+    checked_word,
+    members_of,
+)
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 
@@ -89,17 +95,16 @@ class Normal(Distribution):
     std: float
 
     def __post_init__(self) -> None:
-        if not _is_number(self.mean):
-            raise InputError("mean", self.mean, "give a finite number")
-        if not (_is_number(self.std) and self.std > 0.0):
-            raise InputError("std", self.std, "give a finite standard deviation above 0")
+        object.__setattr__(self, "mean", checked_number("mean", self.mean))
+        object.__setattr__(self, "std", checked_positive("std", self.std))
 
     def quantile(self, u: Real) -> Values:
         """``mean + std Phi^-1(u)``; shares of 0 and 1, which lie at infinity, are kept inside."""
         from scipy.special import ndtri  # noqa: PLC0415  slow to import
 
         smallest = 2.0**-33
-        return np.asarray(self.mean + self.std * ndtri(np.clip(u, smallest, 1.0 - smallest)))
+        inside = np.clip(_shares(u), smallest, 1.0 - smallest)
+        return np.asarray(self.mean + self.std * ndtri(inside))
 
     @property
     def ends(self) -> tuple[object, object]:
@@ -131,19 +136,22 @@ class Choice(Distribution):
     values: tuple[float, ...] | tuple[str, ...]
 
     def __post_init__(self) -> None:
-        given = self.values
-        if isinstance(given, str) or not hasattr(given, "__iter__"):
-            raise InputError("values", given, "give at least two values, for example (6e-3, 8e-3)")
-        values = tuple(given)
-        words = all(isinstance(value, str) for value in values)
-        if len(values) < 2 or not (words or all(map(_is_number, values))):
-            raise InputError("values", given, "give at least two finite numbers, or words only")
-        object.__setattr__(self, "values", values)
+        given = members_of(self.values)
+        if given is None:
+            remedy = "give at least two values, for example (6e-3, 8e-3)"
+            raise InputError("values", self.values, remedy)
+        remedy = "give at least two finite numbers, or words only"
+        if len(given) < 2:
+            raise InputError("values", self.values, remedy)
+        words = all(isinstance(value, str) for value in given)
+        kept = map(str, given) if words else (checked_number("values", v, remedy) for v in given)
+        object.__setattr__(self, "values", tuple(kept))
 
     def quantile(self, u: Real) -> Values:
         """Value k of K for shares from k/K up to (k + 1)/K."""
         values = np.asarray(self.values)
-        return values[np.minimum((u * values.size).astype(np.int64), values.size - 1)]
+        last = values.size - 1
+        return values[np.minimum((_shares(u) * values.size).astype(np.int64), last)]
 
     @property
     def ends(self) -> tuple[object, object]:
@@ -181,8 +189,7 @@ def variations(vary: Vary, screen: FlipFlowScreen) -> tuple[Variation, ...]:
 
 
 def _variation(name: str, given: object, screen: FlipFlowScreen) -> Variation:
-    if name not in FIELD and name != LAW:
-        raise InputError("vary", name, f"choose fields of {', '.join([*FIELD, LAW])}")
+    checked_word("vary", name, (*FIELD, LAW))
     distribution = _distribution(name, given)
     counted = name == LAW or FIELD[name].whole
     if counted and not isinstance(distribution, Choice):
@@ -202,16 +209,17 @@ def _distribution(name: str, given: object) -> Distribution:
         if given.ndim != 1 or given.size < 2 or given.dtype.kind not in "iuf":
             raise InputError(field, given, "give an array of at least two numbers, shape (n,)")
         return Choice(tuple(sorted(float(value) for value in given)))
-    if not isinstance(given, (tuple, list)) or len(given) != 2 or not all(map(_is_number, given)):
+    if not isinstance(given, (tuple, list)) or len(given) != 2:
         raise InputError(field, given, REMEDY)
-    low, high = (float(value) for value in given)
+    low, high = (checked_number(field, value, REMEDY) for value in given)
     if not low < high:
         raise InputError(field, given, "the interval is empty or reversed; give (low, high)")
     return Interval(low, high)
 
 
-def _is_number(value: object) -> bool:
-    numbers = (int, float, np.integer, np.floating)
-    if isinstance(value, bool) or not isinstance(value, numbers):
-        return False
-    return math.isfinite(value)
+def _shares(u: object) -> Real:
+    remedy = "give shares of the distribution from 0 to 1"
+    shares = checked_numbers("u", u, remedy)
+    if ((shares < 0.0) | (shares > 1.0)).any():
+        raise InputError("u", u, remedy)
+    return shares

@@ -11,7 +11,8 @@ from flipflow import __version__
 from flipflow.errors import IncompleteError, InputError, MissingExtra, StoreError
 from flipflow.io.project import load
 from flipflow.io.results import SUMMARY, document_of
-from flipflow.model.monitor import Monitor, silent
+from flipflow.model.arguments import checked_all, checked_monitor
+from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict
 from flipflow.paper.figure import PaperFigure
@@ -111,8 +112,9 @@ def reproduce(
     machine = load(MACHINE) if screen is None else screen
     if not isinstance(machine, FlipFlowScreen):
         raise InputError("screen", type(machine).__name__, "give a FlipFlowScreen")
-    say = monitor or silent
-    wanted = chosen(tuple(figures))
+    say = checked_monitor(monitor)
+    remedy = "give a list of names, such as ['figure-08']"
+    wanted = chosen(checked_all("figures", figures, str, remedy))
     made = []
     for k, one in enumerate(wanted):
         say(one.name, k / len(wanted))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import cast
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import checked_count, checked_kind, checked_positive
 
 MOST_HARMONICS = 200
 MOST_POINTS = 5000
@@ -26,7 +27,7 @@ class PiecewiseExact:
     points: int = 300
 
     def __post_init__(self) -> None:
-        _check_count("points", self.points, MOST_POINTS)
+        _keep_counts(self, points=MOST_POINTS)
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,7 @@ class HarmonicBalance:
     points: int = 300
 
     def __post_init__(self) -> None:
-        _check_count("harmonics", self.harmonics, MOST_HARMONICS)
-        _check_count("points", self.points, MOST_POINTS)
+        _keep_counts(self, harmonics=MOST_HARMONICS, points=MOST_POINTS)
 
 
 @dataclass(frozen=True)
@@ -83,19 +83,28 @@ class SampledHarmonicBalance:
     points: int = 300
 
     def __post_init__(self) -> None:
-        _check_count("harmonics", self.harmonics, MOST_HARMONICS)
-        _check_count("samples", self.samples, MOST_SAMPLES)
-        _check_count("points", self.points, MOST_POINTS)
+        _keep_counts(self, harmonics=MOST_HARMONICS, samples=MOST_SAMPLES, points=MOST_POINTS)
         if self.samples <= 4 * self.harmonics:
             remedy = f"give more than four samples a harmonic, {4 * self.harmonics + 1} or more"
             raise InputError("samples", self.samples, remedy)
-        if not (isinstance(self.sharpness, (int, float)) and 0.0 < self.sharpness < math.inf):
-            raise InputError("sharpness", self.sharpness, "give a finite number above 0, in 1/m")
+        sharpness = checked_positive("sharpness", self.sharpness, "in 1/m")
+        object.__setattr__(self, "sharpness", sharpness)
 
 
 Method = PiecewiseExact | HarmonicBalance | SampledHarmonicBalance
 
 
-def _check_count(name: str, value: object, most: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise InputError(name, value, f"give a whole number from 1 to {most}")
+def checked_method(method: object) -> Method:
+    """The method itself; where none is given the exact one."""
+    if method is None:
+        return PiecewiseExact()
+    remedy = "give ff.PiecewiseExact() or ff.HarmonicBalance(3)"
+    kinds = (PiecewiseExact, HarmonicBalance, SampledHarmonicBalance)
+    return cast("Method", checked_kind("method", method, kinds, remedy))
+
+
+def _keep_counts(options: Method, **most: int) -> None:
+    """Check whole numbers of an option from 1 to the most allowed, and keep them as int."""
+    for name, limit in most.items():
+        count = checked_count(name, getattr(options, name), limit)
+        object.__setattr__(options, name, count)

@@ -12,6 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.motion import ContactInterval, Motion
 from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_index,
+    checked_kind,
+    checked_numbers,
+    checked_reals,
+    takes,
+)
 from flipflow.model.contact_law import ENTERED, OPEN, force_in, shares
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -20,6 +27,7 @@ from flipflow.periodic.stability import STABLE, full_turn, stability_words
 
 GAUSS_POINTS = 24
 POINTS_PER_TURN = 720
+QUANTITY = "give a function of (t, x, v, a) that returns one number for each time"
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +145,7 @@ class Orbit:
 
     def stop_force(self, spring: int = 0, t: ArrayLike | None = None) -> Real:
         """Force H of a stop in N at times t (default: :attr:`t`), positive against +d."""
-        times = np.mod(self.t if t is None else np.asarray(t, float), self.period)
+        times = np.mod(self._times(t), self.period)
         flat = np.atleast_1d(times).ravel()
         return self._force(spring, flat, self.motion.piece(flat)).reshape(times.shape)
 
@@ -178,8 +186,13 @@ class Orbit:
         a grid with both sides of every change of contact, and returns (K,); the summit between
         grid points is that of a parabola through the three highest, within one piece.
         """
+        if not takes(quantity, 4):
+            raise InputError("quantity", quantity, QUANTITY)
         t, piece, *states = self._grid
-        return _summit(np.abs(quantity(t, *states)), piece)
+        values = checked_reals("quantity", quantity(t, *states), QUANTITY)
+        if values.shape != t.shape:
+            raise InputError("quantity", values, QUANTITY)
+        return _summit(np.abs(values), piece)
 
     def stop_force_peak(self, spring: int = 0) -> float:
         """Greatest |H| of a stop over the period in N."""
@@ -193,6 +206,8 @@ class Orbit:
         times this is the power that the stop takes.
         """
         vector = self.system.coordinate(which)
+        if spring is not None:
+            self._spring(spring)
 
         def square(t: Real, piece: NDArray[np.intp]) -> Real:
             rate = self.motion.piece_derivative(t, piece, 1) @ vector
@@ -224,8 +239,11 @@ class Orbit:
                 total += float(weights @ values) * length / (2.0 * parts)
         return float(total / self.period)
 
+    def _times(self, t: ArrayLike | None) -> Real:
+        return self.t if t is None else checked_numbers("t", t, "give finite times in s")
+
     def _along(self, which: Coordinate, t: ArrayLike | None, order: int) -> Real:
-        times = self.t if t is None else np.asarray(t, float)
+        times = self._times(t)
         return np.asarray(self.motion.derivative(times, order) @ self.system.coordinate(which))
 
     @cached_property
@@ -253,9 +271,8 @@ class Orbit:
 
     def _spring(self, number: int) -> ClearanceSpring:
         count = len(self._springs)
-        if not 0 <= number < count:
-            raise InputError("spring", number, f"the machine has {count} springs, from 0 on")
-        return self._springs[number]
+        remedy = f"the machine has {count} springs, from 0 on"
+        return self._springs[checked_index("spring", number, count, remedy)]
 
     def _regime(self, spring: int, piece: NDArray[np.intp]) -> Int:
         """Regime of a spring in each piece: one without gap always pushes."""
@@ -277,8 +294,15 @@ class Orbit:
         return float(low[0]), float(high[0]), complex(first[0])
 
 
+def checked_orbit(name: str, orbit: object) -> Orbit:
+    """A motion, and nothing else."""
+    remedy = "give a motion, for example one of ff.periodic_orbits"
+    return checked_kind(name, orbit, Orbit, remedy)
+
+
 def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
     """State (x, x') from "rest", an orbit or numbers, (2 N,)."""
+    remedy = f"give {2 * size} finite numbers, (x, x')"
     if isinstance(initial, Orbit):
         if initial.state.size != 2 * size:
             raise InputError("initial", initial, "give an orbit of this machine")
@@ -287,12 +311,8 @@ def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
         if initial != "rest":
             raise InputError("initial", initial, 'give "rest", an orbit, or a state (x, x\')')
         return np.zeros(2 * size)
-    remedy = f"give {2 * size} finite numbers, (x, x')"
-    try:
-        state = np.asarray(initial, float)
-    except (TypeError, ValueError):
-        raise InputError("initial", initial, remedy) from None
-    if state.shape != (2 * size,) or not np.isfinite(state).all():
+    state = checked_numbers("initial", initial, remedy)
+    if state.shape != (2 * size,):
         raise InputError("initial", initial, remedy)
     return state
 

@@ -35,7 +35,6 @@ from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
 
 
-@singledispatch
 def figure(result: object) -> Figure:
     """Make the figure of a result; ``figure(result).write("x.html")`` writes it.
 
@@ -55,86 +54,93 @@ def figure(result: object) -> Figure:
     InputError
         For anything else.
     """
-    known = ", ".join(sorted(kind.__name__ for kind in figure.registry if kind is not object))
+    # A function that dispatches by type takes its argument by position only.
+    return _figure(result)
+
+
+@singledispatch
+def _figure(result: object) -> Figure:
+    """The figure of a result of a kind registered below; anything else is refused."""
+    known = ", ".join(sorted(kind.__name__ for kind in _figure.registry if kind is not object))
     raise InputError("result", type(result).__name__, f"a figure can be made of {known}")
 
 
-@figure.register
+@_figure.register
 def _(result: Branch) -> Figure:
     return branch_figure(result)
 
 
-@figure.register(list)
-@figure.register(tuple)
+@_figure.register(list)
+@_figure.register(tuple)
 def _(result: Sequence[Branch]) -> Figure:
     return branches_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: FieldBranch) -> Figure:
     return field_branch_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: LinearResponse) -> Figure:
     return linear_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Orbit) -> Figure:
     return orbit_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: OperatingRegion) -> Figure:
     return region_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Sweep) -> Figure:
     return sweep_figure((result,))
 
 
-@figure.register
+@_figure.register
 def _(result: History) -> Figure:
     return history_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: RunUp) -> Figure:
     return run_up_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Sensitivity) -> Figure:
     return sensitivity_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Loading) -> Figure:
     return loading_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: ResponseFamily) -> Figure:
     return family_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Basins) -> Figure:
     return basins_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Section) -> Figure:
     return section_figure(result)
 
 
-@figure.register
+@_figure.register
 def _(result: Spectrum) -> Figure:
     return spectrum_figure(result)

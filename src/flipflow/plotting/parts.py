@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import InputError, StoreError
+from flipflow.model.arguments import checked_path
 
 Real = NDArray[np.float64]
 Role = Literal[
@@ -258,7 +259,7 @@ def write_rendered(
     StoreError
         When the file cannot be written.
     """
-    target = Path(path)
+    target = checked_path("path", path)
     ending = target.suffix.lower()
     if ending not in formats:
         raise InputError("path", str(path), f"give a name that ends in {', '.join(formats)}")

@@ -20,7 +20,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.periodic.options import Method, PiecewiseExact
+from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import analysed_range
@@ -188,12 +188,13 @@ def assess(
     if not isinstance(project, Project):
         remedy = "give a project, such as ff.load_project('ffs0827')"
         raise InputError("project", type(project).__name__, remedy)
+    span = analysed_range(project.screen, project.speed)
     region = operating_region(
         project.screen,
         project.limits,
         project.load_cases,
         monitor,
-        omega=omega or analysed_range(project.screen, project.speed),
+        omega=span if omega is None else omega,
         method=method,
     )
     cases = tuple(
@@ -211,7 +212,7 @@ def assess(
         tornado=None if project.speed is None else tornado(project.screen, project.speed),
         transients=None if project.speed is None else transients(project, project.speed),
         notes=(*project.warnings, *region.notes, *coexisting(cases)),
-        method=method or PiecewiseExact(),
+        method=checked_method(method),
         version=__version__,
         input_hash=input_hash(project),
     )

@@ -16,8 +16,8 @@ from flipflow.batch.lanes import Run
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_count
-from flipflow.model.monitor import Monitor, silent
+from flipflow.model.arguments import checked_count, checked_monitor, checked_numbers, checked_word
+from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.turns import NOT_SETTLED
@@ -122,6 +122,8 @@ class Basins:
 
     def axis(self, kind: str, which: Coordinate) -> GridAxis | None:
         """The axis of a coordinate, None where it does not vary."""
+        checked_word("kind", kind, tuple(UNITS))
+        system_of(self.machine).coordinate(which)
         return next((a for a in self.axes if (a.kind, a.which) == (kind, which)), None)
 
 
@@ -189,17 +191,17 @@ def basins(
     if not axes:
         remedy = 'give values of at least one coordinate, as {"relative": [-0.04, 0.0, 0.04]}'
         raise InputError("displacement", displacement, remedy)
-    checked_count("most_turns", most_turns, MOST_TURNS)
+    most_turns = checked_count("most_turns", most_turns, MOST_TURNS)
+    say = checked_monitor(monitor)
     shape = tuple(axis.values.size for axis in axes)
     if math.prod(shape) > MOST_CELLS:
         raise InputError("cells", math.prod(shape), f"give a grid of at most {MOST_CELLS:,} cells")
     states = _states(system, axes, shape)
-    say = monitor or silent
     say("motions", 0.0)
     attractors = Attractors(machine, omega, rng, threads)
     run = attractors.run(states, most_turns, tick=lambda share: say("cells", share))
     return Basins(
-        machine, float(omega), axes, run.label.reshape(shape), run.turns.reshape(shape),
+        machine, attractors.lanes.omega, axes, run.label.reshape(shape), run.turns.reshape(shape),
         tuple(attractors.orbits), most_turns, _notes(run, most_turns, len(attractors.orbits)),
     )  # fmt: skip
 
@@ -215,14 +217,10 @@ def _axes(system: MechanicalSystem, kind: Kind, window: Window | None) -> list[G
     for which, given in window.items():
         system.coordinate(which)
         field = f"{kind}[{which!r}]"
-        try:
-            values = np.atleast_1d(np.array(given, dtype=float))
-        except (TypeError, ValueError):
-            raise InputError(field, given, f"give numbers in {UNITS[kind]}") from None
+        remedy = f"give finite numbers in {UNITS[kind]}"
+        values = np.atleast_1d(checked_numbers(field, given, remedy)).copy()
         if values.ndim != 1 or values.size == 0:
             raise InputError(field, f"shape {values.shape}", "give a row of at least one value")
-        if not np.all(np.isfinite(values)):
-            raise InputError(field, given, f"give finite numbers in {UNITS[kind]}")
         made.append(GridAxis(kind, which, values))
     return made
 

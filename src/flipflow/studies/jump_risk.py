@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +11,8 @@ from numpy.typing import NDArray
 from flipflow import __version__
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.arguments import is_number
-from flipflow.model.monitor import Monitor, silent
+from flipflow.model.arguments import checked_monitor, checked_number, checked_speed
+from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
@@ -181,8 +180,10 @@ def jump_risk(
     IncompleteError
         When no stable motion is reached from below.
     """
-    _check_impulse(largest_impulse)
-    say = monitor or silent
+    largest_impulse = _checked_impulse(largest_impulse)
+    say = checked_monitor(monitor)
+    if not isinstance(motion, Orbit):
+        motion = checked_speed(motion, "motion")
     say("motions", 0.0)
     omega = motion.omega if isinstance(motion, Orbit) else motion
     attractors = Attractors(machine, omega, rng, threads)
@@ -224,12 +225,14 @@ def jump_risk(
     )
 
 
-def _check_impulse(largest: object) -> None:
+def _checked_impulse(largest: object) -> float | None:
     if largest is None:
-        return
-    if not is_number(largest) or not 0.0 < cast("float", largest) <= MOST_IMPULSE:
-        remedy = f"give an impulse above 0 and up to {MOST_IMPULSE:g} kg m/s"
+        return None
+    remedy = f"give an impulse above 0 and up to {MOST_IMPULSE:g} kg m/s"
+    impulse = checked_number("largest_impulse", largest, remedy)
+    if not 0.0 < impulse <= MOST_IMPULSE:
         raise InputError("largest_impulse", largest, remedy)
+    return impulse
 
 
 def _working_point(system: MechanicalSystem, motion: float | Orbit) -> Point:

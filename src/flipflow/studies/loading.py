@@ -13,8 +13,9 @@ from scipy.optimize import minimize_scalar
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
+from flipflow.model.arguments import checked_interval
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.periodic.options import Method
+from flipflow.periodic.options import Method, checked_method
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 
 Real = NDArray[np.float64]
@@ -210,6 +211,8 @@ def loading(
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
     if not isinstance(load, Load):
         raise InputError("load", load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
+    method = checked_method(method)
+    omega = None if omega is None else checked_interval("omega", omega)
     bare = screen.replace(clearance=math.inf, clearance_minus=None)
     stopped = _compared(screen, load, omega, method) if screen.has_stop else None
     return Loading(screen, load, stopped, _compared(bare, load, omega, method))

@@ -9,12 +9,12 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.continuation.special_points import CONTACT_BEGIN
 from flipflow.errors import InputError
-from flipflow.model.arguments import check_interval
+from flipflow.model.arguments import checked_all, checked_interval, checked_monitor
 from flipflow.model.limits import Limits
-from flipflow.model.monitor import Monitor, silent
+from flipflow.model.monitor import Monitor
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.periodic.options import Method
+from flipflow.periodic.options import Method, checked_method
 from flipflow.studies.feasible import Bound, CaseWindow, Intervals, case_window, common_window
 from flipflow.studies.landmarks import analysed_range, landmarks
 
@@ -139,11 +139,10 @@ def operating_region(
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
     if limits is not None and not isinstance(limits, Limits):
         raise InputError("limits", limits, "give an ff.Limits, or None for no limits")
-    if isinstance(load_cases, Load) or not all(isinstance(load, Load) for load in load_cases):
-        raise InputError("load_cases", load_cases, "give a list of ff.Load, such as [ff.Load()]")
-    say = monitor or silent
-    loads = tuple(load_cases) or (Load(name="empty"),)
-    span = analysed_range(screen) if omega is None else check_interval(omega)
+    remedy = "give a list of ff.Load, such as [ff.Load()]"
+    loads = checked_all("load_cases", load_cases, Load, remedy) or (Load(name="empty"),)
+    say, method = checked_monitor(monitor), checked_method(method)
+    span = analysed_range(screen) if omega is None else checked_interval("omega", omega)
     say("empty machine", 0.0)
     branch = frequency_response(screen, span, method)
     wanted = limits or Limits()

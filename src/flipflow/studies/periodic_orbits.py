@@ -12,7 +12,12 @@ from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError
-from flipflow.model.arguments import checked_count, checked_generator, checked_speed
+from flipflow.model.arguments import (
+    checked_count,
+    checked_generator,
+    checked_monitor,
+    checked_speed,
+)
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.exact_solver import ExactSolver
@@ -74,15 +79,15 @@ def periodic_orbits(
     IncompleteError
         When no start at all could be followed.
     """
-    checked_count("max_periods", max_periods, MOST_PERIODS)
+    max_periods = checked_count("max_periods", max_periods, MOST_PERIODS)
+    say = checked_monitor(monitor)
     search = _Search(machine, checked_speed(omega), max_periods)
     starts = search.starts(checked_generator(rng))
     if TwoEventProblem.applies(search.settling.solver.system):
         starts += list(TwoEventProblem(search.settling.solver.machine).states(search.omega)[0])
     for k, start in enumerate(starts):
         search.try_from(start)
-        if monitor is not None:
-            monitor(search.progress(), (k + 1) / len(starts))
+        say(search.progress(), (k + 1) / len(starts))
     return search.orbits()
 
 

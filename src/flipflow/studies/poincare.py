@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_count, checked_speed
+from flipflow.model.arguments import checked_count, checked_kind, checked_speed
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit, initial_state
@@ -112,8 +112,8 @@ def poincare_section(
         Where a turn has too many contacts to be recorded.
     """
     speed = checked_speed(omega)
-    checked_count("turns", turns, MOST_TURNS)
-    checked_count("skip", skip, MOST_TURNS, least=0)
+    turns = checked_count("turns", turns, MOST_TURNS)
+    skip = checked_count("skip", skip, MOST_TURNS, least=0)
     solver = ExactSolver(system_of(machine), half_turn=False)
     z = initial_state(solver.system.size, initial)
     if skip:
@@ -142,6 +142,9 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
     InputError
         For a history that is sampled unevenly, or shorter than the periods asked for.
     """
+    checked_kind("motion", motion, (Orbit, History), "give an orbit or a history")
+    if periods is not None:
+        periods = checked_count("periods", periods, MOST_TURNS)
     if isinstance(motion, Orbit):
         count = SAMPLES_A_TURN * motion.periods
         t = motion.period * np.arange(count) / count

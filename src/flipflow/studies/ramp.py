@@ -12,8 +12,8 @@ from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.dynamics.normal import normal_motion
-from flipflow.errors import InputError
-from flipflow.model.arguments import checked_positive, checked_speeds
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.arguments import checked_monitor, checked_positive, checked_speeds
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
@@ -22,10 +22,12 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.studies.periodic_orbits import attracting_orbits
 from flipflow.transient.history import History
 from flipflow.transient.speed_run import Start, normal_direction, run_history, swings
+from flipflow.transient.startup import MOST_SECONDS
 
 Real = NDArray[np.float64]
 BEYOND = 1e-4
 WIDER = 0.15
+SHORTEST = 1e-6  # s, far less than any machine's turn
 LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)
 
 
@@ -111,6 +113,8 @@ def ramp(
     ------
     InputError
         For speeds or a rate that make no sense.
+    IncompleteError
+        When no stable motion is known at the first speed.
     """
     speeds = checked_speeds(omega)
     if speeds.size != 2 or speeds[0] == speeds[1]:
@@ -118,24 +122,37 @@ def ramp(
             "omega", omega, "give two different speeds in rad/s, the first and the last"
         )
     (first, last), (low, high) = speeds.tolist(), np.sort(speeds).tolist()
-    rate = checked_positive("rate", rate, "rad/s^2")
+    rate, duration = _checked_rate(rate, high - low)
+    say = checked_monitor(monitor)
     branch = _branch_over(machine, low, high)
     ends = branch.omega
     held = ends.size > 0 and ends.min() <= first <= ends.max()
     orbits = [orbit for orbit in branch.orbits_at(first) if orbit.stable] if held else []
     orbits = orbits or list(attracting_orbits(machine, first))
     if not orbits:
-        raise InputError("omega", omega, "no stable motion is known at the first speed")
+        raise IncompleteError(
+            f"No stable motion is known at {first:.6g} rad/s; begin at another speed."
+        )
     orbit = orbits[0] if last > first else orbits[-1]
-    duration = abs(last - first) / rate
     state = _with_normal(machine, first, orbit.state)
     history = run_history(
         machine, SpeedProfile((0.0, duration), (first, last)), Start(state, 0.0, first), duration,
-        fastest=high, monitor=monitor,
+        fastest=high, monitor=say,
     )  # fmt: skip
     which = orbit.system.named[-1]
     jumps = _jumps(branch, history, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
+
+
+def _checked_rate(rate: object, span: float) -> tuple[float, float]:
+    """The rate in rad/s^2, and how long the speed then glides over ``span``, in s."""
+    size = checked_positive("rate", rate, "rad/s^2")
+    duration = span / size
+    if not SHORTEST <= duration <= MOST_SECONDS:
+        remedy = f"the speed would glide for {duration:.3g} s; give a rate between"
+        ends = f"{span / MOST_SECONDS:.3g} and {span / SHORTEST:.3g} rad/s^2"
+        raise InputError("rate", rate, f"{remedy} {ends}")
+    return size, duration
 
 
 def _branch_over(machine: Machine, low: float, high: float) -> Branch:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.arguments import check_interval
+from flipflow.model.arguments import checked_interval, checked_reals, checked_word
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.options import Method
@@ -206,7 +206,7 @@ def response_family(
     screens = [screen.replace(**{field: float(value)}) for value in values]
     spans = [analysed_range(one) for one in screens]
     wide = (min(low for low, _ in spans), max(high for _, high in spans))
-    interval = wide if omega is None else check_interval(omega)
+    interval = wide if omega is None else checked_interval("omega", omega)
     members = tuple(
         _member(float(value), one, frequency_response(one, interval, method))
         for value, one in zip(values, screens, strict=True)
@@ -219,14 +219,11 @@ def _one_field(vary: Mapping[str, ArrayLike]) -> tuple[str, Real]:
         remedy = 'name one field and its values, as {"clearance": [5e-3, 6e-3]}'
         raise InputError("vary", vary, remedy)
     ((field, values),) = vary.items()
-    if field not in FIELD:
-        raise InputError("vary", field, f"choose one of {', '.join(FIELD)}")
-    try:
-        array = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        raise InputError(f"vary[{field!r}]", values, "give numbers in SI") from None
+    checked_word("vary", field, FIELD)
+    name = f"vary[{field!r}]"
+    array = np.atleast_1d(checked_reals(name, values, "give numbers in SI"))
     if array.ndim != 1 or array.size == 0:
-        raise InputError(f"vary[{field!r}]", values, "give a list of values")
+        raise InputError(name, values, "give a list of values")
     return field, array
 
 

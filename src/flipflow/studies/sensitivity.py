@@ -12,7 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
 from flipflow.errors import IncompleteError, InputError, StoreError
-from flipflow.model.arguments import check_interval, checked_count, checked_generator
+from flipflow.model.arguments import (
+    checked_count,
+    checked_generator,
+    checked_interval,
+    checked_monitor,
+    checked_speeds,
+    checked_word,
+)
 from flipflow.model.monitor import Monitor
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -296,6 +303,7 @@ def sensitivity(
     workers = checked_count("threads", 1 if threads is None else threads, 256)
     groups = checked_count("n", n, N_MOST, least=LEAST_GROUPS)
     generator = checked_generator(rng)
+    checked_monitor(monitor)
     nominal = _nominal(question)
     points = saltelli_sample(len(varied), groups, generator)
     u = points.reshape(-1, len(varied))
@@ -354,11 +362,10 @@ def _question(machine: object, name: str, omega: object, branch: BranchWord) -> 
     if not isinstance(machine, FlipFlowScreen):
         raise InputError("machine", type(machine).__name__, "give a FlipFlowScreen")
     quantity = quantity_named(name)
-    if branch not in get_args(BranchWord):
-        raise InputError("branch", branch, f"choose one of {', '.join(get_args(BranchWord))}")
+    checked_word("branch", branch, get_args(BranchWord))
     span = analysed_range(machine)
     if quantity.of == "response":
-        wanted = span if omega is None else check_interval(omega)
+        wanted = span if omega is None else checked_interval("omega", omega)
         return Question(machine, quantity, np.array([np.nan]), wanted, branch)
     _require_data(machine, quantity)
     frequencies = _frequencies(omega, name)
@@ -385,13 +392,7 @@ def _require_data(machine: FlipFlowScreen, quantity: Quantity) -> None:
 def _frequencies(omega: object, name: str) -> Real:
     """Frequencies in rad/s, (K,)."""
     remedy = f"give frequencies above 0 rad/s at which {name} is meant, one or (n_omega,)"
-    try:
-        found = np.atleast_1d(np.asarray(omega, dtype=float))
-    except (TypeError, ValueError):
-        raise InputError("omega", omega, remedy) from None
-    if found.ndim != 1 or found.size == 0 or not np.all(np.isfinite(found) & (found > 0.0)):
-        raise InputError("omega", omega, remedy)
-    return found
+    return checked_speeds(omega, remedy)
 
 
 def _values(

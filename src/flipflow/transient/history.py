@@ -10,7 +10,8 @@ import numpy as np
 
 from flipflow import __version__
 from flipflow.compiled.arrays import Int, Real
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import IncompleteError
+from flipflow.model.arguments import checked_index
 from flipflow.model.contact_law import ENTERED, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
 
@@ -130,9 +131,8 @@ class History:
     def stop_force(self, spring: int = 0) -> Real:
         """Force H of a stop in N, positive against +d, (n,)."""
         count = self.force.shape[1]
-        if not 0 <= spring < count:
-            raise InputError("spring", spring, f"the machine has {count} springs, from 0 on")
-        return self.force[:, spring]
+        remedy = f"the machine has {count} springs, from 0 on"
+        return self.force[:, checked_index("spring", spring, count, remedy)]
 
     @property
     def normal_displacement(self) -> Real:

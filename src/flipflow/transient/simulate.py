@@ -11,9 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_count, checked_speed
+from flipflow.model.arguments import (
+    checked_all,
+    checked_count,
+    checked_monitor,
+    checked_numbers,
+    checked_speed,
+)
 from flipflow.model.contact_law import engaged_side
-from flipflow.model.disturbance import Disturbance, Impulse, LoadStep
+from flipflow.model.disturbance import Disturbance, Impulse, LoadStep, Lump
 from flipflow.model.elements import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -81,19 +87,17 @@ def simulate(
         Where stops chatter: too many contacts even in a small part of a turn.
     """
     speed = checked_speed(omega)
-    checked_count("periods", periods, MOST_PERIODS)
+    periods = checked_count("periods", periods, MOST_PERIODS)
+    say = checked_monitor(monitor)
     turn = 2.0 * math.pi / speed
     end = periods * turn
     system = system_of(machine)
     times = _times(t, periods, turn)
-    for one in disturbances:
-        if not isinstance(one, Disturbance):
-            raise InputError("disturbances", one, "give ff.Impulse, ff.LoadStep or ff.Lump")
-    blows = sorted(disturbances, key=lambda one: one.t)
+    blows = sorted(_checked_blows(disturbances), key=lambda one: one.t)
     if blows and blows[-1].t >= end:
         raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
     z = initial_state(system.size, initial)
-    run = _Run(machine, system_of, speed, end, monitor)
+    run = _Run(machine, system_of, speed, end, say)
     run.carry(Recording(times, system.size, len(run.kept)), z, blows)
     settling = Settling(system_of(run.machine), MAX_PERIODS)
     distance = settling.distance_ahead(run.z, speed)
@@ -118,15 +122,22 @@ def simulate(
     )
 
 
+def _checked_blows(disturbances: object) -> tuple[Disturbance, ...]:
+    kinds, remedy = (Impulse, LoadStep, Lump), "give a list of ff.Impulse, ff.LoadStep or ff.Lump"
+    given = checked_all("disturbances", disturbances, kinds, remedy)
+    return cast("tuple[Disturbance, ...]", given)
+
+
 def _times(t: ArrayLike | None, periods: int, turn: float) -> Real:
     if t is None:
         count = periods * SAMPLES_A_TURN
         if count > MOST_SAMPLES:
             raise InputError("periods", periods, "give the times t wanted for so long a run")
         return np.linspace(0.0, periods * turn, count + 1)
-    times = np.atleast_1d(np.asarray(t, float)).copy()
-    if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all():
-        raise InputError("t", t, "give finite times in one row")
+    remedy = "give finite times in one row"
+    times = np.atleast_1d(checked_numbers("t", t, remedy))
+    if times.ndim != 1 or times.size == 0:
+        raise InputError("t", t, remedy)
     end = periods * turn
     if times[0] < 0.0 or times[-1] > end * (1.0 + ROUNDING) or (np.diff(times) < 0.0).any():
         raise InputError("t", t, f"give rising times from 0 to {end:.6g} s")

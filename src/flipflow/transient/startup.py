@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flipflow.compiled import status
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_positive
+from flipflow.model.arguments import checked_monitor, checked_positive, checked_speed
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
 from flipflow.model.elements import Unbalance
@@ -203,7 +203,8 @@ def start_up(
         Without damping, for a bad speed or duration, and for a drive that cannot be.
     """
     movable(machine)
-    given = None if speed is None else checked_positive("speed", speed, "rad/s")
+    given = None if speed is None else checked_speed(speed, "speed")
+    checked_monitor(monitor)
     shaft = _shaft(machine, drive, given, method)
     wanted = given or _working_speed(shaft)
     history = run_history(
@@ -253,7 +254,8 @@ def coast_down(
         Without damping, for a bad speed or duration, and for a drive that cannot be.
     """
     movable(machine)
-    omega = checked_positive("speed", speed, "rad/s")
+    omega = checked_speed(speed, "speed")
+    checked_monitor(monitor)
     shaft, slowest = _shaft(machine, drive, omega, method), -math.inf
     if isinstance(shaft, Drive):
         shaft, slowest = shaft.switched_off(), STOPPED * omega

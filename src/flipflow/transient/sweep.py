@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
 from flipflow.errors import Cancelled
-from flipflow.model.arguments import checked_count, checked_speeds
+from flipflow.model.arguments import checked_count, checked_monitor, checked_speeds
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
@@ -187,8 +187,9 @@ def sweep(
         or a machine without damping, which never settles.
     """
     speeds = checked_speeds(omega)
-    checked_count("max_periods", max_periods, 12)
-    checked_count("most_turns", most_turns, 10_000_000)
+    max_periods = checked_count("max_periods", max_periods, 12)
+    most_turns = checked_count("most_turns", most_turns, 10_000_000)
+    say = checked_monitor(monitor)
     settling = Settling(system_of(machine), max_periods)
     z = initial_state(settling.solver.system.size, initial)
     rows: list[Settled] = []
@@ -199,11 +200,10 @@ def sweep(
             jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
         rows.append(_kept(row))
         z = row.state
-        if monitor is not None:
-            try:
-                monitor(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
-            except Cancelled:
-                break
+        try:
+            say(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
+        except Cancelled:
+            break
     done = len(rows)
     return Sweep(
         machine, speeds[:done], tuple(rows), tuple(jumps), max_periods, most_turns,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from flipflow.compiled import status
 from flipflow.dynamics.machine import stops_of
 from flipflow.errors import InputError
+from flipflow.model.arguments import checked_number, checked_positive, checked_word
 from flipflow.model.contact_law import stored_energy
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.elements import Unbalance
@@ -50,12 +51,14 @@ class RungeKutta:
     step: float | None = None
 
     def __post_init__(self) -> None:
-        if self.formula not in get_args(Formula):
-            raise InputError("formula", self.formula, "choose dopri5 or rk4")
-        if not 1e-13 <= self.tolerance <= 1e-2:
-            raise InputError("tolerance", self.tolerance, "choose between 1e-13 and 1e-2")
-        if self.step is not None and not 0.0 < self.step < math.inf:
-            raise InputError("step", self.step, "give a finite length above 0 s")
+        checked_word("formula", self.formula, get_args(Formula), "choose dopri5 or rk4")
+        remedy = "choose between 1e-13 and 1e-2"
+        tolerance = checked_number("tolerance", self.tolerance, remedy)
+        if not 1e-13 <= tolerance <= 1e-2:
+            raise InputError("tolerance", self.tolerance, remedy)
+        object.__setattr__(self, "tolerance", tolerance)
+        if self.step is not None:
+            object.__setattr__(self, "step", checked_positive("step", self.step, "s"))
 
 
 @dataclass(frozen=True)
