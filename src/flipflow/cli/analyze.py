@@ -31,7 +31,7 @@ def analyze(
     if project.speed is not None:
         speed_of(project, None)
     options = _options(speeds, harmonics)
-    with Destination(output or Path(f"{project.name}-flipflow"), json) as target:
+    with Destination(output or Path(f"{project.name}-flipflow"), json, [file]) as target:
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
@@ -45,12 +45,12 @@ def analyze(
 def _write(assessment: Assessment, target: Destination) -> None:
     """The report, the numbers behind it, the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.assessment import assessment_document  # noqa: PLC0415
     from flipflow.io.response import write_response  # noqa: PLC0415
+    from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
 
-    document = assessment_document(assessment)
+    document = document_of(assessment)
     write_html(assessment, target.path("report.html"))
     target.wrote("report.html")
     target.data("results.json", document)

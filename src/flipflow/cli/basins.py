@@ -34,7 +34,7 @@ def basins(
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
-    with Destination(output or Path(f"{project.name}-flipflow"), json) as target:
+    with Destination(output or Path(f"{project.name}-flipflow"), json, [file]) as target:
         found, risk, reason = _computed(project.screen, omega, cells)
 
         from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
@@ -96,10 +96,9 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
 
 
 def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
-    from flipflow.io.jump_risk import risk_summary  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.results import document_of  # noqa: PLC0415
+    from flipflow.io.results import document_of  # noqa: PLC0415  keeps --help quick
 
-    return document_of(found) | {"jump_risk": None if risk is None else risk_summary(risk)}
+    return document_of(found) | {"jump_risk": None if risk is None else document_of(risk)}
 
 
 def _show(found: Basins, risk: JumpRisk | None, reason: str, out: Console) -> None:

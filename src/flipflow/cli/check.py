@@ -23,9 +23,12 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
     from flipflow.io.project import load_project  # noqa: PLC0415
 
     project = load_project(file, force=force)
-    with Destination(None, json) as target:
+    with Destination(None, json, [file]) as target:
         result = check_project(project)
-        target.document(result.document())
+        if json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+            target.document(document_of(result))
         if target.spoken:
             _show(result, console())
         target.tell()

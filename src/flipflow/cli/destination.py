@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import textwrap
 import time
 from collections.abc import Mapping
@@ -10,8 +11,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
-from flipflow.cli.output import COLUMNS, TERMINAL, check_json, console, write_json
+from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
 from flipflow.errors import Cancelled
+from flipflow.results.store import (
+    checked_place,
+    json_text,
+    prepare_folder,
+    refuse_input,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,16 +47,19 @@ class Destination:
         What ``--output`` names; None where nothing but the terminal is written to.
     json
         What ``--json`` names; ``-`` is the terminal, which then shows nothing else.
+    reads
+        Files that the command reads: they are not written to.
     """
 
-    def __init__(self, folder: Path | None, json: str | None) -> None:
+    def __init__(
+        self, folder: Path | None, json: str | None, reads: Iterable[str] = ()
+    ) -> None:
         if folder is not None:
-            from flipflow.io.files import prepare_folder  # noqa: PLC0415  keeps --help quick
-
-            prepare_folder(folder)
-        if json is not None:
-            check_json(json)
-        self.folder, self.json = folder, json
+            prepare_folder(folder, OUTPUT)
+        self.folder, self.json, self._reads = folder, json, tuple(reads)
+        if json not in (None, TERMINAL):
+            refuse_input(json, self._reads, JSON)
+            checked_place(json, JSON)
         self._begun = time.time()
         self._names: list[str] = []
         self._places: list[str] = []
@@ -76,19 +87,25 @@ class Destination:
 
     def data(self, name: str, document: Mapping[str, object]) -> None:
         """Write a JSON document into the folder."""
-        write_json(document, str(self.path(name)))
+        write_text(self.path(name), json_text(document), OUTPUT)
         self.wrote(name)
 
     def document(self, document: Mapping[str, object]) -> None:
         """Write the JSON document where ``--json`` asks for it."""
-        if self.json is not None:
-            write_json(document, self.json)
-            if self.spoken:
-                self._places.append(self.json)
+        if self.json is None:
+            return
+        text = json_text(document)
+        if self.json == TERMINAL:
+            sys.stdout.write(text)
+        else:
+            write_text(self.json, text, JSON)
+            self._places.append(self.json)
 
     def path(self, name: str) -> Path:
-        """Where a file of the folder stands."""
-        return Path(self.folder or "") / name
+        """Where a file of the folder stands; a file that is read is refused."""
+        place = Path(self.folder or "") / name
+        refuse_input(place, self._reads, OUTPUT)
+        return place
 
     def wrote(self, *names: str) -> None:
         """Note files of the folder that something else has written."""

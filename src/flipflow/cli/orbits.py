@@ -37,7 +37,7 @@ def orbits(
 
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
-    with Destination(output, json) as target:
+    with Destination(output, json, [file]) as target:
         with progress("searching; the first run of a version compiles") as tell:
             found = periodic_orbits(project.screen, omega, max_periods, monitor=tell)
         if output is not None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 COLUMNS = 80
 TERMINAL = "-"
-JSON = "--json"
+JSON, OUTPUT = "--json", "--output"
 
 
 def console() -> Console:
@@ -43,57 +43,3 @@ def print_list(out: Console, title: str, lines: Iterable[str]) -> None:
 def printable(text: str) -> str:
     """Blanks for control characters, which a terminal would act on."""
     return "".join(c if c.isprintable() else " " for c in text)
-
-
-def check_json(target: str) -> None:
-    """See that a document can be written to ``target``, before there is one.
-
-    Raises
-    ------
-    InputError
-        For a folder, a file in a folder that is not there, and what is not the user's to write.
-    """
-    path = Path(target)
-    if target == TERMINAL:
-        return
-    if not target or "\0" in target:
-        raise InputError(JSON, target, "name a file, or - for the terminal")
-    if path.is_dir():
-        raise InputError(JSON, target, "this is a folder, name a file in it")
-    if not path.parent.is_dir():
-        raise InputError(
-            JSON, target, f"there is no folder {str(path.parent)!r}, make it or name another"
-        )
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(JSON, target, "it may not be written, name a file in a folder you own")
-
-
-def write_json(document: Mapping[str, object], target: str) -> None:
-    """Write a document to a file, or to stdout for ``-``; what is not finite becomes null.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
-    """
-    text = json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    if target == TERMINAL:
-        sys.stdout.write(text)
-        return
-    try:
-        Path(target).write_text(text, encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(
-            JSON, target, f"it cannot be written ({reason}), name a file in a folder you own"
-        ) from None
-
-
-def _finite(value: object) -> object:
-    if isinstance(value, Mapping):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(inner) for inner in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -42,7 +42,7 @@ def reproduce(
     wanted = chosen(names)
     screen = load(machine)
     folder = output or FOLDER
-    with Destination(folder, json) as target:
+    with Destination(folder, json, [machine]) as target:
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.paper.page import write_reproduction  # noqa: PLC0415
         from flipflow.report.html import require_templates  # noqa: PLC0415
@@ -54,7 +54,10 @@ def reproduce(
             return found, write_reproduction(found, folder, monitor)
 
         found, written = with_progress(run)
-        target.document(found.document())
+        if json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+            target.document(document_of(found))
         if target.spoken:
             _show(found, console())
         count = (len(written) - 1) // 3

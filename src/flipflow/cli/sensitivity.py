@@ -72,7 +72,7 @@ def sensitivity(
     ranges = read_vary(vary or [], project.screen)
     omega = _omega(project, quantity, speed, speeds)
     options = {"n": n, "rng": seed, "branch": branch}
-    with Destination(output, json) as target:
+    with Destination(output, json, [file]) as target:
         _write(_analysed((project.screen, ranges, quantity, omega), options), target)
 
 

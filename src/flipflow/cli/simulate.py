@@ -49,7 +49,7 @@ def simulate(
     project = load_project(file, force=force)
     omega = speed_of(project, speed)
     blows = _blows(impulse or (), periods * 2.0 * math.pi / omega)
-    with Destination(output, json) as target:
+    with Destination(output, json, [file]) as target:
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
         if output is not None:

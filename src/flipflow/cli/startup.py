@@ -70,16 +70,16 @@ def startup(
         project = replace(project, speed=speed_of(project, speed))
     drive = _drive(project, motor_power, inertia, profile)
     seconds = None if duration is None else _seconds(duration)
-    with Destination(output, json) as target:
+    with Destination(output, json, [file]) as target:
         start, coast = _calculated(project, drive, seconds)
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
         if output is not None:
             _figures(runs, target)
         if json is not None:
+            from flipflow.io.command_results import Startup  # noqa: PLC0415
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            parts = {name: document_of(run) for name, run in runs.items()}
-            target.document({"schema": "flipflow/startup/1", "name": project.name, **parts})
+            target.document(document_of(Startup(project.name, start, coast)))
         if target.spoken:
             _show(project, start, coast, console())
         target.tell()

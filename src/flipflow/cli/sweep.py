@@ -69,7 +69,7 @@ def sweep(
     project = load_project(file, force=force)
     ends = speeds_of(speeds)
     gliding = None if rate is None else _rate(rate, ends)
-    with Destination(output, json) as target:
+    with Destination(output, json, [file]) as target:
         found = _passed(project, ends, steps, gliding)
         if json is not None:
             target.document(_document(project, found))
@@ -142,20 +142,15 @@ def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[R
 
 
 def _document(project: Project, found: Passed) -> dict[str, Any]:
+    from flipflow.io.command_results import Glide, Sweeps  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-    return {
-        "schema": "flipflow/sweeps/1",
-        "name": project.name,
-        "up": document_of(found.up),
-        "down": None if found.down is None else document_of(found.down),
-        "late": [vars(jump) for glide in found.glides for jump in glide.jumps],
-        "glides": [
-            {"rate": glide.rate, "to": glide.history.omega[-1], "complete": found.whole(glide)}
-            for glide in found.glides
-        ],
-        "complete": found.complete,
-    }
+    late = tuple(jump for glide in found.glides for jump in glide.jumps)
+    glides = tuple(
+        Glide(glide.rate, float(glide.history.omega[-1]), found.whole(glide))
+        for glide in found.glides
+    )
+    return document_of(Sweeps(project.name, found.up, found.down, late, glides, found.complete))
 
 
 def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:

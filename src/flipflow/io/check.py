@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from flipflow.io.derived import Derived, derive
 from flipflow.io.layout import SECTIONS, SPEED, Entry, unchecked_without
@@ -74,11 +74,6 @@ class Check:
     assumed: tuple[str, ...]
     missing: tuple[Gap, ...]
     warnings: tuple[str, ...]
-
-    def document(self) -> dict[str, object]:
-        """Return everything as plain data with a schema name."""
-        parts = {**asdict(self), "sums": dict(self.sums)}
-        return {"schema": "flipflow/check/1", **parts}
 
 
 def check_project(project: Project) -> Check:

@@ -9,10 +9,14 @@ import dataclasses
 from functools import singledispatch
 from typing import Any
 
-from flipflow.io.run_up import run_up_summary
+from flipflow.model.drive import SpeedProfile
 from flipflow.periodic.orbit import Orbit
-from flipflow.results.codec import plain
+from flipflow.results.codec import exact, plain
+from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.jump_risk import JumpRisk, Throw
+from flipflow.studies.sensitivity import OneAtATime
+from flipflow.studies.start_and_blows import Transients
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 
@@ -63,4 +67,124 @@ def basins_numbers(basins: Basins) -> dict[str, Any]:
     }
 
 
-read_off.register(RunUp, run_up_summary)
+@read_off.register
+def run_up_summary(run: RunUp) -> dict[str, Any]:
+    """Verdict, peaks, power and drive, SI."""
+    history = run.history
+    summary = {
+        "version": history.version,
+        "verdict": run.verdict,
+        "outcome": run.outcome,
+        "speed": run.speed,
+        "final_speed": run.final_speed,
+        "near": None if run.near is None else run.near._asdict(),
+        "first_frequency": run.first_frequency,
+        "time_to_speed": run.time_to_speed,
+        "passing": run.passing,
+        "peaks": {name: dataclasses.asdict(peak) for name, peak in run.peaks.items()},
+        "power": run.power,
+        "energy": history.energy,
+        "drive": _drive(run),
+        "notes": run.notes,
+        "status": history.status,
+        "method": history.method,
+        "counters": history.counters,
+    }
+    return {name: plain(value) for name, value in summary.items()}
+
+
+def _drive(run: RunUp) -> dict[str, Any]:
+    if isinstance(run.drive, SpeedProfile):
+        return {"times": run.drive.times, "speeds": run.drive.speeds}
+    return dataclasses.asdict(run.drive)
+
+
+@read_off.register
+def risk_summary(risk: JumpRisk) -> dict[str, Any]:
+    """Least impulse and lump, SI and rad; null where nothing throws the motion."""
+    return {
+        "working_relative_amplitude": _relative(risk.orbit),
+        "other_motions": len(risk.others),
+        "impulse": _throw_summary(risk.worst_impulse),
+        "lump": _throw_summary(risk.worst_lump),
+        "largest_impulse": {str(k): plain(size) for k, size in risk.largest_impulse.items()},
+        "notes": list(risk.notes),
+    }
+
+
+def _throw_summary(throw: Throw | None) -> dict[str, Any] | None:
+    if throw is None:
+        return None
+    fields = dict(vars(throw))
+    lands = fields.pop("lands")
+    return {**exact(fields), "lands_on_relative_amplitude": _relative(lands)}
+
+
+def _relative(orbit: Orbit) -> float | None:
+    """Amplitude of the coordinate "relative" in m; null where the machine names none so."""
+    return orbit.amplitude("relative") if "relative" in orbit.system.coordinates else None
+
+
+@read_off.register
+def assessment_summary(assessment: Assessment) -> dict[str, Any]:
+    """Verdict, limits, region and cases of an assessment."""
+    region = assessment.region
+    frequencies = ("omega_ea", "omega_ar", "omega_cs", "omega_lb", "omega_ub", "lower", "upper")
+    return {
+        "version": assessment.version,
+        "input_hash": assessment.input_hash,
+        "name": assessment.project.document.name or assessment.project.name,
+        "verdict": assessment.verdict,
+        "omega": assessment.omega,
+        "limits": [plain(vars(row)) for row in assessment.limits_table],
+        "region": {
+            **{name: plain(getattr(region, name)) for name in frequencies},
+            "feasible": plain(region.feasible),
+            "binding": [[vars(bound) for bound in pair] for pair in region.binding],
+            "cases": [
+                {"name": c.name, "intervals": plain(c.intervals), "unchecked": plain(c.unchecked)}
+                for c in region.cases
+            ],
+        },
+        "cases": [
+            {
+                "name": case.name,
+                "values": plain(case.values),
+                "energy": plain(case.energy),
+                "stop_reached": case.stop_reached,
+                "stability": None if case.orbit is None else case.orbit.stability,
+                "multipliers": None if case.orbit is None else plain(case.orbit.multipliers),
+                "branch_status": case.branch.status.name,
+                "special_points": [
+                    {
+                        "kind": p.kind,
+                        "omega": p.omega,
+                        "relative_amplitude": p.amplitude("relative"),
+                    }
+                    for p in case.branch.special_points
+                ],
+            }
+            for case in assessment.cases
+        ],
+        "transients": _transients(assessment.transients),
+        "tornado": None if assessment.tornado is None else _tornado_document(assessment.tornado),
+        "notes": list(assessment.notes),
+    }
+
+
+def _transients(found: Transients | None) -> dict[str, Any] | None:
+    """Start, coast-down and jump risk of the empty machine; null without a working speed."""
+    if found is None:
+        return None
+    runs = {"start": found.start, "coast_down": found.coast_down}
+    return {
+        "drive_assumed": found.assumed,
+        **{name: None if run is None else run_up_summary(run) for name, run in runs.items()},
+        "jump_risk": None if found.jump is None else risk_summary(found.jump),
+        "reasons": dict(found.reasons),
+    }
+
+
+def _tornado_document(result: OneAtATime) -> dict[str, Any]:
+    fields = ("quantity", "names", "ends", "omega", "nominal", "at_low", "at_high")
+    return {name: plain(getattr(result, name)) for name in fields}

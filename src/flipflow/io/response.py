@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch
-from flipflow.io.files import write_file
 from flipflow.model.constants import RPM
+from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 
 Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]

@@ -1,4 +1,4 @@
-"""Results in and out of files."""
+"""Results in and out of files: one document of each, which opens as what it was."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ from typing import Any
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
-from flipflow.errors import InputError, StoreError
-from flipflow.io.assessment import ASSESSMENT, assessment_document
-from flipflow.io.files import write_file
+from flipflow.errors import FlipflowError, InputError, StoreError
+from flipflow.io.check import Check
+from flipflow.io.command_results import Startup, Sweeps
 from flipflow.io.read_off import read_off
 from flipflow.io.response import branch_csv, branch_netcdf
 from flipflow.model.arguments import checked_path
 from flipflow.periodic.orbit import Orbit
+from flipflow.results.store import json_text, write_file, write_text
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.documents import CODEC
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
-from flipflow.studies.reopen import CODEC
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.transient.history import History
@@ -35,7 +36,7 @@ from flipflow.transient.sweep import Sweep
 
 Document = Mapping[str, Any]
 ORBITS = "flipflow/orbits/1"
-SCHEMAS: Mapping[type, str] = {
+SCHEMAS: dict[type, str] = {
     Branch: "flipflow/branch/1",
     FieldBranch: "flipflow/field-branch/1",
     Orbit: "flipflow/orbit/1",
@@ -52,11 +53,24 @@ SCHEMAS: Mapping[type, str] = {
     Loading: "flipflow/loading/1",
     ResponseFamily: "flipflow/response-family/1",
     Sensitivity: "flipflow/sensitivity/1",
+    Assessment: "flipflow/assessment/1",
+    Startup: "flipflow/startup/1",
+    Sweeps: "flipflow/sweeps/1",
+    Check: "flipflow/check/1",
 }
-# The layers above have results of their own; what opens them is looked up when it is needed.
-ABOVE: Mapping[str, tuple[str, str]] = {
-    "flipflow/claims/1": ("flipflow.paper.reproduce", "reproduction_from")
-}
+# Of these a file holds a summary, and beside it under a key what opens again.
+SUMMARISED: set[type] = {Assessment}
+WHOLE = "whole"
+# The layers above have results of their own; the module of one makes it known when it is loaded.
+ABOVE: Mapping[str, str] = {"flipflow/claims/1": "flipflow.paper.reproduce"}
+TABLES: Mapping[str, Callable[[Branch], bytes]] = {".nc": branch_netcdf, ".csv": branch_csv}
+# What reading ends in where a document does not hold what it should: its numbers may be too large
+# to compute with, and its lists too deep to walk.
+DAMAGE = (
+    FlipflowError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
+    RecursionError, MemoryError,
+)  # fmt: skip
+MOST_SHOWN = 200  # characters of what is wrong
 
 
 def save(result: object, path: str | os.PathLike[str]) -> None:
@@ -72,12 +86,13 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        For an ending or a result that is not known, and where the file cannot be written.
+        For an ending or a result that is not known.
+    StoreError
+        When the file cannot be written.
     """
     target = checked_path("path", path)
     if target.suffix == ".json":
-        text = json.dumps(document_of(result), indent=1, ensure_ascii=False, allow_nan=False)
-        write_file(target, text.encode())
+        write_text(target, json_text(document_of(result)))
     elif target.suffix in TABLES and isinstance(result, Branch):
         write_file(target, TABLES[target.suffix](result))
     else:
@@ -107,8 +122,10 @@ def open_result(path: str | os.PathLike[str]) -> Any:
         raise InputError("path", str(path), remedy)
     try:
         document = json.loads(source.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path} cannot be read as a result: {error}") from None
+    except OSError as error:
+        raise StoreError(f"{path} cannot be read ({error.strerror})") from None
+    except DAMAGE as error:
+        raise StoreError(f"{path} cannot be read as a result: {_shown(error)}") from None
     schema = document.get("schema") if isinstance(document, dict) else None
     if not isinstance(schema, str) or not schema.startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
@@ -116,8 +133,15 @@ def open_result(path: str | os.PathLike[str]) -> Any:
         return opener(schema)(document)
     except StoreError as error:
         raise StoreError(f"{path}: {error}") from None
-    except (LookupError, ValueError, TypeError, AttributeError) as error:
-        raise StoreError(f"{path} is damaged: {error!r}") from None
+    except DAMAGE as error:
+        raise StoreError(f"{path} is damaged: {_shown(error)}") from None
+
+
+def _shown(error: Exception) -> str:
+    """What is wrong, on one line."""
+    told = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+    line = " ".join(told.split()) or type(error).__name__
+    return line if len(line) <= MOST_SHOWN else f"{line[: MOST_SHOWN - 3]}..."
 
 
 @singledispatch
@@ -133,7 +157,17 @@ def document_of(result: object) -> dict[str, Any]:
     if kind not in SCHEMAS:
         remedy = "give what an analysis returns, such as the branch of ff.frequency_response"
         raise InputError("result", kind.__name__, remedy)
-    return {"schema": SCHEMAS[kind], **read_off(result), **CODEC.form(kind).write(result)}
+    fields = CODEC.form(kind).write(result)
+    if kind in SUMMARISED:
+        fields = {WHOLE: fields}
+    return {"schema": SCHEMAS[kind], **read_off(result), **fields}
+
+
+@document_of.register
+def _(found: Startup | Sweeps) -> dict[str, Any]:
+    parts = {k: document_of(one) for k, one in vars(found).items() if type(one) in SCHEMAS}
+    fields = CODEC.form(type(found)).write(found)
+    return {"schema": SCHEMAS[type(found)], **fields, **parts}
 
 
 @document_of.register
@@ -141,14 +175,6 @@ def _(orbits: tuple) -> dict[str, Any]:  # type: ignore[type-arg]
     if not all(isinstance(orbit, Orbit) for orbit in orbits):
         raise InputError("result", orbits, "give one result, or the motions of periodic_orbits")
     return {"schema": ORBITS, "orbits": [document_of(orbit) for orbit in orbits]}
-
-
-@document_of.register
-def _(assessment: Assessment) -> dict[str, Any]:
-    return {
-        **assessment_document(assessment),
-        "whole": CODEC.form(Assessment).write(assessment),
-    }
 
 
 def opener(schema: str) -> Callable[[Document], object]:
@@ -160,24 +186,25 @@ def opener(schema: str) -> Callable[[Document], object]:
         For a document that is no result, or that this version does not know.
     """
     if schema in ABOVE:
-        module, name = ABOVE[schema]
-        return getattr(importlib.import_module(module), name)  # type: ignore[no-any-return]
+        importlib.import_module(ABOVE[schema])
     if schema == ORBITS:
         return lambda document: CODEC.form(tuple[Orbit, ...]).read(document["orbits"])
-    if schema == ASSESSMENT:
-        return _assessment_from
     for kind, known in SCHEMAS.items():
         if schema == known:
-            return CODEC.form(kind).read
+            read = CODEC.form(kind).read
+            return (lambda document: read(_whole(document))) if kind in SUMMARISED else read
     raise StoreError(f"{schema!r} is no result that opens again; update flipflow if it is newer")
 
 
-def _assessment_from(document: Document) -> Assessment:
-    if "whole" not in document:
-        raise StoreError(SUMMARY)
-    assessment: Assessment = CODEC.form(Assessment).read(document["whole"])
-    return assessment
+def _whole(document: Document) -> Document:
+    """What of a summarised result opens again.
 
-
-SUMMARY = "this is the summary that the command line writes; what ff.save writes opens again"
-TABLES: Mapping[str, Callable[[Branch], bytes]] = {".nc": branch_netcdf, ".csv": branch_csv}
+    Raises
+    ------
+    StoreError
+        For a summary alone, which earlier commands wrote.
+    """
+    if WHOLE not in document:
+        raise StoreError("this is a summary alone; what ff.save writes opens again")
+    whole: Document = document[WHOLE]
+    return whole

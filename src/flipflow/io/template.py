@@ -9,6 +9,7 @@ from pathlib import Path
 
 from flipflow.errors import InputError
 from flipflow.io.layout import FORMAT, SECTION_SENTENCES, SECTIONS, Entry, unchecked_without
+from flipflow.results.store import write_file
 
 _HEAD = f"""\
 # A machine file of flipflow. The values are those of no real machine: replace every one.
@@ -52,23 +53,14 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        When the file exists, cannot be written, or does not end in ``.toml``.
+        When the file exists, or does not end in ``.toml``.
+    StoreError
+        When it cannot be written.
     """
     target = Path(path)
     if target.suffix != ".toml":
         raise InputError("file", str(target), "let the name end in .toml")
-    try:
-        with target.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(template())
-    except FileExistsError:
-        raise InputError(
-            "file", str(target), "it exists and is not overwritten, choose another name"
-        ) from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(
-            "file", str(target), f"it cannot be written ({reason}), choose another place"
-        ) from None
+    write_file(target, template().encode(), "file", fresh=True)
     return target
 
 

@@ -217,7 +217,7 @@ def checked_path(name: str, value: object) -> Path:
     """A path of a file, as text or as a path object."""
     if isinstance(value, (str, os.PathLike)):
         path = os.fspath(value)
-        if isinstance(path, str) and "\0" not in path:
+        if isinstance(path, str):
             return Path(path)
     raise InputError(name, value, "give the path of a file, as text or as a Path")
 

@@ -22,8 +22,9 @@ from flipflow.report.blocks import (
     Text,
     TitleBlock,
 )
-from flipflow.report.html import page, write_page
+from flipflow.report.html import page
 from flipflow.report.numbers import NOTHING, number
+from flipflow.results.store import write_text
 
 TITLE = "The paper, reproduced"
 PAGE = "reproduction.html"
@@ -82,7 +83,7 @@ def write_reproduction(
         tuple(blocks(found)), title=TITLE, kind="figures and claims",
         footer=f"flipflow {__version__}: {PAPER}",
     )  # fmt: skip
-    write_page(text, folder / PAGE)
+    write_text(folder / PAGE, text)
     return (PAGE, *names)
 
 

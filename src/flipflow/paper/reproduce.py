@@ -10,7 +10,8 @@ from typing import Any
 from flipflow import __version__
 from flipflow.errors import IncompleteError, InputError, MissingExtra, StoreError
 from flipflow.io.project import load
-from flipflow.io.results import SUMMARY, document_of
+from flipflow.io.read_off import read_off
+from flipflow.io.results import SCHEMAS, SUMMARISED
 from flipflow.model.arguments import checked_all, checked_monitor
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
@@ -20,9 +21,8 @@ from flipflow.paper.registry import FIGURES, chosen
 from flipflow.plotting.drawing import Drawing
 from flipflow.plotting.parts import Figure
 from flipflow.report.blocks import Table
-from flipflow.results.codec import Codec, Form
-from flipflow.studies.documents import machine_document
-from flipflow.studies.reopen import CODEC
+from flipflow.results.codec import Form
+from flipflow.studies.documents import CODEC, machine_document
 
 SCHEMA = "flipflow/claims/1"
 PAPER = "Lin, Wang, Xu, Zuo, Liang, Minerals 2024, 14, 406"
@@ -74,17 +74,6 @@ class Reproduction:
         """How many claims have each verdict."""
         found = Counter(claim.evaluation.verdict for claim in self.claims)
         return {str(verdict): found[verdict] for verdict in Verdict}
-
-    def document(self) -> dict[str, Any]:
-        """The claims as JSON types."""
-        return {
-            "schema": SCHEMA,
-            "version": __version__,
-            "paper": PAPER,
-            "machine": machine_document(self.screen),
-            "claims": [claim.document() for claim in self.claims],
-            "counts": self.counts,
-        }
 
 
 def reproduce(
@@ -142,26 +131,6 @@ def _without(one: PaperFigure[Any], why: str) -> ReproducedFigure:
     return ReproducedFigure(one.name, one.title, None, (), claims, why)
 
 
-@document_of.register
-def _(reproduction: Reproduction) -> dict[str, Any]:
-    whole = PAPER_CODEC.form(Reproduction).write(reproduction)
-    return {**reproduction.document(), "whole": whole}
-
-
-def reproduction_from(document: Mapping[str, Any]) -> Reproduction:
-    """The reproduction that :func:`flipflow.save` wrote.
-
-    Raises
-    ------
-    StoreError
-        For a document that holds the claims alone, or one that this version does not know.
-    """
-    if "whole" not in document:
-        raise StoreError(SUMMARY)
-    reproduction: Reproduction = PAPER_CODEC.form(Reproduction).read(document["whole"])
-    return reproduction
-
-
 def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
     """The claim that :meth:`~flipflow.paper.claims.DecidedClaim.document` wrote."""
     name, figure = document["id"], document["figure"]
@@ -173,4 +142,18 @@ def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
     return DecidedClaim(known[name], figure, evaluation)
 
 
-PAPER_CODEC = Codec({**CODEC.own, DecidedClaim: Form(DecidedClaim.document, _claim_from)})
+def _summary(reproduction: Reproduction) -> dict[str, Any]:
+    """The claims with their verdicts, for other readers."""
+    return {
+        "version": __version__,
+        "paper": PAPER,
+        "machine": machine_document(reproduction.screen),
+        "claims": [claim.document() for claim in reproduction.claims],
+        "counts": reproduction.counts,
+    }
+
+
+CODEC.learn({DecidedClaim: Form(DecidedClaim.document, _claim_from)})
+SCHEMAS[Reproduction] = SCHEMA
+SUMMARISED.add(Reproduction)
+read_off.register(Reproduction, _summary)

@@ -15,8 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.errors import InputError, StoreError
+from flipflow.errors import InputError
 from flipflow.model.arguments import checked_path
+from flipflow.results.store import write_file
 
 Real = NDArray[np.float64]
 Role = Literal[
@@ -263,9 +264,5 @@ def write_rendered(
     ending = target.suffix.lower()
     if ending not in formats:
         raise InputError("path", str(path), f"give a name that ends in {', '.join(formats)}")
-    data = rendered(ending)
-    try:
-        target.write_bytes(data)
-    except OSError as error:
-        raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
+    write_file(target, rendered(ending))
     return target

@@ -8,10 +8,11 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flipflow.errors import MissingExtra, StoreError
+from flipflow.errors import MissingExtra
 from flipflow.plotting.plotly import START, element, library
 from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
+from flipflow.results.store import write_text
 from flipflow.studies.assessment import Assessment
 
 if TYPE_CHECKING:
@@ -42,23 +43,8 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
     StoreError
         When the file cannot be written.
     """
-    return write_page(html(assessment), path)
-
-
-def write_page(text: str, path: str | os.PathLike[str]) -> Path:
-    """Write a page to a file.
-
-    Raises
-    ------
-    StoreError
-        When the file cannot be written.
-    """
-    target = Path(path)
-    try:
-        target.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{target} cannot be written: {error.strerror}.") from error
-    return target
+    write_text(path, html(assessment))
+    return Path(path)
 
 
 def html(assessment: Assessment) -> str:

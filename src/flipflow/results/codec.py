@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -17,7 +18,10 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.errors import StoreError
+
 Json = Any
+MOST_WHOLE = 2**63  # what is larger is no count, index or seed
 
 
 @dataclass(frozen=True)
@@ -29,17 +33,14 @@ class Form:
 
 
 class Codec:
-    """The forms of types; that of a dataclass is made of those of its fields.
+    """The forms of types; that of a dataclass is made of those of its fields."""
 
-    Parameters
-    ----------
-    own
-        Types that have another form than their fields give them.
-    """
+    def __init__(self) -> None:
+        self._forms: dict[Any, Form] = dict(OWN)
 
-    def __init__(self, own: Mapping[Any, Form]) -> None:
-        self.own = dict(own)
-        self._forms: dict[Any, Form] = {**OWN, **own}
+    def learn(self, own: Mapping[Any, Form]) -> None:
+        """Take up types that have another form than their fields give them."""
+        self._forms |= own
 
     def form(self, kind: Any) -> Form:
         """The form of a type: a class, or a hint such as ``tuple[Orbit, ...]``.
@@ -58,12 +59,12 @@ class Codec:
         if origin in MAKERS:
             return MAKERS[origin](self, parts)
         if isinstance(kind, type) and issubclass(kind, Enum):
-            return Form(lambda value: value.name, lambda name: kind[name])
+            return Form(lambda value: value.name, lambda name: kind[_text(name)])
         if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
-            return self._of_fields(kind)
+            return self.fields(kind)
         raise TypeError(f"no form is known for {kind!r}")
 
-    def _of_fields(self, kind: Any) -> Form:
+    def fields(self, kind: Any) -> Form:
         """An object by the fields of a dataclass or a named tuple; what is absent has its default.
 
         Forms are looked up when they are used, so that a type may hold others of its kind.
@@ -73,9 +74,33 @@ class Codec:
         def write(value: object) -> Json:
             return {name: self.form(hints[name]).write(getattr(value, name)) for name in fields}
 
-        def read(document: Mapping[str, Json]) -> object:
-            present = [name for name, needed in fields.items() if needed or name in document]
-            return kind(**{name: self.form(hints[name]).read(document[name]) for name in present})
+        def read(document: Json) -> object:
+            present = _object(document)
+            missing = [name for name, needed in fields.items() if needed and name not in present]
+            if missing:
+                raise ValueError(f"{missing[0]} is missing")
+            read = {}
+            for name in (name for name in fields if name in present):
+                with _within(name):
+                    read[name] = self.form(hints[name]).read(present[name])
+            return kind(**read)
+
+        return Form(write, read)
+
+    def tagged(self, key: str, kinds: Mapping[str, Any]) -> Form:
+        """One of several types by its fields, told apart by a word that stands under ``key``."""
+        forms = {word: self.fields(kind) for word, kind in kinds.items()}
+
+        def write(value: object) -> Json:
+            word = next(word for word, kind in kinds.items() if isinstance(value, kind))
+            return {key: word, **forms[word].write(value)}
+
+        def read(document: Json) -> object:
+            word = _text(_object(document)[key])
+            if word not in kinds:
+                known = " or ".join(map(repr, kinds))
+                raise StoreError(f"{key} = {word!r} is not known here, only {known}; update flipflow")
+            return forms[word].read(document)
 
         return Form(write, read)
 
@@ -90,9 +115,22 @@ def exact(value: object) -> Json:
     return _jsonable(value, {math.inf: "inf", -math.inf: "-inf"})
 
 
-def array(values: object, dtype: type = float) -> NDArray[Any]:
-    """The array of a list that :func:`plain` or :func:`exact` wrote; null is NaN."""
+def array(values: object, dtype: type = float, shape: tuple[int, ...] = ()) -> NDArray[Any]:
+    """The array of a list that :func:`plain` or :func:`exact` wrote; null is NaN.
+
+    Raises
+    ------
+    ValueError
+        Where the list does not fill ``shape``, if one is given.
+    """
+    found = _array(values, dtype)
+    return found.reshape(shape) if shape else found
+
+
+def _array(values: object, dtype: type) -> NDArray[Any]:
     if isinstance(values, Mapping):
+        if 0 not in values["shape"]:
+            raise ValueError(f"no array without elements has the shape {values['shape']}")
         return np.zeros(values["shape"], dtype)
     if np.issubdtype(dtype, np.complexfloating):
         pairs = np.asarray(values, dtype=float)
@@ -127,10 +165,47 @@ def _jsonable(value: object, words: Mapping[float, str]) -> Json:
     return value
 
 
+@contextmanager
+def _within(name: str) -> Iterator[None]:
+    """Let what is wrong be told with the name of the field where it stands."""
+    try:
+        yield
+    except (ValueError, TypeError, LookupError, ArithmeticError) as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _typed(what: str, *kinds: type) -> Callable[[Json], Any]:
+    """What passes values of some JSON types; true and false are no numbers."""
+
+    def read(document: Json) -> Any:
+        if type(document) not in kinds:
+            raise TypeError(f"{what} is expected, not {type(document).__name__}")
+        return document
+
+    return read
+
+
+_object = _typed("an object", dict)
+_list = _typed("a list", list)
+_text = _typed("a text", str)
+_truth = _typed("true or false", bool)
+_real = _typed("a number", float, int)
+_count = _typed("a whole number", int)
+
+
 def _number(document: Json) -> float:
     if document is None:
         return math.nan
-    return document if isinstance(document, int) else float(document)
+    if document in ("inf", "-inf"):
+        return float(document)
+    float(_real(document))  # refuses a whole number that is too large
+    return document  # type: ignore[no-any-return]
+
+
+def _whole(document: Json) -> int:
+    if abs(_count(document)) > MOST_WHOLE:
+        raise ValueError("a whole number is too large")
+    return document  # type: ignore[no-any-return]
 
 
 def _arrays(_codec: Codec, parts: tuple[Any, ...]) -> Form:
@@ -142,7 +217,10 @@ def _arrays(_codec: Codec, parts: tuple[Any, ...]) -> Form:
         bare = values.size == 0 and values.ndim > 1
         return {"shape": list(values.shape)} if bare else exact(values)
 
-    return Form(write, lambda document: array(document, dtype))
+    def read(document: Json) -> NDArray[Any]:
+        return array(document if isinstance(document, Mapping) else _list(document), dtype)
+
+    return Form(write, read)
 
 
 def _tuples(codec: Codec, parts: tuple[Any, ...]) -> Form:
@@ -150,12 +228,14 @@ def _tuples(codec: Codec, parts: tuple[Any, ...]) -> Form:
         every = codec.form(parts[0])
         return Form(
             lambda value: [every.write(one) for one in value],
-            lambda document: tuple(map(every.read, document)),
+            lambda document: tuple(map(every.read, _list(document))),
         )
     forms = [codec.form(part) for part in parts]
     return Form(
         lambda value: [form.write(one) for form, one in zip(forms, value, strict=True)],
-        lambda document: tuple(form.read(one) for form, one in zip(forms, document, strict=True)),
+        lambda document: tuple(
+            form.read(one) for form, one in zip(forms, _list(document), strict=True)
+        ),
     )
 
 
@@ -185,13 +265,25 @@ def _unions(codec: Codec, parts: tuple[Any, ...]) -> Form:
         return codec.form(next(fits, kinds[0])).write(value)
 
     def read(document: Json) -> object:
-        if document is None:
+        if document is None and NoneType in parts:
             return None
         keys = set(document) if isinstance(document, Mapping) else set()
-        fits = (kind for kind in kinds if not keys or _holds(kind, keys))
-        return codec.form(next(fits, kinds[0])).read(document)
+        *fits, last = [kind for kind in kinds if not keys or _holds(kind, keys)] or kinds[:1]
+        for kind in fits:
+            with suppress(TypeError, ValueError):
+                return codec.form(kind).read(document)
+        return codec.form(last).read(document)
 
     return Form(write, read)
+
+
+def _words(_codec: Codec, parts: tuple[Any, ...]) -> Form:
+    def read(document: Json) -> object:
+        if document not in parts:
+            raise ValueError(f"{document!r} is none of {', '.join(map(repr, parts))}")
+        return document
+
+    return Form(exact, read)
 
 
 def _holds(kind: Any, keys: set[str]) -> bool:
@@ -204,9 +296,12 @@ def _holds(kind: Any, keys: set[str]) -> bool:
 
 AS_IT_IS = Form(exact, lambda document: document)
 OWN: Mapping[Any, Form] = {
-    **dict.fromkeys((int, str, bool, object, NoneType), AS_IT_IS),
+    **dict.fromkeys((object, Any, NoneType), AS_IT_IS),
+    bool: Form(exact, _truth),
+    int: Form(exact, _whole),
+    str: Form(exact, _text),
     float: Form(exact, _number),
-    Path: Form(str, Path),
+    Path: Form(str, lambda document: Path(_text(document))),
 }
 MAKERS: Mapping[Any, Callable[[Codec, tuple[Any, ...]], Form]] = {
     np.ndarray: _arrays,
@@ -215,5 +310,5 @@ MAKERS: Mapping[Any, Callable[[Codec, tuple[Any, ...]], Form]] = {
     Mapping: _mappings,
     Union: _unions,
     UnionType: _unions,
-    Literal: lambda _codec, _parts: AS_IT_IS,
+    Literal: _words,
 }

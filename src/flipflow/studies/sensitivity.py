@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.errors import IncompleteError, InputError, StoreError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import (
     checked_count,
     checked_generator,
@@ -23,9 +22,7 @@ from flipflow.model.arguments import (
 from flipflow.model.monitor import Monitor
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.vary import Choice, Distribution, Interval, Normal, Variation, Vary, variations
-from flipflow.results.codec import array, plain
-from flipflow.studies.documents import Document, machine_document, screen_from
+from flipflow.model.vary import Distribution, Variation, Vary, variations
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.samples import (
     Columns,
@@ -37,11 +34,6 @@ from flipflow.studies.samples import (
 from flipflow.studies.sobol import LEAST_GROUPS, SobolIndices, saltelli_sample, sobol_indices
 
 Real = NDArray[np.float64]
-KINDS: Mapping[str, type[Interval | Normal | Choice]] = {
-    "Interval": Interval,
-    "Normal": Normal,
-    "Choice": Choice,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,81 +140,6 @@ class OneAtATime:
     def ends(self) -> tuple[tuple[object, object], ...]:
         """Low and high end of each field's range."""
         return tuple(distribution.ends for distribution in self.distributions)
-
-
-ARRAYS = (
-    "first_order", "total", "first_order_confidence", "total_confidence", "mean", "variance",
-    "failed", "nominal", "at_low", "at_high",
-)  # fmt: skip
-
-
-def sensitivity_document(result: Sensitivity) -> Document:
-    """A sensitivity with all it takes to open it again."""
-    return {
-        "version": result.version,
-        "machine": machine_document(result.screen),
-        "quantity": result.quantity,
-        "branch": result.branch,
-        "names": list(result.names),
-        "vary": [distribution_document(one) for one in result.distributions],
-        "omega": plain(result.omega),
-        "interval": isinstance(result.omega, tuple),
-        "n": result.n,
-        **{name: plain(getattr(result, name)) for name in ARRAYS},
-        "notes": list(result.notes),
-    }
-
-
-def sensitivity_from(document: Mapping[str, Any]) -> Sensitivity:
-    """The sensitivity that :func:`sensitivity_document` wrote.
-
-    Raises
-    ------
-    StoreError
-        When the document holds something this version does not know.
-    """
-    arrays = {name: _numbers(document[name]) for name in ARRAYS}
-    omega = document["omega"]
-    return Sensitivity(
-        screen=screen_from(document["machine"]),
-        quantity=document["quantity"],
-        branch=document["branch"],
-        names=tuple(document["names"]),
-        distributions=tuple(distribution_from(one) for one in document["vary"]),
-        omega=(float(omega[0]), float(omega[1])) if document["interval"] else _numbers(omega),
-        n=int(document["n"]),
-        notes=tuple(document["notes"]),
-        version=document["version"],
-        **arrays,
-    )
-
-
-def distribution_document(distribution: Distribution) -> Document:
-    """How a field varies, by name and numbers."""
-    fields = dataclasses.asdict(distribution)  # type: ignore[call-overload]
-    return {"kind": type(distribution).__name__, **plain(fields)}
-
-
-def distribution_from(document: Mapping[str, Any]) -> Distribution:
-    """The distribution of a document.
-
-    Raises
-    ------
-    StoreError
-        For a distribution that this version does not know.
-    """
-    if document["kind"] not in KINDS:
-        raise StoreError(f"the distribution {document['kind']!r} is not known; update flipflow")
-    values = {key: value for key, value in document.items() if key != "kind"}
-    if "values" in values:
-        values["values"] = tuple(values["values"])
-    return KINDS[document["kind"]](**values)
-
-
-def _numbers(values: object) -> Any:
-    """An array, or the number where it is one."""
-    found = array(values)
-    return float(found) if found.ndim == 0 else found
 
 
 N_MOST = 2**20

@@ -1,0 +1,176 @@
+"""Where files are written: whole or not at all, or refused in one sentence.
+
+Nothing here loads numpy, so that the command line refuses a file before it loads anything.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import stat
+import tempfile
+import uuid
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from flipflow.errors import InputError, StoreError
+
+AS_WRITTEN: Any = {"ensure_ascii": False, "allow_nan": False}
+MOST_SHOWN = 300  # characters of a path that a sentence shows
+
+
+def json_text(document: Mapping[str, object]) -> str:
+    """A document as it stands in a file or in the terminal, a line for each of its parts."""
+    # An indentation throughout would take Python's slow encoder, and a line for every number.
+    written = {part: json.dumps(document[part], **AS_WRITTEN) for part in document}
+    lines = (f"{json.dumps(part, **AS_WRITTEN)}: {text}" for part, text in written.items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def write_text(target: str | Path, text: str, field: str = "path") -> None:
+    """Write a text as :func:`write_file` does, in UTF-8."""
+    # Half of a surrogate pair has no UTF-8; JSON reads this escape as what it was.
+    write_file(target, text.encode(errors="backslashreplace"), field)
+
+
+def write_file(
+    target: str | Path, content: bytes, field: str = "path", *, fresh: bool = False
+) -> None:
+    """Write a whole file or nothing.
+
+    The content is written beside the file under a name of its own, which is then changed: a reader
+    sees the old file or the new one. A link is followed, and a file keeps its mode. A device or a
+    pipe is written to as it is.
+
+    Parameters
+    ----------
+    target
+        The file.
+    content
+        All that it will hold.
+    field
+        What a sentence calls the file: an argument or an option.
+    fresh
+        Whether a file that exists is refused.
+
+    Raises
+    ------
+    StoreError
+        When it cannot be written.
+    InputError
+        When it exists and may not.
+    """
+    place = checked_place(target, field)
+    try:
+        if fresh:
+            _put_new(place, content)
+        elif place.exists() and not place.is_file():
+            place.write_bytes(content)
+        else:
+            _put(place, content)
+    except FileExistsError:
+        remedy = "it exists and is not overwritten, choose another name"
+        raise InputError(field, str(target), remedy) from None
+    except OSError as error:
+        raise _refused(field, target, _because(error)) from None
+
+
+def checked_place(target: str | Path, field: str = "path") -> Path:
+    """Where a file stands or will stand, links followed.
+
+    Raises
+    ------
+    StoreError
+        For a folder, a file in a folder that is not there, and what is not the user's to write.
+    """
+    named = Path(target)
+    try:
+        mode = named.stat().st_mode
+    except FileNotFoundError:
+        mode = 0
+    except (OSError, ValueError) as error:
+        raise _refused(field, target, _because(error)) from None
+    if stat.S_ISDIR(mode):
+        raise _refused(field, target, "this is a folder, name a file in it")
+    if mode and not stat.S_ISREG(mode):
+        return named
+    place = Path(os.path.realpath(named))
+    if not place.parent.is_dir():
+        where = str(named.parent)
+        raise _refused(field, target, f"there is no folder {where!r}, make it or name another")
+    if not all(os.access(one, os.W_OK) for one in ([place] if mode else []) + [place.parent]):
+        raise _refused(field, target, "it may not be written, name a file in a folder you own")
+    return place
+
+
+def prepare_folder(folder: Path, field: str) -> None:
+    """Make an output folder and see that it can be written, before anything is computed.
+
+    Raises
+    ------
+    StoreError
+        When it cannot.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (FileExistsError, NotADirectoryError):
+        why = "it cannot be written (a file is in its way), name a folder you own"
+        raise _refused(field, folder, why) from None
+    except (OSError, ValueError) as error:
+        raise _refused(field, folder, _because(error, "a folder")) from None
+
+
+def refuse_input(target: str | Path, inputs: Iterable[str], field: str) -> None:
+    """See that a file to write is none of those that are read, by whatever name.
+
+    Raises
+    ------
+    InputError
+        When it is.
+    """
+    for one in inputs:
+        with contextlib.suppress(OSError, ValueError):
+            if os.path.samefile(target, one):
+                remedy = "this is the file that is read, name another to write"
+                raise InputError(field, str(target), remedy)
+
+
+def _put(place: Path, content: bytes) -> None:
+    """Write beside a file, then take its place."""
+    part = place.with_name(f".{uuid.uuid4().hex}.part")
+    try:
+        with part.open("xb") as file:
+            file.write(content)
+            file.flush()
+            if place.exists():
+                part.chmod(stat.S_IMODE(place.stat().st_mode))
+            os.fsync(file.fileno())
+        part.replace(place)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _put_new(place: Path, content: bytes) -> None:
+    """Write a file that is not there yet; its name is taken first, from other processes too."""
+    place.touch(exist_ok=False)
+    try:
+        _put(place, content)
+    except BaseException:
+        place.unlink()
+        raise
+
+
+def _because(error: OSError | ValueError, what: str = "a file in a folder") -> str:
+    """Why writing ended, and what to do."""
+    reason = error.strerror if isinstance(error, OSError) else str(error)
+    return f"it cannot be written ({reason}), name {what} you own"
+
+
+def _refused(field: str, target: str | Path, why: str) -> StoreError:
+    shown = repr(str(target))
+    shown = shown if len(shown) <= MOST_SHOWN else f"{shown[: MOST_SHOWN - 3]}..."
+    return StoreError(f"{field} = {shown}: {why}.")
