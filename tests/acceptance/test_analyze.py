@@ -101,7 +101,7 @@ def test_bad_ranges_and_orders(monkeypatch, capsys, tmp_path, options, words):
 
 def test_output_folder_that_cannot_be_written(monkeypatch, capsys, tmp_path):
     (tmp_path / "file").write_text("in the way")
-    assert run(monkeypatch, "analyze", "ffs0827", "-o", tmp_path / "file" / "out") == 2
+    assert run(monkeypatch, "analyze", "ffs0827", "-o", tmp_path / "file" / "out") == 4
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1
     assert "--output" in captured.err

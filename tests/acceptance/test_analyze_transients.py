@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.io.assessment import assessment_document
+from flipflow.io.results import document_of
 from flipflow.report.blocks import FigureBlock, Heading, Text
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess
@@ -38,7 +38,7 @@ def words(assessment):
 def test_numbers_are_those_of_the_analyses(project, assessment):
     start = ff.start_up(project.screen, project.drive, speed=project.speed)
     coast = ff.coast_down(project.screen, start.final_speed, start.drive)
-    document = assessment_document(assessment)["transients"]
+    document = document_of(assessment)["transients"]
     assert document["drive_assumed"] is (project.drive is None)
     for name, run in (("start", start), ("coast_down", coast)):
         assert document[name]["outcome"] == run.outcome
@@ -87,14 +87,14 @@ def test_a_machine_that_is_captured_has_no_coast_down(project):
     assert "does not pass the first natural frequency" in said["Start (empty):"]
     reason = "the start does not reach the working speed"
     assert said["Coast-down (empty):"] == f"not checked: {reason}."
-    document = assessment_document(weak)["transients"]
+    document = document_of(weak)["transients"]
     assert document["coast_down"] is None
     assert document["reasons"] == {"coast_down": reason}
 
 
 def test_least_blow_and_lump_of_a_bistable_machine(rig):
     risk = ff.jump_risk(rig.project.screen, rig.project.speed)
-    found = assessment_document(rig)["transients"]["jump_risk"]
+    found = document_of(rig)["transients"]["jump_risk"]
     assert found["other_motions"] == len(risk.others) > 0
     assert found["impulse"]["impulse"] == risk.worst_impulse.impulse
     assert found["lump"] is None or found["lump"]["lump"] == risk.worst_lump.lump
@@ -104,7 +104,7 @@ def test_least_blow_and_lump_of_a_bistable_machine(rig):
 def test_without_a_working_speed_nothing_is_checked(project):
     given = assess(dataclasses.replace(project, speed=None), omega=(85.0, 90.0))
     assert given.transients is None
-    assert assessment_document(given)["transients"] is None
+    assert document_of(given)["transients"] is None
     said = words(given)["Start, stop and disturbances:"]
     assert said == "not checked, for the machine file gives no working speed."
 

@@ -79,7 +79,7 @@ def test_a_bad_json_file_is_refused_before_the_work(
     monkeypatch.setattr("os.access", lambda path, _mode: path.name != "locked")
     at_work(lambda: pytest.fail("the work was begun"))
     code, out, err = command(name, *QUICK.get(name, ("ffs0827",)), "--json", target)
-    assert (code, out) == (2, "")
+    assert (code, out) == (4, "")
     assert err.startswith("Error: --json = ")
     assert word in err
     assert err.count("\n") == 1
@@ -91,10 +91,46 @@ def test_a_bad_folder_is_refused_before_the_work(command, at_work, tmp_path, nam
     (tmp_path / "file").write_text("kept")
     at_work(lambda: pytest.fail("the work was begun"))
     code, out, err = command(name, *QUICK[name], "-o", target)
-    assert (code, out) == (2, "")
+    assert (code, out) == (4, "")
     assert err.startswith("Error: --output = ")
     assert err.count("\n") == 1
     assert (tmp_path / "file").read_text() == "kept"
+
+
+@pytest.mark.parametrize("written", ["own.toml", "link.json", "folder/../own.toml"])
+@pytest.mark.parametrize("name", [*QUICK, "check"])
+def test_the_file_that_is_read_is_not_written_to(command, at_work, tmp_path, name, written):
+    command("new", "own.toml")
+    before = (tmp_path / "own.toml").read_bytes()
+    (tmp_path / "link.json").symlink_to("own.toml")
+    (tmp_path / "folder").mkdir()
+    at_work(lambda: pytest.fail("the work was begun"))
+    words = ("3", "--machine", "own.toml") if name == "reproduce" else ("own.toml",)
+    code, out, err = command(name, *words, *QUICK.get(name, ("",))[1:], "--json", written)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"Error: --json = {written!r}: this is the file that is read")
+    assert (tmp_path / "own.toml").read_bytes() == before
+
+
+def test_a_link_in_the_folder_to_the_file_that_is_read_is_not_followed(command, tmp_path):
+    command("new", "own.toml")
+    before = (tmp_path / "own.toml").read_bytes()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "motion.html").symlink_to("../own.toml")
+    code, _, err = command("simulate", "own.toml", "--periods", "2", "-o", "out")
+    assert code == 2
+    assert "this is the file that is read" in err
+    assert (tmp_path / "own.toml").read_bytes() == before
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="needs a device that is full")
+def test_a_document_for_a_full_disk_is_said(command):
+    code, _, err = command("simulate", *QUICK["simulate"], "--json", str(FULL))
+    assert code == 4
+    assert err == (
+        "Error: --json = '/dev/full': it cannot be written (No space left on device), name a file "
+        "in a folder you own.\n"
+    )
 
 
 @pytest.mark.parametrize("name", FILES)

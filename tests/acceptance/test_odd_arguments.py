@@ -235,8 +235,10 @@ def test_following_tells_how_far_it_is_and_can_be_cancelled(name):
 
 
 def test_paths_of_files(tmp_path):
-    for path in (5, None, "a\0b.json", b"x.json"):
+    for path in (5, None, b"x.json"):
         with pytest.raises(ff.InputError, match="path"):
             ff.save(orbit(), path)
+    with pytest.raises(errors.StoreError, match="path"):
+        ff.save(orbit(), "a\0b.json")
     ff.save(result=orbit(), path=Path(tmp_path / "x.json"))
     assert ff.open_result(path=str(tmp_path / "x.json")).omega == orbit().omega

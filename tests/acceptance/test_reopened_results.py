@@ -19,7 +19,7 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError, StoreError
-from flipflow.io.assessment import assessment_document
+from flipflow.io.read_off import read_off
 from flipflow.paper.claims import Claim
 from flipflow.paper.reproduce import Reproduction
 from flipflow.periodic.orbit import Orbit
@@ -255,7 +255,7 @@ def test_an_infinite_lump_is_not_a_plain_impulse(tmp_path):
         ("hello", "cannot be read"),
         ("[1, 2]", "is not a result of flipflow"),
         ('{"schema": "flipflow/branch/99"}', r"flipflow/branch/99.*update flipflow"),
-        ('{"schema": "flipflow/sweeps/1", "up": {}}', "flipflow/sweeps/1"),
+        ('{"schema": "flipflow/sweeps/1", "up": {}}', "is damaged: name is missing"),
         ('{"schema": 3}', "is not a result of flipflow"),
         ('{"schema": "flipflow/branch/1"}', "is damaged"),
         ('{"schema": "flipflow/branch/1", "machine": [], "method": 3}', "is damaged"),
@@ -276,7 +276,7 @@ def test_a_summary_of_the_command_line_says_what_opens_again(tmp_path):
         dataclasses.replace(ff.load_project("ffs0827"), speed=None), omega=(85.0, 90.0)
     )
     for name, document in (
-        ("assessment", assessment_document(assessment)),
+        ("assessment", {"schema": "flipflow/assessment/1", **read_off(assessment)}),
         ("claims", ff.reproduce(figures=("1",)).document()),
     ):
         (tmp_path / f"{name}.json").write_text(json.dumps(document))

@@ -79,10 +79,12 @@ def test_new_writes_a_file_that_checks_and_never_overwrites(run, tmp_path):
     assert (tmp_path / "a.toml").read_bytes() == before
 
 
-@pytest.mark.parametrize(("name", "word"), [("a.txt", ".toml"), ("no/folder.toml", "written")])
-def test_new_refuses(run, name, word):
-    code, _, err = run("new", name)
-    assert code == 2
+@pytest.mark.parametrize(
+    ("name", "code", "word"), [("a.txt", 2, ".toml"), ("no/folder.toml", 4, "written")]
+)
+def test_new_refuses(run, name, code, word):
+    found, _, err = run("new", name)
+    assert found == code
     assert word in err
     assert "Traceback" not in err
 

@@ -18,6 +18,7 @@ from flipflow.errors import InputError
 from flipflow.io.check import check_project
 from flipflow.io.derived import derive
 from flipflow.io.layout import SECTIONS
+from flipflow.io.results import document_of
 from flipflow.io.schema import machine_schema
 from flipflow.io.source import bundled_names
 from flipflow.io.template import template
@@ -306,6 +307,6 @@ def test_limits_table_and_class_agree():
 
 
 def test_check_document_is_plain_data():
-    document = check_project(ff.load_project("ffs0827")).document()
+    document = document_of(check_project(ff.load_project("ffs0827")))
     assert document["schema"] == "flipflow/check/1"
     assert json.loads(json.dumps(document))["speeds"][0]["name"] == "w01"

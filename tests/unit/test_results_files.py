@@ -95,6 +95,6 @@ def test_load_cases_with_foreign_letters_are_written(tmp_path):
 def test_a_file_that_cannot_be_put_in_place_leaves_nothing_behind(tmp_path):
     (tmp_path / "taken.json").mkdir()
     branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 151.0))
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(StoreError, match="cannot be written"):
         ff.save(branch, tmp_path / "taken.json")
     assert [path.name for path in tmp_path.iterdir()] == ["taken.json"]

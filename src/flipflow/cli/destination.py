@@ -51,9 +51,7 @@ class Destination:
         Files that the command reads: they are not written to.
     """
 
-    def __init__(
-        self, folder: Path | None, json: str | None, reads: Iterable[str] = ()
-    ) -> None:
+    def __init__(self, folder: Path | None, json: str | None, reads: Iterable[str] = ()) -> None:
         if folder is not None:
             prepare_folder(folder, OUTPUT)
         self.folder, self.json, self._reads = folder, json, tuple(reads)

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import math
-import os
 import shutil
-import sys
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
-
-from flipflow.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from flipflow.studies.ramp import LateJump
 from flipflow.transient.startup import RunUp

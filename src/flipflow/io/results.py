@@ -130,11 +130,13 @@ def open_result(path: str | os.PathLike[str]) -> Any:
     if not isinstance(schema, str) or not schema.startswith("flipflow/"):
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
-        return opener(schema)(document)
+        result = opener(schema)(document)
+        repr(result)  # a result without numbers, where it should have some, cannot be told
     except StoreError as error:
         raise StoreError(f"{path}: {error}") from None
     except DAMAGE as error:
         raise StoreError(f"{path} is damaged: {_shown(error)}") from None
+    return result
 
 
 def _shown(error: Exception) -> str:
@@ -189,11 +191,13 @@ def opener(schema: str) -> Callable[[Document], object]:
         importlib.import_module(ABOVE[schema])
     if schema == ORBITS:
         return lambda document: CODEC.form(tuple[Orbit, ...]).read(document["orbits"])
-    for kind, known in SCHEMAS.items():
-        if schema == known:
-            read = CODEC.form(kind).read
-            return (lambda document: read(_whole(document))) if kind in SUMMARISED else read
-    raise StoreError(f"{schema!r} is no result that opens again; update flipflow if it is newer")
+    kinds = {known: kind for kind, known in SCHEMAS.items()}
+    if schema not in kinds:
+        told = f"{schema!r} is no result that opens again; update flipflow if it is newer"
+        raise StoreError(told)
+    kind = kinds[schema]
+    read = CODEC.form(kind).read
+    return (lambda document: read(_whole(document))) if kind in SUMMARISED else read
 
 
 def _whole(document: Document) -> Document:

@@ -75,6 +75,17 @@ class Reproduction:
         found = Counter(claim.evaluation.verdict for claim in self.claims)
         return {str(verdict): found[verdict] for verdict in Verdict}
 
+    def document(self) -> dict[str, Any]:
+        """The claims as JSON types; :func:`flipflow.save` writes this and what opens again."""
+        return {
+            "schema": SCHEMA,
+            "version": __version__,
+            "paper": PAPER,
+            "machine": machine_document(self.screen),
+            "claims": [claim.document() for claim in self.claims],
+            "counts": self.counts,
+        }
+
 
 def reproduce(
     screen: FlipFlowScreen | None = None,
@@ -142,18 +153,7 @@ def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
     return DecidedClaim(known[name], figure, evaluation)
 
 
-def _summary(reproduction: Reproduction) -> dict[str, Any]:
-    """The claims with their verdicts, for other readers."""
-    return {
-        "version": __version__,
-        "paper": PAPER,
-        "machine": machine_document(reproduction.screen),
-        "claims": [claim.document() for claim in reproduction.claims],
-        "counts": reproduction.counts,
-    }
-
-
 CODEC.learn({DecidedClaim: Form(DecidedClaim.document, _claim_from)})
 SCHEMAS[Reproduction] = SCHEMA
 SUMMARISED.add(Reproduction)
-read_off.register(Reproduction, _summary)
+read_off.register(Reproduction, Reproduction.document)

@@ -43,8 +43,9 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
     StoreError
         When the file cannot be written.
     """
-    write_text(path, html(assessment))
-    return Path(path)
+    target = Path(path)
+    write_text(target, html(assessment))
+    return target
 
 
 def html(assessment: Assessment) -> str:

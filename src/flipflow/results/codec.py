@@ -99,7 +99,7 @@ class Codec:
             word = _text(_object(document)[key])
             if word not in kinds:
                 known = " or ".join(map(repr, kinds))
-                raise StoreError(f"{key} = {word!r} is not known here, only {known}; update flipflow")
+                raise StoreError(f"{key} = {word!r} is not known, only {known}; update flipflow")
             return forms[word].read(document)
 
         return Form(write, read)

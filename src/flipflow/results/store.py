@@ -5,7 +5,6 @@ Nothing here loads numpy, so that the command line refuses a file before it load
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import stat
@@ -93,13 +92,13 @@ def checked_place(target: str | Path, field: str = "path") -> Path:
     except (OSError, ValueError) as error:
         raise _refused(field, target, _because(error)) from None
     if stat.S_ISDIR(mode):
-        raise _refused(field, target, "this is a folder, name a file in it")
+        raise _refused(field, target, "it cannot be written (this is a folder), name a file in it")
     if mode and not stat.S_ISREG(mode):
         return named
     place = Path(os.path.realpath(named))
     if not place.parent.is_dir():
-        where = str(named.parent)
-        raise _refused(field, target, f"there is no folder {where!r}, make it or name another")
+        why = f"it cannot be written (there is no folder {str(named.parent)!r})"
+        raise _refused(field, target, f"{why}, make it or name another")
     if not all(os.access(one, os.W_OK) for one in ([place] if mode else []) + [place.parent]):
         raise _refused(field, target, "it may not be written, name a file in a folder you own")
     return place
@@ -132,11 +131,17 @@ def refuse_input(target: str | Path, inputs: Iterable[str], field: str) -> None:
     InputError
         When it is.
     """
-    for one in inputs:
-        with contextlib.suppress(OSError, ValueError):
-            if os.path.samefile(target, one):
-                remedy = "this is the file that is read, name another to write"
-                raise InputError(field, str(target), remedy)
+    if any(_same(target, one) for one in inputs):
+        remedy = "this is the file that is read, name another to write"
+        raise InputError(field, str(target), remedy)
+
+
+def _same(target: str | Path, other: str) -> bool:
+    """Whether both are names of one file that exists."""
+    try:
+        return Path(target).samefile(other)
+    except (OSError, ValueError):
+        return False
 
 
 def _put(place: Path, content: bytes) -> None:
