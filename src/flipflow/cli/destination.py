@@ -18,7 +18,7 @@ from flipflow.results.store import (
     json_text,
     prepare_folder,
     refuse_input,
-    write_text,
+    write_file,
 )
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Destination:
 
     def data(self, name: str, document: Mapping[str, object]) -> None:
         """Write a JSON document into the folder."""
-        write_text(self.path(name), json_text(document), OUTPUT)
+        write_file(self.path(name), json_text(document), OUTPUT)
         self.wrote(name)
 
     def document(self, document: Mapping[str, object]) -> None:
@@ -96,7 +96,7 @@ class Destination:
         if self.json == TERMINAL:
             sys.stdout.write(text)
         else:
-            write_text(self.json, text, JSON)
+            write_file(self.json, text, JSON)
             self._places.append(self.json)
 
     def path(self, name: str) -> Path:

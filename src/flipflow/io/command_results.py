@@ -11,17 +11,7 @@ from flipflow.transient.sweep import Sweep
 
 @dataclass(frozen=True, eq=False)
 class Startup:
-    """What ``flipflow startup`` finds.
-
-    Parameters
-    ----------
-    name
-        Of the machine.
-    start
-        The machine's start.
-    coast_down
-        Its coast-down; None where working speed was not reached.
-    """
+    """A machine's start, and its coast-down where working speed was reached."""
 
     name: str
     start: RunUp
@@ -30,17 +20,7 @@ class Startup:
 
 @dataclass(frozen=True)
 class Glide:
-    """A sweep that did not wait, without its motion.
-
-    Parameters
-    ----------
-    rate
-        In rad/s^2, negative where the speed falls.
-    to
-        Where it ended, rad/s.
-    complete
-        Whether that is where it should.
-    """
+    """A sweep that did not wait, without its motion: rate in rad/s^2, last speed in rad/s."""
 
     rate: float
     to: float
@@ -49,18 +29,9 @@ class Glide:
 
 @dataclass(frozen=True, eq=False)
 class Sweeps:
-    """What ``flipflow sweep`` finds.
+    """Sweeps with the speed rising, then falling; how late glides jump, and how far they came.
 
-    Parameters
-    ----------
-    name
-        Of the machine.
-    up, down
-        With the speed rising, then falling; None where Ctrl-C came before.
-    late, glides
-        Where glides jump, and how far they came.
-    complete
-        Whether all of it was done.
+    What Ctrl-C ended has no ``down``, or is not ``complete``.
     """
 
     name: str

@@ -9,16 +9,18 @@ import dataclasses
 from functools import singledispatch
 from typing import Any
 
-from flipflow.model.drive import SpeedProfile
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.codec import exact, plain
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.documents import CODEC
 from flipflow.studies.jump_risk import JumpRisk, Throw
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.start_and_blows import Transients
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
+
+RUN = ("version", "energy", "status", "method", "counters")
 
 
 @singledispatch
@@ -68,35 +70,10 @@ def basins_numbers(basins: Basins) -> dict[str, Any]:
 
 
 @read_off.register
-def run_up_summary(run: RunUp) -> dict[str, Any]:
-    """Verdict, peaks, power and drive, SI."""
-    history = run.history
-    summary = {
-        "version": history.version,
-        "verdict": run.verdict,
-        "outcome": run.outcome,
-        "speed": run.speed,
-        "final_speed": run.final_speed,
-        "near": None if run.near is None else run.near._asdict(),
-        "first_frequency": run.first_frequency,
-        "time_to_speed": run.time_to_speed,
-        "passing": run.passing,
-        "peaks": {name: dataclasses.asdict(peak) for name, peak in run.peaks.items()},
-        "power": run.power,
-        "energy": history.energy,
-        "drive": _drive(run),
-        "notes": run.notes,
-        "status": history.status,
-        "method": history.method,
-        "counters": history.counters,
-    }
-    return {name: plain(value) for name, value in summary.items()}
-
-
-def _drive(run: RunUp) -> dict[str, Any]:
-    if isinstance(run.drive, SpeedProfile):
-        return {"times": run.drive.times, "speeds": run.drive.speeds}
-    return dataclasses.asdict(run.drive)
+def run_up_numbers(run: RunUp) -> dict[str, Any]:
+    """Verdict, time, energy, and how it was computed."""
+    told = {name: plain(getattr(run.history, name)) for name in RUN}
+    return {"verdict": run.verdict, "time_to_speed": plain(run.time_to_speed), **told}
 
 
 @read_off.register
@@ -179,10 +156,16 @@ def _transients(found: Transients | None) -> dict[str, Any] | None:
     runs = {"start": found.start, "coast_down": found.coast_down}
     return {
         "drive_assumed": found.assumed,
-        **{name: None if run is None else run_up_summary(run) for name, run in runs.items()},
+        **{name: None if run is None else _run_summary(run) for name, run in runs.items()},
         "jump_risk": None if found.jump is None else risk_summary(found.jump),
         "reasons": dict(found.reasons),
     }
+
+
+def _run_summary(run: RunUp) -> dict[str, Any]:
+    """A start or a coast-down without its motion."""
+    whole = CODEC.form(RunUp).write(run) | run_up_numbers(run)
+    return {name: value for name, value in whole.items() if name not in ("machine", "history")}
 
 
 def _tornado_document(result: OneAtATime) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from flipflow.io.read_off import read_off
 from flipflow.io.response import branch_csv, branch_netcdf
 from flipflow.model.arguments import checked_path
 from flipflow.periodic.orbit import Orbit
-from flipflow.results.store import json_text, write_file, write_text
+from flipflow.results.store import json_text, write_file
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.documents import CODEC
@@ -92,7 +92,7 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     """
     target = checked_path("path", path)
     if target.suffix == ".json":
-        write_text(target, json_text(document_of(result)))
+        write_file(target, json_text(document_of(result)))
     elif target.suffix in TABLES and isinstance(result, Branch):
         write_file(target, TABLES[target.suffix](result))
     else:

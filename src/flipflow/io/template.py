@@ -60,7 +60,7 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix != ".toml":
         raise InputError("file", str(target), "let the name end in .toml")
-    write_file(target, template().encode(), "file", fresh=True)
+    write_file(target, template(), "file", fresh=True)
     return target
 
 

@@ -24,7 +24,7 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.html import page
 from flipflow.report.numbers import NOTHING, number
-from flipflow.results.store import write_text
+from flipflow.results.store import write_file
 
 TITLE = "The paper, reproduced"
 PAGE = "reproduction.html"
@@ -83,7 +83,7 @@ def write_reproduction(
         tuple(blocks(found)), title=TITLE, kind="figures and claims",
         footer=f"flipflow {__version__}: {PAPER}",
     )  # fmt: skip
-    write_text(folder / PAGE, text)
+    write_file(folder / PAGE, text)
     return (PAGE, *names)
 
 

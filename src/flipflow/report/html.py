@@ -12,7 +12,7 @@ from flipflow.errors import MissingExtra
 from flipflow.plotting.plotly import START, element, library
 from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
-from flipflow.results.store import write_text
+from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
         When the file cannot be written.
     """
     target = Path(path)
-    write_text(target, html(assessment))
+    write_file(target, html(assessment))
     return target
 
 

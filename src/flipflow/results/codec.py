@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
+from operator import attrgetter
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -71,21 +72,35 @@ class Codec:
         """
         hints, fields = get_type_hints(kind), fields_of(kind)
 
-        def write(value: object) -> Json:
-            return {name: self.form(hints[name]).write(getattr(value, name)) for name in fields}
-
         def read(document: Json) -> object:
-            present = _object(document)
-            missing = [name for name, needed in fields.items() if needed and name not in present]
-            if missing:
-                raise ValueError(f"{missing[0]} is missing")
-            read = {}
-            for name in (name for name in fields if name in present):
-                with _within(name):
-                    read[name] = self.form(hints[name]).read(present[name])
-            return kind(**read)
+            given = _object(document)
+            present = {name: hints[name] for name, must in fields.items() if must or name in given}
+            return kind(**self._read(present, given))
+
+        return Form(self.table({name: hints[name] for name in fields}).write, read)
+
+    def table(self, kinds: Mapping[str, Any], **paths: str) -> Form:
+        """Parts of an object by name, each of a type; read, they are a dictionary.
+
+        ``paths`` tells where a part stands that is no attribute of that name, as "traced.u".
+        """
+        parts = {name: attrgetter(paths.get(name, name)) for name in kinds}
+
+        def write(value: object) -> Json:
+            return {name: self.form(kinds[name]).write(part(value)) for name, part in parts.items()}
+
+        def read(document: Json) -> dict[str, Any]:
+            return self._read(kinds, _object(document))
 
         return Form(write, read)
+
+    def _read(self, kinds: Mapping[str, Any], document: Mapping[str, Json]) -> dict[str, Any]:
+        """Named parts of a document, each by the form of its type."""
+        found = {}
+        for name, kind in kinds.items():
+            with _within(name):
+                found[name] = self.form(kind).read(document[name])
+        return found
 
     def tagged(self, key: str, kinds: Mapping[str, Any]) -> Form:
         """One of several types by its fields, told apart by a word that stands under ``key``."""
@@ -115,19 +130,8 @@ def exact(value: object) -> Json:
     return _jsonable(value, {math.inf: "inf", -math.inf: "-inf"})
 
 
-def array(values: object, dtype: type = float, shape: tuple[int, ...] = ()) -> NDArray[Any]:
-    """The array of a list that :func:`plain` or :func:`exact` wrote; null is NaN.
-
-    Raises
-    ------
-    ValueError
-        Where the list does not fill ``shape``, if one is given.
-    """
-    found = _array(values, dtype)
-    return found.reshape(shape) if shape else found
-
-
-def _array(values: object, dtype: type) -> NDArray[Any]:
+def array(values: Json, dtype: type = float) -> NDArray[Any]:
+    """The array of a list that :func:`plain` or :func:`exact` wrote; null is NaN."""
     if isinstance(values, Mapping):
         if 0 not in values["shape"]:
             raise ValueError(f"no array without elements has the shape {values['shape']}")
@@ -170,6 +174,8 @@ def _within(name: str) -> Iterator[None]:
     """Let what is wrong be told with the name of the field where it stands."""
     try:
         yield
+    except KeyError as error:
+        raise ValueError(f"{error.args[0]} is missing") from None
     except (ValueError, TypeError, LookupError, ArithmeticError) as error:
         raise ValueError(f"{name}: {error}") from None
 

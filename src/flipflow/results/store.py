@@ -28,31 +28,14 @@ def json_text(document: Mapping[str, object]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def write_text(target: str | Path, text: str, field: str = "path") -> None:
-    """Write a text as :func:`write_file` does, in UTF-8."""
-    # Half of a surrogate pair has no UTF-8; JSON reads this escape as what it was.
-    write_file(target, text.encode(errors="backslashreplace"), field)
-
-
 def write_file(
-    target: str | Path, content: bytes, field: str = "path", *, fresh: bool = False
+    target: str | Path, content: bytes | str, field: str = "path", *, fresh: bool = False
 ) -> None:
-    """Write a whole file or nothing.
+    """Write a whole file or nothing, text in UTF-8; where ``fresh`` one that exists is refused.
 
     The content is written beside the file under a name of its own, which is then changed: a reader
     sees the old file or the new one. A link is followed, and a file keeps its mode. A device or a
-    pipe is written to as it is.
-
-    Parameters
-    ----------
-    target
-        The file.
-    content
-        All that it will hold.
-    field
-        What a sentence calls the file: an argument or an option.
-    fresh
-        Whether a file that exists is refused.
+    pipe is written to as it is. ``field`` is the argument or option that a sentence names.
 
     Raises
     ------
@@ -61,6 +44,9 @@ def write_file(
     InputError
         When it exists and may not.
     """
+    if isinstance(content, str):
+        # Half of a surrogate pair has no UTF-8; JSON reads this escape as what it was.
+        content = content.encode(errors="backslashreplace")
     place = checked_place(target, field)
     try:
         if fresh:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.continuation import arclength
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -23,12 +24,11 @@ from flipflow.continuation.field_path import FieldPoint
 from flipflow.continuation.frequency_response import formulation_of, method_of
 from flipflow.model.arguments import (
     checked_count,
-    checked_flag,
     checked_numbers,
     checked_speed,
     checked_speeds,
-    checked_word,
 )
+from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -41,18 +41,53 @@ from flipflow.periodic.options import (
 )
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Solver, Traced
-from flipflow.periodic.stability import STABLE, UNDETERMINED, UNSTABLE
-from flipflow.results.codec import Codec, Form, array, exact, plain
+from flipflow.results.codec import Codec, Form, array, plain
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.transient.settle import Settled
 from flipflow.transient.sweep import Jump, Sweep
 
 Document = Mapping[str, Any]
 P = TypeVar("P", bound=Point)
+Word = Literal["stable", "unstable", "undetermined"]
 MOST_TURNS = 10_000  # forcing periods after which a motion of a file may repeat
-PLACE = ("kind", "position", "spring", "side")
-RECORDED = ("tangent", "side", "signature", "iterations")
 CODEC = Codec()
+
+# Parts that are read again, by name and type, and where they stand in a result.
+SPRING = CODEC.table(
+    {
+        "direction": Real, "stiffness": float, "damping": float, "gaps": tuple[float, float],
+        "law": ContactLaw,
+    }
+)  # fmt: skip
+FORMULATION = {"half_turn": bool, "turns": int}
+FORMULATION_AT = {name: f"formulation.{name}" for name in FORMULATION}
+POINT = CODEC.table(
+    {"omega": float, **FORMULATION, "unknowns": Real, "return_map": Real},
+    unknowns="u", **FORMULATION_AT,
+)  # fmt: skip
+PLACE = CODEC.table({"kind": str, "position": float, "spring": int, "side": int})
+WORD = CODEC.table({"stability": Word})
+ENDED = {"version": str, "status": BranchStatus, "notes": tuple[str, ...]}
+FOLLOWED = {**ENDED, "omega": Real, "stability": tuple[Word, ...], "multipliers": Complex}
+RECORDED = {"tangent": Real, "side": Real, "signature": Int, "iterations": Int}
+TRIED = {"rejected": Int, "reason": Int}
+BRANCH = CODEC.table(
+    {
+        "machine": Machine, "method": Method, **FOLLOWED, **FORMULATION,
+        "saddle_side_at_start": bool, "return_maps": Real, "unknowns": Real, **RECORDED, **TRIED,
+        "code": int, "course": tuple[float, ...],
+    },
+    **FORMULATION_AT, unknowns="traced.u", code="traced.code", course="traced.course",
+    **{name: f"traced.record.{name}" for name in RECORDED},
+    **{name: f"traced.{name}" for name in TRIED},
+)  # fmt: skip
+FIELD_BRANCH = CODEC.table({"machine": FlipFlowScreen, **FOLLOWED, "field": str, "values": Real})
+SWEEP = CODEC.table(
+    {
+        "machine": Machine, "version": str, "omega": Real, "settled": NDArray[np.bool_],
+        "turns": Int, "jumps": tuple[Jump, ...], "max_periods": int, "most_turns": int,
+    }
+)  # fmt: skip
 
 
 def machine_document(machine: Machine) -> dict[str, Any]:
@@ -62,42 +97,24 @@ def machine_document(machine: Machine) -> dict[str, Any]:
     return written
 
 
-def spring_document(spring: ClearanceSpring) -> dict[str, Any]:
-    """A spring with both gaps."""
-    fields = {name: plain(getattr(spring, name)) for name in ("direction", "stiffness", "damping")}
-    return {**fields, "gaps": exact(spring.gaps), "law": spring.law}
-
-
 def spring_from(document: Document) -> ClearanceSpring:
     """The spring of a document."""
-    fields = {name: document[name] for name in ("direction", "stiffness", "damping", "law")}
-    plus, minus = map(float, document["gaps"])
-    return ClearanceSpring(clearance=plus, clearance_minus=minus, **fields)
+    read = SPRING.read(document)
+    clearance, minus = read.pop("gaps")
+    return ClearanceSpring(clearance=clearance, clearance_minus=minus, **read)
 
 
 class Motions:
-    """Reads the motions of one machine by one method; equations are set up once.
-
-    Parameters
-    ----------
-    machine, method
-        What moves, and how its motions were found.
-    """
+    """Reads the motions of one machine by one method; equations are set up once."""
 
     def __init__(self, machine: Machine, method: Method) -> None:
         self.machine, self.method, self.system = machine, method, machine.system()
+        self.states = 2 * self.system.size
         self._solvers: dict[tuple[bool, int], Solver] = {}
 
-    @classmethod
-    def of(cls, document: Document) -> Self:
-        """Of the machine and the method of a document; the exact one where it names none."""
-        method = METHODS.read(document["method"]) if "method" in document else PiecewiseExact()
-        return cls(MACHINES.read(document["machine"]), method)
-
-    def solver(self, document: Document) -> Solver:
-        """A solver of what the motion of a document was solved for."""
-        half_turn = checked_flag("half_turn", document["half_turn"])
-        turns = checked_count("turns", document["turns"], MOST_TURNS)
+    def solver(self, half_turn: bool, turns: int) -> Solver:
+        """A solver of such motions."""
+        checked_count("turns", turns, MOST_TURNS)
         if (half_turn, turns) not in self._solvers:
             found = formulation_of(self.system, self.method, half_turn=half_turn, turns=turns)
             self._solvers[half_turn, turns] = found.solver()
@@ -105,31 +122,17 @@ class Motions:
 
     def point(self, document: Document, kind: type[P], **more: Any) -> P:
         """A motion as its solver left it."""
-        solver, states = self.solver(document), 2 * self.system.size
-        u = array(document["unknowns"], float, (solver.unknowns,))
-        return kind(
-            solver.formulation,
-            checked_numbers("unknowns", u, "give finite numbers"),
-            checked_speed(document["omega"]),
-            known_map=array(document["return_map"], float, (states, states)),
-            **more,
-        )
+        read = POINT.read(document)
+        solver = self.solver(read["half_turn"], read["turns"])
+        u, known = read["unknowns"], read["return_map"].reshape(self.states, self.states)
+        checked_numbers("unknowns", u, "give finite numbers")
+        omega = checked_speed(read["omega"])
+        return kind(solver.formulation, u.reshape(solver.unknowns), omega, known_map=known, **more)
 
     def orbit(self, document: Document, kind: type[P], **more: Any) -> Orbit:
         """A motion and its stability."""
-        word = checked_word("stability", document["stability"], WORDS)
+        word = WORD.read(document)["stability"]
         return Orbit(self.machine, self.point(document, kind, **more), word)
-
-
-def point_document(point: Point) -> dict[str, Any]:
-    """A motion as its solver left it."""
-    return {
-        "omega": point.omega,
-        "half_turn": point.formulation.half_turn,
-        "turns": point.formulation.turns,
-        "unknowns": plain(point.u),
-        "return_map": plain(point.return_map),
-    }
 
 
 def orbit_document(orbit: Orbit) -> dict[str, Any]:
@@ -138,139 +141,105 @@ def orbit_document(orbit: Orbit) -> dict[str, Any]:
         "machine": machine_document(orbit.machine),
         "method": METHODS.write(method_of(orbit.point.formulation)),
         "periods": orbit.periods,
-        "stability": orbit.stability,
         "amplitude": _named(orbit.system, orbit.amplitude),
-        **point_document(orbit.point),
+        **WORD.write(orbit),
+        **POINT.write(orbit.point),
     }
 
 
 def orbit_from(document: Document) -> Orbit:
     """The motion of a document."""
-    return Motions.of(document).orbit(document, Point)
+    motions = Motions(MACHINES.read(document["machine"]), METHODS.read(document["method"]))
+    return motions.orbit(document, Point)
 
 
 def branch_document(branch: Branch) -> dict[str, Any]:
     """A branch over frequency."""
-    traced = branch.traced
-    return {
-        **_followed_document(branch, branch.system),
-        "method": METHODS.write(branch.method),
-        "shortened_steps": [dataclasses.asdict(step) for step in branch.shortened_steps],
-        "half_turn": branch.formulation.half_turn,
-        "turns": branch.formulation.turns,
-        "saddle_side_at_start": branch.saddle_side_at_start,
-        "return_maps": plain(branch.return_maps),
-        "unknowns": plain(traced.u),
-        **{name: plain(getattr(traced.record, name)) for name in RECORDED},
-        "rejected": plain(traced.rejected),
-        "reason": plain(traced.reason),
-        "code": traced.code,
-        "course": plain(tuple(traced.course)),
-    }
+    steps = [dataclasses.asdict(step) for step in branch.shortened_steps]
+    return {"shortened_steps": steps, **_read_off(branch, branch.system), **BRANCH.write(branch)}
 
 
 def branch_from(document: Document) -> Branch:
     """The branch of a document."""
-    motions = Motions.of(document)
-    traced, states = _traced_from(document, motions), 2 * motions.system.size
-    points = traced.omega.size
+    read = BRANCH.read(document)
+    motions = Motions(read["machine"], read["method"])
+    solver = motions.solver(read["half_turn"], read["turns"])
+    n, points = motions.states, read["omega"].size
+    maps = read["return_maps"].reshape(points, n, n)
     return Branch(
-        machine=motions.machine,
-        method=motions.method,
-        formulation=motions.solver(document).formulation,
-        traced=traced,
-        return_maps=array(document["return_maps"], float, (points, states, states)),
-        saddle_side_at_start=checked_flag("saddle_side_at_start", document["saddle_side_at_start"]),
-        multipliers=array(document["multipliers"], complex, (points, states)),
-        stability=_words_from(document["stability"], points),
+        formulation=solver.formulation,
+        traced=_traced_from(read, solver, maps),
+        return_maps=maps,
+        multipliers=read["multipliers"].reshape(points, n),
+        stability=np.asarray(read["stability"], dtype="<U12").reshape(points),
         # Where a branch meets another, the point is one of the other's motions.
         special_points=tuple(
-            SpecialPoint(orbit=motions.orbit(one, Point), **_place_from(one))
+            SpecialPoint(orbit=motions.orbit(one, Point), **PLACE.read(one))
             for one in document["special_points"]
         ),
-        **_ended_from(document),
+        **{name: read[name] for name in ("machine", "method", "saddle_side_at_start", *ENDED)},
     )
 
 
-def _traced_from(document: Document, motions: Motions) -> Traced:
+def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:
     """The points of a branch as they were followed, but for the depths: those are not kept."""
-    solver, states, omega = motions.solver(document), 2 * motions.system.size, document["omega"]
-    points = len(omega)
+    points, tried = read["omega"].size, read["rejected"].size
     # One more than the points: the step at which the branch ended.
     record = solver.new_branch(points + 1)
     record.depth[:] = np.nan
-    record.u[:points] = array(document["unknowns"], float, (points, solver.unknowns))
-    record.omega[:points] = checked_speeds(omega) if points else []
-    for name in RECORDED:
-        kept: NDArray[Any] = getattr(record, name)[:points]
-        kept[:] = array(document[name], kept.dtype.type, kept.shape)
+    record.omega[:points] = checked_speeds(read["omega"]) if points else 0.0
+    for name, values in {"u": read["unknowns"], **{name: read[name] for name in RECORDED}}.items():
+        kept = getattr(record, name)[:points]
+        kept[:] = values.reshape(kept.shape)
     if solver.reads_jacobian:
-        maps = array(document["return_maps"], float, (points, states, states))
-        record.jacobian[:points] = maps - np.eye(states)
-    tried = len(document["rejected"])
-    record.rejected[:tried], record.reason[:tried] = document["rejected"], document["reason"]
-    course = arclength.Course(*array(document["course"]).tolist())
-    return Traced.recorded(record, points, CODEC.form(int).read(document["code"]), course)
+        record.jacobian[:points] = maps - np.eye(maps.shape[1])
+    record.rejected[:tried], record.reason[:tried] = read["rejected"], read["reason"]
+    course = arclength.Course(*read["course"])
+    return Traced.recorded(record, points, read["code"], course)
 
 
 def field_branch_document(branch: FieldBranch) -> dict[str, Any]:
     """A branch over a field of the machine."""
-    return {
-        **_followed_document(branch, branch.machine.system()),
-        "field": branch.field,
-        "values": plain(branch.values),
-        "points": [point_document(orbit.point) for orbit in branch.orbits],
-    }
+    points = [POINT.write(orbit.point) for orbit in branch.orbits]
+    system = branch.machine.system()
+    return {**_read_off(branch, system), **FIELD_BRANCH.write(branch), "points": points}
 
 
 def field_branch_from(document: Document) -> FieldBranch:
     """The branch of a document."""
-    screen, field = CODEC.form(FlipFlowScreen).read(document["machine"]), document["field"]
+    read = FIELD_BRANCH.read(document)
 
-    def orbit_at(one: Document) -> Orbit:
+    def orbit_at(value: float, one: Document) -> Orbit:
+        machine = read["machine"].replace(**{read["field"]: value})
+        return Motions(machine, PiecewiseExact()).orbit(one, FieldPoint, value=value)
+
+    def special_point(one: Document) -> FieldSpecialPoint:
         value = CODEC.form(float).read(one["value"])
-        motions = Motions(screen.replace(**{field: value}), PiecewiseExact())
-        return motions.orbit(one, FieldPoint, value=value)
+        return FieldSpecialPoint(orbit=orbit_at(value, one), value=value, **PLACE.read(one))
 
-    values, words = document["values"], document["stability"]
-    points = zip(document["points"], values, words, strict=True)
+    points = zip(read["values"].tolist(), document["points"], document["stability"], strict=True)
     return FieldBranch(
-        machine=screen,
-        field=field,
-        orbits=tuple(
-            orbit_at({**one, "value": value, "stability": word}) for one, value, word in points
-        ),
-        values=array(values),
-        special_points=tuple(
-            FieldSpecialPoint(orbit=orbit_at(one), value=one["value"], **_place_from(one))
-            for one in document["special_points"]
-        ),
-        **_ended_from(document),
+        orbits=tuple(orbit_at(value, {**one, "stability": word}) for value, one, word in points),
+        special_points=tuple(map(special_point, document["special_points"])),
+        **{name: read[name] for name in ("machine", "field", "values", *ENDED)},
     )
 
 
-def _followed_document(branch: Branch | FieldBranch, system: MechanicalSystem) -> dict[str, Any]:
-    """What every branch holds, and the amplitudes and phases of named coordinates."""
+def _read_off(branch: Branch | FieldBranch, system: MechanicalSystem) -> dict[str, Any]:
+    """What every branch tells other readers, and its special points."""
     return {
-        "version": branch.version,
-        "machine": machine_document(branch.machine),
-        "status": branch.status.name,
         "status_sentence": branch.status.value,
         "complete": branch.complete,
-        "notes": list(branch.notes),
-        "omega": plain(branch.omega),
         "amplitude": _named(system, branch.amplitude),
         "phase": _named(system, branch.phase),
-        "stability": branch.stability.tolist(),
-        "multipliers": plain(branch.multipliers),
         "error": plain(branch.error),
         "special_points": [
             {
                 **({"value": point.value} if isinstance(point, FieldSpecialPoint) else {}),
-                **{name: getattr(point, name) for name in PLACE},
-                "stability": point.orbit.stability,
                 "amplitude": _named(point.orbit.system, point.amplitude),
-                **point_document(point.orbit.point),
+                **PLACE.write(point),
+                **WORD.write(point.orbit),
+                **POINT.write(point.orbit.point),
             }
             for point in branch.special_points
         ],
@@ -282,69 +251,36 @@ def _named(system: MechanicalSystem, value: Callable[[Coordinate], object]) -> d
     return {str(which): plain(value(which)) for which in system.named}
 
 
-def _ended_from(document: Document) -> dict[str, Any]:
-    """How a branch ended, and what is to be said of it."""
-    kinds = {"status": BranchStatus, "notes": tuple[str, ...], "version": str}
-    return {name: CODEC.form(kind).read(document[name]) for name, kind in kinds.items()}
-
-
-def _place_from(document: Document) -> dict[str, Any]:
-    """What a special point is, and where it stands along its branch."""
-    kinds = dict(zip(PLACE, (str, float, int, int), strict=True))
-    return {name: CODEC.form(kind).read(document[name]) for name, kind in kinds.items()}
-
-
-def _words_from(words: list[str], points: int) -> NDArray[np.str_]:
-    for word in words:
-        checked_word("stability", word, WORDS)
-    return np.asarray(words, dtype="<U12").reshape(points)
-
-
 def sweep_document(sweep: Sweep) -> dict[str, Any]:
     """What a machine settles to, speed by speed."""
+    points = [row.point for row in sweep.rows]
     return {
-        "version": sweep.version,
-        "machine": machine_document(sweep.machine),
-        "omega": plain(sweep.omega),
         "amplitude": _named(sweep.system, sweep.amplitude),
         "periods": plain(sweep.periods),
-        "settled": plain(sweep.settled),
-        "turns": plain(sweep.turns),
         "distance": plain(sweep.distance),
-        "jumps": [dataclasses.asdict(jump) for jump in sweep.jumps],
-        "max_periods": sweep.max_periods,
-        "most_turns": sweep.most_turns,
         "complete": sweep.complete,
         "states": [plain(row.recent) for row in sweep.rows],
-        "points": [None if row.point is None else point_document(row.point) for row in sweep.rows],
+        "points": [None if point is None else POINT.write(point) for point in points],
+        **SWEEP.write(sweep),
     }
 
 
 def sweep_from(document: Document) -> Sweep:
     """The sweep of a document."""
-    motions = Motions.of(document)
-    columns = [document[name] for name in ("states", "points", "distance", "turns", "settled")]
+    read = SWEEP.read(document)
+    motions = Motions(read["machine"], PiecewiseExact())
+    columns = [document[name] for name in ("omega", "states", "points", "distance")]
+    columns += [read.pop("turns").tolist(), read.pop("settled").tolist()]
     rows = []
-    for states, one, distance, turns, settled in zip(*columns, strict=True):
-        recent = array(states, float, (-1, 2 * motions.system.size))
+    for _, states, one, distance, turns, settled in zip(*columns, strict=True):
+        recent = array(states).reshape(-1, motions.states)
         point = None if one is None else motions.point(one, Point)
         away = np.inf if point is None else CODEC.form(float).read(distance)
-        kept = checked_count("turns", turns, 2**63), point, away, checked_flag("settled", settled)
-        rows.append(Settled(recent[-1].copy(), *kept, recent))
-    omega = checked_speeds(document["omega"])
-    if omega.size != len(rows):
-        raise ValueError(f"{len(rows)} rows are not one for each of {omega.size} speeds")
-    return Sweep(
-        machine=motions.machine,
-        omega=omega,
-        rows=tuple(rows),
-        jumps=CODEC.form(tuple[Jump, ...]).read(document["jumps"]),
-        max_periods=checked_count("max_periods", document["max_periods"], MOST_TURNS),
-        most_turns=checked_count("most_turns", document["most_turns"], 2**63),
-        formulation=motions.solver({"half_turn": False, "turns": 1}).formulation,
-        version=CODEC.form(str).read(document["version"]),
-        complete=checked_flag("complete", document.get("complete", True)),
-    )
+        rows.append(Settled(recent[-1].copy(), turns, point, away, settled, recent))
+    checked_speeds(read["omega"])
+    complete = CODEC.form(bool).read(document.get("complete", True))
+    formulation = motions.solver(half_turn=False, turns=1).formulation
+    return Sweep(rows=tuple(rows), formulation=formulation, complete=complete, **read)
 
 
 def sensitivity_document(result: Sensitivity) -> dict[str, Any]:
@@ -368,13 +304,12 @@ def _by_name(*kinds: type) -> dict[str, type]:
     return {kind.__name__: kind for kind in kinds}
 
 
-WORDS = (STABLE, UNSTABLE, UNDETERMINED)
 METHODS = CODEC.tagged("name", _by_name(PiecewiseExact, HarmonicBalance, SampledHarmonicBalance))
 SCREENS, SYSTEMS = {"screen": FlipFlowScreen}, {"system": MechanicalSystem}
 MACHINES = CODEC.tagged("kind", SCREENS | SYSTEMS)
 CODEC.learn(
     {
-        ClearanceSpring: Form(spring_document, spring_from),
+        ClearanceSpring: Form(SPRING.write, spring_from),
         Unbalance | HarmonicForce: CODEC.tagged("kind", _by_name(Unbalance, HarmonicForce)),
         Machine: Form(machine_document, MACHINES.read),
         FlipFlowScreen: CODEC.tagged("kind", SCREENS),
