@@ -112,12 +112,19 @@ def test_the_file_that_is_read_is_not_written_to(command, at_work, tmp_path, nam
     assert (tmp_path / "own.toml").read_bytes() == before
 
 
-def test_a_link_in_the_folder_to_the_file_that_is_read_is_not_followed(command, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "link"),
+    [("simulate", "motion.html"), ("analyze", "response.csv"), ("reproduce", "figure-03.svg")],
+)
+def test_a_link_in_the_folder_to_the_file_that_is_read_is_not_followed(
+    command, tmp_path, name, link
+):
     command("new", "own.toml")
     before = (tmp_path / "own.toml").read_bytes()
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "motion.html").symlink_to("../own.toml")
-    code, _, err = command("simulate", "own.toml", "--periods", "2", "-o", "out")
+    (tmp_path / "out" / link).symlink_to("../own.toml")
+    words = ("3", "--machine", "own.toml") if name == "reproduce" else ("own.toml",)
+    code, _, err = command(name, *words, *QUICK[name][1:], "-o", "out")
     assert code == 2
     assert "this is the file that is read" in err
     assert (tmp_path / "own.toml").read_bytes() == before

@@ -45,7 +45,7 @@ def analyze(
 def _write(assessment: Assessment, target: Destination) -> None:
     """The report, the numbers behind it, the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.response import write_response  # noqa: PLC0415
+    from flipflow.io.response import NAMES, write_response  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
@@ -54,7 +54,8 @@ def _write(assessment: Assessment, target: Destination) -> None:
     write_html(assessment, target.path("report.html"))
     target.wrote("report.html")
     target.data("results.json", document)
-    target.wrote(*write_response(assessment, target.path("")))
+    write_response(assessment, target.all_of(NAMES))
+    target.wrote(*NAMES)
     target.document(document)
     if target.spoken:
         summary(assessment, console())

@@ -105,6 +105,12 @@ class Destination:
         refuse_input(place, self._reads, OUTPUT)
         return place
 
+    def all_of(self, names: Iterable[str]) -> Path:
+        """The folder, for something else to write these files into."""
+        for name in names:
+            self.path(name)
+        return Path(self.folder or "")
+
     def wrote(self, *names: str) -> None:
         """Note files of the folder that something else has written."""
         self._names += names

@@ -44,10 +44,11 @@ def reproduce(
     folder = output or FOLDER
     with Destination(folder, json, [machine]) as target:
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
-        from flipflow.paper.page import write_reproduction  # noqa: PLC0415
+        from flipflow.paper.page import ENDINGS, PAGE, write_reproduction  # noqa: PLC0415
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
+        target.all_of([PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)])
 
         def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
             found = _finished(screen, [one.name for one in wanted], monitor)

@@ -16,6 +16,7 @@ from flipflow.model.constants import RPM
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 
+NAMES = "response.nc", "response.csv"
 Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]
 
 
@@ -53,8 +54,8 @@ def _attributes(branch: Branch) -> dict[str, str]:
     }
 
 
-def write_response(assessment: Assessment, folder: Path) -> list[str]:
-    """Write the response of every case as NetCDF and CSV; the names of the files.
+def write_response(assessment: Assessment, folder: Path) -> None:
+    """Write the response of every case as NetCDF and CSV, as :data:`NAMES`.
 
     Branches have different numbers of points, so the cases follow each other along "point".
     """
@@ -70,13 +71,12 @@ def write_response(assessment: Assessment, folder: Path) -> list[str]:
         set.intersection(*(set(_attributes(case.branch).items()) for case in assessment.cases))
     )
     shared["input_hash"] = assessment.input_hash
-    write_file(folder / "response.nc", _netcdf(joined, shared))
+    write_file(folder / NAMES[0], _netcdf(joined, shared))
     rows = [
         _csv(table, case=case.name, head=k == 0)
         for k, (case, table) in enumerate(zip(assessment.cases, tables, strict=True))
     ]
-    write_file(folder / "response.csv", b"".join(rows))
-    return ["response.nc", "response.csv"]
+    write_file(folder / NAMES[1], b"".join(rows))
 
 
 def _netcdf(columns: Columns, attributes: Mapping[str, str]) -> bytes:
