@@ -23,6 +23,14 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Tests of a file stay on one process: what they share is then made once."""
+    from xdist.scheduler import LoadFileScheduling  # noqa: PLC0415  only with pytest-xdist
+
+    return LoadFileScheduling(config, log)
+
+
 @pytest.fixture(scope="session")
 def screen() -> ff.FlipFlowScreen:
     """FFS0827 with stop, as bundled."""

@@ -20,6 +20,7 @@ from flipflow.studies.linear_motions import LINEAR
 from flipflow.studies.quantities import QUANTITIES
 from flipflow.studies.sensitivity import one_at_a_time
 
+pytestmark = pytest.mark.numerical
 SEVEN = (
     "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
     "shear_stiffness", "shear_damping",

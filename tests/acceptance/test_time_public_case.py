@@ -13,6 +13,7 @@ import flipflow as ff
 from flipflow.periodic.exact_solver import ExactSolver
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 SPEEDS = np.round(np.arange(0.5, 0.8001, 0.01), 3)
 TURNS, WATCHED, REPEAT = 1500, 60, 1e-7
 # Here several motions are stable, or some repeat after more than six turns or never, and a run

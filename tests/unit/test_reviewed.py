@@ -15,6 +15,8 @@ from flipflow.io.derived import derive
 from flipflow.studies.assessment import assess_case, energy_balance, input_hash, verdict
 from flipflow.studies.quantities import Working
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def screen():

@@ -9,6 +9,8 @@ import flipflow as ff
 from flipflow.dynamics.assembly import PlanBuilder
 from flipflow.periodic.two_event_starts import TwoEventProblem
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.mark.parametrize(
     "changes",
