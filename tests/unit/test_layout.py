@@ -14,7 +14,7 @@ import flipflow
 ROOT = Path(__file__).parents[2]
 MOST_LINES = 600
 VAGUE = {"utils", "util", "helpers", "helper", "common", "manager"}
-HEAVY = ("numba", "scipy", "xarray", "plotly", "matplotlib", "pint", "pydantic")
+HEAVY = ("numba", "scipy", "xarray", "plotly", "matplotlib", "pint")
 
 
 def modules(*folders):
