@@ -44,6 +44,13 @@ def test_no_module_has_a_name_that_says_nothing():
     assert not vague
 
 
+def test_whoever_is_judged_by_the_reference_integrators_is_run_on_a_generic_processor():
+    for path in modules("tests"):
+        source = path.read_text(encoding="utf-8")
+        if path.name.startswith("test_") and "\nfrom reference import" in source:
+            assert "pytest.mark.numerical" in source, path
+
+
 def test_import_loads_nothing_heavy():
     assert loaded_by("import flipflow") == []
 
