@@ -18,11 +18,6 @@ from flipflow.studies.quantities import Working
 pytestmark = pytest.mark.numerical
 
 
-@pytest.fixture(scope="module")
-def screen():
-    return ff.load("ffs0827")
-
-
 def test_bonded_stop_carries_its_force(screen):
     """With no gap the stop is a spring that always acts: H = k3 x2 + c3 x2'."""
     orbit = ff.periodic_orbits(screen.replace(clearance=0.0), omega=120.0)[0]
