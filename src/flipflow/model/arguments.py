@@ -26,7 +26,7 @@ Complex = NDArray[np.complex128]
 Kind = TypeVar("Kind")
 OMEGA_LEAST, OMEGA_MOST = 1e-9, 1e6
 WITHIN = (
-    f"no screen runs below {OMEGA_LEAST:g} or above {OMEGA_MOST:g} rad/s; give a frequency between"
+    f"no screen runs above {OMEGA_MOST:g} or below {OMEGA_LEAST:g} rad/s; give a frequency between"
 )
 # The square of a number beyond it overflows, and with it whatever is worked out from it.
 LARGEST = 1e150
