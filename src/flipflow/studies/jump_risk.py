@@ -184,7 +184,7 @@ def jump_risk(
     say = checked_monitor(monitor)
     if not isinstance(motion, Orbit):
         if real(motion) is None:
-            raise InputError("motion", motion, "give a frequency in rad/s, or a stable Orbit")
+            raise InputError("motion", motion, "give a frequency omega in rad/s, or a stable Orbit")
         motion = checked_speed(motion)
     say("motions", 0.0)
     omega = motion.omega if isinstance(motion, Orbit) else motion
