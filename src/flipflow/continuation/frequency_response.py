@@ -39,6 +39,8 @@ from flipflow.periodic.stability import (
 
 SETTLING_TURNS = 4000
 SCAN_POINTS = 2000
+BACK, BACK_MOST = 0.96, 170  # steps down in search of a motion without contact, to a thousandth
+STEPS_UP = 16  # least steps from there up to the frequency asked for
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -152,16 +154,15 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     lower = lowest_contact(solver, omega)
     if lower is None:
         return contact_free_unknowns(solver, omega)
-    while lower > 1e-3 * omega:
-        lower *= 0.96
-        if contact_free(solver, lower):
-            course = arclength.Course(
-                lower, omega, (omega - lower) / 50, STEP_SHARE, 1.0, arclength.QUICK
-            )
-            traced = solver.trace(contact_free_unknowns(solver, lower), lower, course)
-            if traced.code == status.REACHED_UPPER:
-                return np.asarray(traced.u[-1])
-            break
+    starts = lower * BACK ** np.arange(1.0, BACK_MOST)
+    free = ~_meets_a_gap(solver, complex_amplitudes(solver.system, starts))
+    if free.any():
+        start = float(starts[free.argmax()])
+        step = (omega - start) / STEPS_UP
+        course = arclength.Course(start, omega, step, STEP_SHARE, 1.0, arclength.QUICK)
+        traced = solver.trace(contact_free_unknowns(solver, start), start, course)
+        if traced.code == status.REACHED_UPPER:
+            return np.asarray(traced.u[-1])
     return settled_unknowns(solver, omega)
 
 
@@ -170,12 +171,6 @@ def lowest_contact(solver: Solver, omega: float) -> float | None:
     scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
     beyond = _meets_a_gap(solver, complex_amplitudes(solver.system, scan))
     return float(scan[beyond.argmax()]) if beyond.any() else None
-
-
-def contact_free(solver: Solver, omega: float) -> bool:
-    """Whether the linear motion at ``omega`` stays within all gaps."""
-    X = complex_amplitudes(solver.system, np.array([omega]))
-    return not _meets_a_gap(solver, X)[0]
 
 
 def _meets_a_gap(solver: Solver, X: Complex) -> NDArray[np.bool_]:

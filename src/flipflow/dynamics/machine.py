@@ -41,13 +41,14 @@ def machine_arrays(system: MechanicalSystem) -> MachineArrays:
     """
     system.require_damping()
     n, springs = system.size, system.springs
-    m = len(springs)
+    m, force = len(springs), system.excitation.vector
     D = np.array([spring.direction for spring in springs]).reshape(m, n)
-    force = system.excitation.vector
-    right = np.column_stack([system.K, system.C, D.T, force.real, force.imag])
-    solved = np.linalg.solve(system.M, right)
-    stiffness, damping = solved[:, :n].copy(), solved[:, n : 2 * n].copy()
-    if np.linalg.matrix_rank(system.K) < n:
+    right = np.empty((n, 2 * n + m + 2))
+    right[:, :n], right[:, n : 2 * n], right[:, 2 * n : -2] = system.K, system.C, D.T
+    right[:, -2], right[:, -1] = force.real, force.imag
+    solved = np.asarray(np.linalg.solve(system.M, right), np.float64)
+    held = np.abs(np.linalg.eigvalsh(system.K))
+    if held.min() <= n * np.finfo(float).eps * held.max():
         raise InputError(
             "K",
             "singular",
@@ -55,8 +56,8 @@ def machine_arrays(system: MechanicalSystem) -> MachineArrays:
             "spring",
         )
     return MachineArrays(
-        stiffness=stiffness,
-        damping=damping,
+        stiffness=solved[:, :n].copy(),
+        damping=solved[:, n : 2 * n].copy(),
         direction=D,
         reach=np.ascontiguousarray(solved[:, 2 * n : 2 * n + m].T),
         push=solved[:, -2] + 1j * solved[:, -1],

@@ -66,14 +66,16 @@ def new_modes(machine: MachineArrays) -> Modes:
         For more springs than contact states can be kept of.
     """
     m, n = machine.direction.shape
-    kinds = KINDS[machine.stops.law]
-    states = math.prod(kinds.tolist())
+    place = [1]
+    for law in machine.stops.law:
+        place.append(place[-1] * int(KINDS[law]))
+    states = place.pop()
     modes = 2 * n
     if states > MOST_STATES or states * (2 * modes + 2 * m) * modes * 16 > MOST_BYTES:
         raise InputError("springs", m, "so many springs with a gap have too many contact states")
     table = (states, modes)
     return Modes(
-        place=np.concatenate([[1], np.cumprod(kinds[:-1])]).astype(np.int64)[:m],
+        place=np.array(place, np.int64),
         ready=np.zeros(states, np.int64),
         mode_count=np.zeros(states, np.int64),
         rate=np.zeros(table, np.complex128),
@@ -94,7 +96,7 @@ def new_modes(machine: MachineArrays) -> Modes:
     )
 
 
-@kernel
+@kernel(inline=True)
 def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
     """Number of the contact state of regimes (m,), its modes prepared; negative: there are none."""
     number = 0
