@@ -1,4 +1,4 @@
-"""What a kernel can report, as integers; the sentences stand in ``results.status``."""
+"""What a kernel can report, as integers; what each means to a user is said where it is reported."""
 
 from __future__ import annotations
 

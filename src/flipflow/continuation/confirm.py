@@ -28,11 +28,11 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import determinant_minus
 
-BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
-FOLLOWED = (1.0, 4.0)
-EDGE = 1e-6
-ZERO = 1e-3
-LISTED = 8
+BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)  # steps to both sides, in this order
+FOLLOWED = (1.0, 4.0)  # steps before and after a point over which the exact branch is followed
+EDGE = 1e-6  # relative widening of that interval of speeds
+ZERO = 1e-3  # a test below this share of its values at the ends has a zero there, not a jump
+LISTED = 8  # speeds that a note names
 
 
 @dataclass(frozen=True, eq=False)

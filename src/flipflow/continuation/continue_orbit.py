@@ -34,7 +34,7 @@ from flipflow.periodic.orbit import Orbit, checked_orbit
 from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Solver
 from flipflow.periodic.stability import UNDETERMINED
 
-SYMMETRIC = 1e-9
+SYMMETRIC = 1e-9  # distance from its mirror image, relative: a motion within it is symmetric
 SPECIAL_SHARE = 0.8  # of the work is done where the special points are sought
 
 

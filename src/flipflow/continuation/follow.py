@@ -26,10 +26,10 @@ from flipflow.continuation.arclength import (
 )
 from flipflow.continuation.problem import depths, residual
 
-TRACE_ALL = -1
-FOLD = -1
-SHARE_TOLERANCE = 1e-10
-MOST_ROOT_STEPS = 100
+TRACE_ALL = -1  # in place of a step: follow the whole branch
+FOLD = -1  # number of the test for a fold; those from 0 on are depths beyond gaps
+SHARE_TOLERANCE = 1e-10  # share of a step to which a zero is located
+MOST_ROOT_STEPS = 100  # steps of the search for one zero
 
 
 @kernel

@@ -36,8 +36,8 @@ from flipflow.periodic.stability import (
     stability_words,
 )
 
-SETTLING_TURNS = 4000
-SCAN_POINTS = 2000
+SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
+SCAN_POINTS = 2000  # equally spaced frequencies at which contact is looked for
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."

@@ -28,9 +28,12 @@ from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
-DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
-BOTTOM_STEPS = 15
-QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
+# A dip of |test| is followed to its bottom where any of these three holds.
+DIP = 0.5  # the parabola through it falls below this share of its lowest point
+SHARP_DIP = 0.3  # that point lies below this share of both its neighbours
+LOW = 1e-3  # that point lies below this share of the largest value along the branch
+BOTTOM_STEPS = 15  # evaluations in the search for the bottom of a dip
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a step at which a suspected dip is looked for
 
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"

@@ -23,9 +23,10 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus
 
-FINER = (1.0, 0.05, 0.01, 0.001)
-SMALL = 1e-3
-SECANT, SECANT_MOST = 1e-6, 30
+FINER = (1.0, 0.05, 0.01, 0.001)  # factors on the step, tried until no point lands on the parent
+SMALL = 1e-3  # distance of a child's first motion from its parent, relative to the motion
+SECANT = 1e-6  # relative distance in omega of the first two points of the secant method
+SECANT_MOST = 30  # its iterations
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ from flipflow.model.contact_law import ENTERED, MOST_EXITS, NO_EXIT, OPEN
 NOTHING = -9  # no regime: nothing has changed yet
 MAX_SEARCH = 20_000  # steps of one search; thirty are usual
 AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
-SMALLEST_STEP = 1e-11  # of the horizon: what bounds the steps of a search that grazes
+SMALLEST_STEP = 1e-11  # share of the horizon: least step, which bounds their number at grazing
 
 
 class GapMotion(NamedTuple):

@@ -34,7 +34,7 @@ from flipflow.dynamics.law import (
 from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, new_modes, state_number
 
-MOST_SEGMENTS = 600
+MOST_SEGMENTS = 600  # that a flow can record; a turn has one more than changes of contact
 
 
 class Flow(NamedTuple):

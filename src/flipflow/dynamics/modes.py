@@ -29,8 +29,9 @@ from flipflow.errors import InputError
 from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 
 NEARLY_DEFECTIVE = 1e6  # condition of the basis of eigenvectors from which it has lost six digits
-NUDGE, MOST_NUDGES = 1e-10, 3  # relative change of damping that splits a double eigenvalue
-MOST_STATES = 2**12
+NUDGE = 1e-10  # relative change of damping that splits a double eigenvalue
+MOST_NUDGES = 3  # such changes tried, each larger by one nudge
+MOST_STATES = 2**12  # contact states for which tables are kept
 MOST_BYTES = 2**32  # of tables, of which only what is met is ever touched
 
 

@@ -24,7 +24,7 @@ from flipflow.model.contact_law import engaged_side
 from flipflow.model.system import MechanicalSystem
 
 TIMES = "give finite times in s"
-MOST_SAMPLES = 10_000_000
+MOST_SAMPLES = 10_000_000  # times in a grid over one period
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from flipflow.periodic.series import (
 )
 from flipflow.periodic.shooting import Shooting, ShootingWork, shoot
 
-ROUNDING = 1e-9
+ROUNDING = 1e-9  # a Newton step below this share of the motion is rounding of the flow
 
 
 @kernel(entry=True)

@@ -8,9 +8,9 @@ from typing import cast
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_kind, checked_positive
 
-MOST_HARMONICS = 200
-MOST_POINTS = 5000
-MOST_SAMPLES = 2**17
+MOST_HARMONICS = 200  # highest harmonic that may be asked for
+MOST_POINTS = 5000  # steps of full length into which an interval may be divided
+MOST_SAMPLES = 2**17  # samples of the contact force in a turn
 
 
 @dataclass(frozen=True)

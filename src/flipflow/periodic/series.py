@@ -35,7 +35,7 @@ from flipflow.dynamics.law import (
 )
 from flipflow.dynamics.machine import MachineArrays
 
-NO_SPRING = -1
+NO_SPRING = -1  # no change of contact began the segment
 
 
 class Balance(NamedTuple):

@@ -25,7 +25,7 @@ from flipflow.periodic.observe import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 
 STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size
-POINTS_MOST = 20_000  # of one branch; a few hundred are usual
+POINTS_MOST = 20_000  # that one branch can record; a few hundred are usual
 
 
 @dataclass(frozen=True, eq=False)

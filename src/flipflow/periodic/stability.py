@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Complex, Real
 
 STABLE, UNSTABLE, UNDETERMINED = "stable", "unstable", "undetermined"
-NEAR_ONE = 1e-6
-SADDLE_NODE_BAND = 0.2
+NEAR_ONE = 1e-6  # distance of the largest modulus from 1 within which stability is undetermined
+SADDLE_NODE_BAND = 0.2  # distance from +1 within which the Jacobian overrules a real multiplier
 
 
 def full_turn(eigenvalues: Complex, *, half_turn: bool) -> Complex:

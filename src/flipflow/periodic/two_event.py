@@ -28,10 +28,10 @@ from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, prepare
 from flipflow.model.system import MechanicalSystem
 
-OPEN_SLOT, PLUS_SLOT = 0, 1
-MOST_ROOT_STEPS = 60  # twenty are usual
+OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
+MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
-MOST_MOTIONS = 8
+MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 
 
 class TwoEvent(NamedTuple):

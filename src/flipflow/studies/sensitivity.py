@@ -225,7 +225,7 @@ def _numbers(values: object) -> Any:
     return float(found) if found.ndim == 0 else found
 
 
-N_MOST = 2**20
+N_MOST = 2**20  # groups of samples that may be asked for
 # Values held at once: all samples at as many frequencies as fit.
 BLOCK_VALUES = 2_000_000
 

@@ -13,8 +13,8 @@ from flipflow.model.elements import ClearanceSpring
 from flipflow.model.smooth import SHARPNESS, smooth_force
 
 Real = NDArray[np.float64]
-UNSWITCHED = 1e-3
-POINTS = 20_001
+UNSWITCHED = 1e-3  # share of the force that the smooth law has not switched at its layer's edge
+POINTS = 20_001  # positions over the stroke, besides those in the layers
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,13 +22,14 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import STABLE, stability_words
 
-MOST_TURNS = 4000
-TOLERANCE = 1e-9
-FIRST_CHUNK, LONGEST_CHUNK = 16, 256
-NEAR = 0.1
-SAME_PERIOD = 3.0
-RECENT = 64
-SAME = 1e-6
+MOST_TURNS = 4000  # forcing periods waited unless told otherwise
+TOLERANCE = 1e-9  # distance from the periodic motion, relative to it, within which it has settled
+FIRST_CHUNK = 16  # turns; twice as many are run before anything is looked at
+LONGEST_CHUNK = 256  # most turns run at once while no periodic motion is in sight
+NEAR = 0.1  # distance, relative to the motion, within which a periodic motion is looked for
+SAME_PERIOD = 3.0  # the first period whose step is within this factor of the least one is taken
+RECENT = 64  # turns whose states are kept
+SAME = 1e-6  # distance, relative to the motion, within which two states are one
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,11 +31,11 @@ from flipflow.transient.settle import Settling
 from flipflow.transient.sweep import MAX_PERIODS
 
 Real = NDArray[np.float64]
-SAMPLES_A_TURN = 128
-MOST_PERIODS = 1_000_000
-MOST_SAMPLES = 20_000_000
-SETTLED = 1e-6
-ROUNDING = 1e-12
+SAMPLES_A_TURN = 128  # default times in each forcing period
+MOST_PERIODS = 1_000_000  # forcing periods that may be asked for
+MOST_SAMPLES = 20_000_000  # default times that are given without being asked for
+SETTLED = 1e-6  # distance from the periodic motion, relative to it, within which it has settled
+ROUNDING = 1e-12  # relative excess of the last time over the end that is rounding
 
 
 def simulate(

@@ -18,8 +18,11 @@ from flipflow.transient.history import ContactChange, History, stop_forces
 from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper, Stretch
 
 Real = NDArray[np.float64]
-MOST_ROWS = 400_000
-SETTLED, MOST_TURNS, TURNS_AT_ONCE, MOST_PERIODS = 1e-7, 2000, 20, 6
+MOST_ROWS = 400_000  # rows after which a run is ended
+SETTLED = 1e-7  # change of the state over a period, relative to it, within which it has settled
+MOST_TURNS = 2000  # turns waited for a motion to settle
+TURNS_AT_ONCE = 20  # turns between two looks at whether it has settled
+MOST_PERIODS = 6  # turns after which a settled motion may repeat
 
 STATUS = {
     status.OK: "The whole time was calculated.",

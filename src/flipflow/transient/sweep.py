@@ -138,8 +138,8 @@ class Sweep:
         return {}
 
 
-MAX_PERIODS = 6
-JUMP_SHARE = 0.05
+MAX_PERIODS = 6  # longest period looked for, in forcing periods, unless told otherwise
+JUMP_SHARE = 0.05  # distance, relative to the motion, beyond which it is another one: a jump
 
 
 def sweep(

@@ -22,7 +22,7 @@ from flipflow.dynamics.law import (
 )
 from flipflow.model.contact_law import ENTERED, NO_EXIT, OPEN
 
-SHAFT_STATES = 5  # phi, phi', work put in, work dissipated, work of friction
+SHAFT_STATES = 5  # of the shaft: phi, phi', work put in, work dissipated, work of friction
 
 
 class Shaft(NamedTuple):
