@@ -13,7 +13,7 @@ from flipflow.paper.figure import PaperFigure
 from flipflow.paper.trends import FamilyPair
 from flipflow.periodic.options import HarmonicBalance
 from flipflow.plotting.family import family_figure
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.report.blocks import Column, Table, cells
 from flipflow.report.numbers import NOTHING, quantity
 from flipflow.studies.response_family import ResponseFamily, response_family

@@ -10,8 +10,9 @@ from flipflow.continuation.branch import Branch
 from flipflow.model.fields import FIELD
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.curves import Curve
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.parts import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, curve_traces
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
