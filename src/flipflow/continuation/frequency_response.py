@@ -106,11 +106,9 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
     return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
 
 
-def solver_for(
-    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
-) -> Solver:
+def solver_for(system: MechanicalSystem, method: Method) -> Solver:
     """A solver of a method's equations for a machine: see :func:`formulation_of`."""
-    return formulation_of(system, method, half_turn=half_turn, turns=turns).solver()
+    return formulation_of(system, method).solver()
 
 
 def formulation_of(

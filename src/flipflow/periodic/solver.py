@@ -292,13 +292,6 @@ class Solver(ABC):
             self.problem, self.scratch, self.corrector, record, u, omega, course, p, *shares, test
         )
 
-    def trace_through(self, u: Real, omega: float, course: arclength.Course) -> Traced:
-        """Follow the branch from (u, omega) both ways, in rising omega at the start."""
-        ahead = self.trace(u, omega, course._replace(direction=1.0))
-        if ahead.code == status.CLOSED or ahead.omega.size == 0:
-            return ahead
-        return self.trace(u, omega, course._replace(direction=-1.0)).reversed_into(ahead)
-
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
         return self.zero_between(traced, FOLD, p, share, share)[1]

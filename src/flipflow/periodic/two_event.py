@@ -217,15 +217,6 @@ def two_event_states(
     return found
 
 
-@kernel(entry=True)
-def force_excesses(
-    machine: MachineArrays, work: TwoEvent, omega: Real, shares: Real, out: Real
-) -> None:
-    """f at pairs of omega and s, (P,)."""
-    for p in range(omega.shape[0]):
-        out[p] = force_excess(machine, work, omega[p], shares[p])
-
-
 class TwoEventProblem:
     """The scalar problem f(s) = |F(s, omega)| - 1 of a machine with one symmetric stop."""
 
@@ -258,10 +249,3 @@ class TwoEventProblem:
         shares = np.empty(MOST_MOTIONS)
         found = two_event_states(self._machine, self._work, omega, SAMPLES, states, shares)
         return states[:found], shares[:found]
-
-    def excess(self, omega: Real, share: Real) -> Real:
-        """f at pairs of omega and contact share, (P,): 0 where the machine has such a motion."""
-        out = np.empty(np.shape(omega))
-        pairs = np.ascontiguousarray(omega), np.ascontiguousarray(share)
-        force_excesses(self._machine, self._work, *pairs, out)
-        return out

@@ -48,14 +48,11 @@ class Geometry:
         For each panel, where the label of each vertical line stands above it.
     titles
         For each panel, the height of its title's foot above the axes.
-    legend_top
-        Top of the legend.
     """
 
     rects: tuple[Rect, ...]
     labels: tuple[dict[int, Label], ...]
     titles: tuple[float, ...]
-    legend_top: float
 
 
 def arrange(figure: PanelGrid) -> Geometry:
@@ -76,7 +73,7 @@ def arrange(figure: PanelGrid) -> Geometry:
             labels.append(place_labels(panel, width))
             titles.append(head - 6.0 - TITLE_ROW)
         top += height + ROW_GAP
-    return Geometry(tuple(rects), tuple(labels), tuple(titles), 0.0)
+    return Geometry(tuple(rects), tuple(labels), tuple(titles))
 
 
 def legend_names(figure: PanelGrid) -> list[str]:

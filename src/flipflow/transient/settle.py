@@ -82,24 +82,23 @@ class Settling:
             self._solvers[periods] = self.solver.with_turns(periods)
         return self._solvers[periods]
 
-    def settle(
-        self, z: Real, omega: float, *, most: int = MOST_TURNS, tolerance: float = TOLERANCE
-    ) -> Settled:
-        """Run from z until the distance falls below ``tolerance`` times the motion's size.
+    def settle(self, z: Real, omega: float, most: int) -> Settled:
+        """Run from z until the distance falls below TOLERANCE times the motion's size.
 
-        Not settled is, too, where the flow over a turn does not end.
+        The machine has not settled after ``most`` turns, nor where the flow over a turn does not
+        end.
         """
         turns, chunk = 0, FIRST_CHUNK
         recent = np.array(z, float)[None]
         while True:
             point = self.approached(recent, omega)
             distance = math.inf if point is None else self.distance(recent[-1], point.u, omega)
-            done = distance <= tolerance * (self.size(recent, omega) + self.solver.length)
+            done = distance <= TOLERANCE * (self.size(recent, omega) + self.solver.length)
             if done or turns >= most:
                 return Settled(recent[-1].copy(), turns, point, distance, done, recent)
             chunk = min(2 * chunk, LONGEST_CHUNK)
             if point is not None:
-                chunk = self._turns_to_go(point, distance, tolerance * self.size(recent, omega))
+                chunk = self._turns_to_go(point, distance, TOLERANCE * self.size(recent, omega))
             run = self._run(recent[-1], omega, min(chunk, most - turns))
             if run is None:
                 return Settled(recent[-1].copy(), turns, None, math.inf, False, recent)
