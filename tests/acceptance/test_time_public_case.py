@@ -1,4 +1,4 @@
-"""Row 24 in time: period-doubled, quasi-periodic and coexisting motions against brute force.
+"""A two-mass chain in time: period-doubled, quasi-periodic and coexisting motions by brute force.
 
 The brute force is a stroboscopic run of our own with nothing but DOP853 with events (at a few
 frequencies) or the exact flow turn by turn (at all): no settling criterion, no shooting.
@@ -40,8 +40,8 @@ def brute_force(chain, speeds) -> list[tuple[int, float, float]]:
 
 
 @pytest.mark.parametrize("direction", [1, -1], ids=["up", "down"])
-def test_row_24_sweeps_agree_with_brute_force_frequency_by_frequency(chain, direction) -> None:
-    """Must show 3: both sweeps, from 0.5 to 0.8, against a stroboscopic run."""
+def test_sweeps_agree_with_brute_force_frequency_by_frequency(chain, direction) -> None:
+    """Both sweeps, from 0.5 to 0.8, against a stroboscopic run."""
     speeds = SPEEDS[::direction]
     swept = ff.sweep(chain, speeds, most_turns=TURNS)
     low, high = swept.extremes(0)
@@ -57,8 +57,8 @@ def test_row_24_sweeps_agree_with_brute_force_frequency_by_frequency(chain, dire
         assert abs(low[k] - least) < 1e-6, f"{where}: {low[k]} against {least}"
 
 
-def test_row_24_kinds_of_motion_are_found_in_the_sweeps(chain) -> None:
-    """Must show 3: period-doubled, quasi-periodic and coexisting motions."""
+def test_kinds_of_motion_are_found_in_the_sweeps(chain) -> None:
+    """Period-doubled, quasi-periodic and coexisting motions."""
     up = ff.sweep(chain, SPEEDS, most_turns=TURNS)
     down = ff.sweep(chain, SPEEDS[::-1], most_turns=TURNS)
     assert 2 in up.periods[np.isclose(SPEEDS, 0.74)]
@@ -71,7 +71,7 @@ def test_row_24_kinds_of_motion_are_found_in_the_sweeps(chain) -> None:
 
 
 @pytest.mark.parametrize("omega", [0.6, 0.74, 0.745])
-def test_row_24_periodic_orbits_close_under_dop853(chain, omega) -> None:
+def test_periodic_orbits_close_under_dop853(chain, omega) -> None:
     """Every motion found returns to itself after its periods by an independent integration."""
     machine = integrate.Machine.of(chain)
     orbits = ff.periodic_orbits(chain, omega, 6)

@@ -48,7 +48,7 @@ def test_all_touching_motions_are_found_without_a_guess(omega):
 
 
 def test_shooting_has_the_last_word_where_motion_leans():
-    """Row 25, e = 2 mm at 57.7 rad/s: of the scalar problem's candidates one is a motion.
+    """e = 2 mm at 57.7 rad/s: of the scalar problem's candidates one is a motion.
 
     The others would touch more often than they assume. Shooting finds that one, which is
     unstable, and the two stable motions that lean to either side.
