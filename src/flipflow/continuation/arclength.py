@@ -1,7 +1,7 @@
 """Pseudo-arclength continuation of a branch in omega, compiled whole.
 
 Unknowns w = (u, omega) are measured in steps: each unknown by its own size times ``u_step``,
-omega by ``omega_step``, so that a step of length one is as long as is wanted in any of them.
+omega by ``omega_step``, so that a step of length one is the longest that is wanted in each.
 """
 
 from __future__ import annotations
@@ -249,8 +249,9 @@ def chord_to(work: Corrector, branch: Branch, p: int) -> float:
 def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> None:
     """Turn the guess on the tangent of point p into one on the cubic through p - 1 and p.
 
-    With h the chord, left in work.b by ``chord_to``, d its direction, t and t' the tangents at p
-    and p - 1 and r = step / h, that is step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')) farther.
+    With h the chord, which ``chord_to`` left in work.b, d its direction, t and t' the tangents at
+    p and p - 1, and r = step / h, the guess moves by
+    step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')).
     """
     norm = 0.0
     for k in range(work.b.shape[0]):
@@ -267,7 +268,7 @@ def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> 
 
 @kernel
 def astray(work: Corrector) -> float:
-    """Distance of the corrected point from the guess, in steps: far away is another strand."""
+    """Distance of the corrected point from the guess, in steps; far away lies another strand."""
     square = 0.0
     for k in range(work.w.shape[0]):
         square += ((work.w[k] - work.guess[k]) / work.scale[k]) ** 2
@@ -335,11 +336,11 @@ def trace(
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
 
-    The first point is corrected at fixed omega, the last stands exactly on the bound; a branch
-    that comes back to its first point is closed there. A step is
-    refused and halved when Newton fails, when the tangent turns too far, and, down to a small
-    length, when the contacts of a turn change: points then gather where a contact begins, for
-    what is narrow hides there.
+    The first point is corrected at fixed omega, the last one stands exactly on the bound; a branch
+    that comes back to its first point is closed there. A step is refused and halved when Newton
+    fails, when the tangent turns too far, and, down to a small length, when the contacts of a turn
+    change. Points then gather where a contact begins, because narrow details of the branch stand
+    there.
     """
     n = work.r.shape[0]
     for k in range(n):
@@ -375,7 +376,7 @@ def trace(
         branch.iterations[p] = iterations
         distance = from_start(work, branch)
         travelled = max(travelled, distance)
-        # Beside a fold the other strand passes the first point, too, with omega the other way.
+        # Beside a fold the other strand also passes the first point, but with omega the other way.
         same_way = branch.tangent[p, n] * branch.tangent[0, n] > 0.0
         back = travelled > AWAY and distance < BACK * step and same_way
         ended = arrival(branch, course, p, ends, back)

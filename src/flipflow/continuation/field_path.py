@@ -31,7 +31,7 @@ SystemAt = Callable[[float], MechanicalSystem]
 
 @dataclass(frozen=True, eq=False)
 class FieldPoint(Point):
-    """A motion of the machine whose field has a value; ``omega_tangent`` is the share in it."""
+    """A motion at a value of the field; ``omega_tangent`` is the tangent's share in the value."""
 
     value: float = np.nan
 
@@ -46,7 +46,7 @@ class FieldEquations(Equations):
     bounds
         (lower, upper) values.
     own
-        The machine's own value, which says how large values of the field are.
+        The machine's own value, which sets the scale of the field.
     omega
         Frequency in rad/s.
     half_turn, turns

@@ -49,7 +49,7 @@ def frequency_response(
 ) -> Branch:
     """Follow the periodic motions of a machine over an interval of frequency.
 
-    The branch is the one reached from below: it starts from the motion that hangs together with
+    The branch is the one reached from below: it starts from the motion that is connected with
     the contact-free one at lower frequency, and is followed through its folds by pseudo-arclength
     until it leaves the interval. Every point has its stability and error, every special point is
     refined. Motions detached from this branch are not seen.
@@ -142,9 +142,9 @@ def method_of(formulation: Formulation) -> Method:
 def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
-    Where no lower frequency touches a stop that is the contact-free motion. Otherwise the branch
-    is followed up from a frequency without contact, and where there is none, the machine is let
-    settle from rest.
+    Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
+    followed up from a frequency without contact; where there is none, the machine is left to settle
+    from rest.
     """
     lower = lowest_contact(solver, omega)
     if lower is None:
@@ -242,5 +242,5 @@ def _finished(
 
 
 def word_of(kind: str) -> str | None:
-    """Where stability changes the motion is neither; elsewhere its multipliers tell."""
+    """The stability where it changes, which is neither; None leaves it to the multipliers."""
     return UNDETERMINED if kind in STABILITY_CHANGES else None

@@ -67,7 +67,7 @@ class Equations(ABC):
 
     @abstractmethod
     def apart(self, w: Real) -> float:
-        """How far a solution is from the branch that this one may come from; infinite: none."""
+        """Distance of a solution from the parent branch, relative; infinite where there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ def stalled(equations: Equations, points: list[Solved]) -> Path:
 
 
 def met(equations: Equations, points: list[Solved]) -> Path:
-    """A path that ends on another branch, without the points that are one with it to rounding."""
+    """A path that ends on its parent branch, without the points that rounding puts there."""
     kept = len(points)
     while kept > 1 and equations.apart(points[kept - 1].w) < CLOSE:
         kept -= 1

@@ -269,7 +269,7 @@ def run_flow(
 
 @kernel(inline=True)
 def contact_number(flow: Flow) -> int:
-    """A number that changes when the contacts of the record change: how often each spring does."""
+    """A number that changes with the contacts of the record: a count of changes by spring."""
     total = 0
     for e in range(flow.segments[0] - 1):
         total += 1 + 1000 * flow.spring[e]

@@ -7,8 +7,8 @@ v_i and l_i of the state's matrix A,
 
 one term for a conjugate pair (weight 2) and one for a real eigenvalue (weight 1), so that
 overdamped machines need no special case. Which side of a stop is engaged does not change the
-matrix: a contact state is told by the kinds of force that its springs have, and the place where it
-would stand still follows from the gaps on whichever side.
+matrix. A contact state is therefore identified by the kinds of force that its springs have; where
+the machine would stand still follows from the gaps on the engaged sides.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
 def prepare(machine: MachineArrays, modes: Modes, number: int) -> int:
     """Fill the tables of one contact state; returns a status.
 
-    Exactly critical damping has no full set of eigenvectors; a damping changed in its tenth digit
-    has one, and costs less than the digits a defective basis would.
+    With exactly critical damping there is no full set of eigenvectors. A change of the damping in
+    its tenth digit gives one, and loses fewer digits than a defective basis would.
     """
     modes.ready[number] = -1
     for nudge in range(MOST_NUDGES + 1):
@@ -235,7 +235,7 @@ def _inverted(modes: Modes, number: int) -> float:
 
 @kernel
 def _seen_from_outside(machine: MachineArrays, modes: Modes, number: int) -> None:
-    """What the modes take up from the exciter and the gaps, and show at the gaps."""
+    """How the exciter and the gaps act on the modes, and how the modes move the gaps."""
     m, n = machine.direction.shape
     for i in range(modes.mode_count[number]):
         force = 0j
@@ -273,10 +273,10 @@ def open_answer(modes: Modes, power: int, omega: float, k: int) -> complex:
 def contact_free(
     machine: MachineArrays, modes: Modes, omega: Real, answer: Complex, stop_at_contact: bool
 ) -> int:
-    """X (n, N) in x = Re(X exp(i omega t)) without contact; the first index that meets a gap.
+    """Write X (n, N) of x = Re(X exp(i omega t)) without contact; the first index that meets a gap.
 
-    ``stop_at_contact``: nothing is written beyond it. n where no gap is met, negative where the
-    open machine has no modes.
+    The result is n where no gap is met, and negative where the open machine has no modes. With
+    ``stop_at_contact`` nothing is written beyond that index.
     """
     if modes.ready[0] == 0:
         prepare(machine, modes, 0)

@@ -193,7 +193,7 @@ class Motion:
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""
         found: list[ContactInterval] = []
-        # Where a piece ends the next one starts, to the last digit: touches are joined by it.
+        # A piece ends where the next one starts, to the last digit: so touches can be joined.
         ends = np.concatenate([self.start[1:], self.start[-1:] + self.length[-1:]])
         for j, spring in enumerate(self.system.springs):
             side = engaged_side(spring.law, self.regime[:, j])

@@ -126,7 +126,7 @@ class Orbit:
 
     @cached_property
     def error(self) -> float:
-        """Estimated distance in m from the exact motion; infinite where nothing is promised."""
+        """Estimated distance in m from the exact motion; infinite where there is no estimate."""
         return float(
             self.point.formulation.solver().errors(self.unknowns[None], np.array([self.omega]))[0]
         )

@@ -1,4 +1,4 @@
-"""What the two solvers of periodic motions share: the branch trace and what is read off points."""
+"""What the solvers of periodic motions share: the branch trace and what is read off points."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Traced:
         ends = (status.REACHED_UPPER, status.REACHED_LOWER, status.FOLLOWED)
         code = self.code if self.code not in ends else ahead.code
         code = status.FOLLOWED if code in ends else code
-        # What is told of a step stands at its end, which is its other point when read backwards.
+        # Counts and reasons of a step stand at its end: read backwards, at its other point.
         none = np.zeros(1, np.int64)
         rejected, reason = (
             np.concatenate([none, mine[turned], its[1:]])
@@ -137,7 +137,7 @@ class Formulation:
     options: tuple[float, ...] = ()
 
     def solver(self) -> Solver:
-        """A solver of its own for whoever asks."""
+        """A new solver, with scratch that no other caller uses."""
         return self.kind(self.system, *self.options, half_turn=self.half_turn, turns=self.turns)
 
 
@@ -357,7 +357,7 @@ class Solver(ABC):
         One Newton step of the exact flow corrects the state by delta = (I - M)^-1 (flow(z) - z);
         the largest difference of any displacement over the turn between the corrected flow and
         the motion is the estimate. Where a second step does not shrink, as close to a fold,
-        nothing is promised.
+        there is no estimate.
         """
         harmonics, series = self.series(u, omega)
         states = self.states(u, omega)

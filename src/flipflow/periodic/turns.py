@@ -1,4 +1,4 @@
-"""Many motions of one machine, turn after turn: the only loops over lanes."""
+"""Many motions (lanes) of one machine, each carried turn after turn until one is recognised."""
 
 from __future__ import annotations
 

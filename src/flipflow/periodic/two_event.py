@@ -1,14 +1,15 @@
-"""The symmetric motion with one touch a side, found without a guess: a scalar problem.
+"""The symmetric motion with one touch on each side, without a guess: a scalar problem.
 
 One spring with equal gaps is touched for the share s of each half turn. Counting time from the
 moment of contact, the half turn is an engaged piece of length s pi / omega and an open one, and
-its end is minus its beginning. Given omega and s that is linear in the state z at contact and in
-the force's complex size F (in units of the machine's own force), with y = e at both ends of the
-touch: one 2 N x 2 N solve, then a 2 x 2 one. Motions of the machine are the zeros of
+the state at its end is minus the state at its beginning. Given omega and s, this condition and
+y = e at both ends of the touch are linear in the state z at contact and in the complex size F of
+the force (in units of the machine's own force): one 2 N x 2 N solve, then a 2 x 2 one. Motions of
+the machine are the zeros of
 
     f(s) = |F(s, omega)| - 1,
 
-a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting has the last word on each.
+a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting must confirm each zero.
 """
 
 from __future__ import annotations

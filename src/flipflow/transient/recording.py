@@ -49,7 +49,7 @@ class Recording:
         end: float,
         tell: Callable[[float], None],
     ) -> Real:
-        """State at ``end`` from z at ``begin``; ``tell`` hears the time reached.
+        """State at ``end`` from z at ``begin``; ``tell`` is called with the time reached.
 
         Raises
         ------

@@ -99,9 +99,10 @@ def _hermite(h: float, g0: float, s0: float, g1: float, s1: float, share: float)
 
 @kernel(inline=True)
 def _expected(h: float, g0: float, s0: float, g1: float, s1: float) -> float:
-    """Share of the step at which a switching function is expected to turn positive; 2: it is not.
+    """Share of the step at which a switching function is expected to turn positive; 2 if it is not.
 
-    Negative: it turns back within the step, and the share's size is where it is largest.
+    The share is negative if the function turns back within the step: its size then tells where the
+    function is largest.
     """
     top = 1.0
     if g1 <= 0.0:

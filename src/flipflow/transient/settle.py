@@ -1,8 +1,9 @@
-"""Letting a machine run until it has settled on a periodic motion, and knowing how far off it is.
+"""A machine is run until it has settled on a periodic motion; its distance from that is known.
 
-Differences between turns say little: just past a fold a motion lingers where none exists, and
-slow multipliers creep. The periodic motion that is approached is therefore solved for; its distance
-is known in metres, and its leading multiplier tells how many turns are still to go.
+Differences between turns say little: just past a fold the machine lingers where no periodic motion
+exists, and with a multiplier close to 1 it creeps. The periodic motion that is approached is
+therefore solved for. The distance from it is known in metres, and its leading multiplier tells how
+many turns are still to go.
 """
 
 from __future__ import annotations

@@ -181,17 +181,17 @@ class _Run:
                 self.blown[kind] += self.moving() - before
 
     def moving(self) -> float:
-        """What masses hold and springs that always act, J."""
+        """Energy in J of the masses and of the springs that always act."""
         system = self.build(self.machine).with_bonded()
         x, v = np.split(self.z, 2)
         return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x)
 
     def stored(self) -> float:
-        """What masses and all springs hold, J."""
+        """Energy in J of the masses and of all springs."""
         return self.moving() + self.held()
 
     def held(self) -> float:
-        """What the touched stops hold, J."""
+        """Energy in J of the stops that are touched."""
         system = self.build(self.machine)
         x, v = np.split(self.z, 2)
         total = 0.0

@@ -85,7 +85,8 @@ def run_history(
 ) -> History:
     """Run a machine with its shaft and keep every step.
 
-    ``enough`` sees all that was calculated so far and may end the run; ``monitor`` hears of it.
+    ``enough`` is called with all that was calculated so far, and ends the run by returning True;
+    ``monitor`` is called with the time reached.
     """
     system, normal = movable(machine), normal_direction(machine)
     stepper = Stepper(
@@ -113,7 +114,7 @@ def settled_start(machine: Machine, speed: float, method: RungeKutta | None = No
     """The state into which the machine settles from rest at constant speed, at angle 0.
 
     The motion may repeat after up to six turns. Where it has not settled after 2000 turns, the
-    state then, marked so.
+    state reached then is returned, marked as not settled.
     """
     movable(machine)
     state = at_rest(machine).state

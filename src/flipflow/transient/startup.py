@@ -239,7 +239,7 @@ def coast_down(
     speed
         Speed in rad/s at which it runs.
     drive
-        Its inertia and friction count; a :class:`~flipflow.SpeedProfile` lays the speed down;
+        Its inertia and friction are used; a :class:`~flipflow.SpeedProfile` gives the speed;
         None: the drive that :func:`start_up` assumes.
     duration
         Longest time in s; None: 600 s or the profile's. A free run ends at 2 % of ``speed``.

@@ -165,7 +165,7 @@ class Stepper:
         }
 
     def run(self, until: float) -> Iterator[Stretch]:
-        """Step to time ``until`` in s, giving up the record whenever it is full."""
+        """Step to time ``until`` in s, handing over the record whenever it is full."""
         for end, acceleration in self._legs(until):
             self._acceleration[0] = acceleration
             while True:
