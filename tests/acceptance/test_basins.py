@@ -10,6 +10,7 @@ from flipflow.errors import Cancelled, InputError
 from flipflow.periodic.exact_solver import ExactSolver
 from settling import settled_on
 
+pytestmark = pytest.mark.numerical
 OMEGA = 203.0
 X = np.linspace(-0.08, 0.08, 41)
 V = np.linspace(-16.0, 16.0, 41)

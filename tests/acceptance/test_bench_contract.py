@@ -13,6 +13,8 @@ import pytest
 
 import flipflow as ff
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def contract():

@@ -17,6 +17,7 @@ from flipflow.periodic.orbit import Orbit
 from judge import close, kinds, minmax
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 WINDOW_2MM = (56.9837, 58.4409)
 LEANING_2MM = (2.024274e-3, -2.130097e-3)
 CUSPS = {"stop_stiffness": (5.8231e6, 185.618), "clearance": (5.3021e-3, 210.416)}

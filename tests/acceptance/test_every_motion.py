@@ -12,6 +12,8 @@ import flipflow as ff
 from flipflow.errors import IncompleteError
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def screen() -> ff.FlipFlowScreen:

@@ -26,6 +26,7 @@ from flipflow.paper.registry import FIGURES
 from flipflow.studies.lost_symmetry import leaning_motions
 from judge import close
 
+pytestmark = pytest.mark.numerical
 IN_PART = {"S1", "S2", "S4", "M1", "M2", "M4", "M6", "V1g", "V9f"}
 CLAIMS = [
     "L1", "L2", "L3", "S1", "S2", "S3", "S4", "F1", "F2", "P1", "N1", "N2", "N3", "N4",

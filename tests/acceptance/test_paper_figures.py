@@ -19,6 +19,8 @@ from flipflow.plotting.drawing import Drawing
 from judge import close
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
+
 FOLD_UP, FOLD_DOWN = 206.405559, 198.649272
 
 

@@ -14,6 +14,7 @@ import flipflow as ff
 from judge import close
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 INTERVAL = (0.5, 0.8)
 SPEEDS = (0.55, 0.6, 0.635, 0.66, 0.7, 0.72, 0.735, 0.75, 0.755, 0.78)
 

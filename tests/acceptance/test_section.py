@@ -7,6 +7,8 @@ import pytest
 
 import flipflow as ff
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def screen() -> ff.FlipFlowScreen:

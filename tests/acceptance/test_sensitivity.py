@@ -19,6 +19,7 @@ from flipflow.studies.feasible import working_motion
 from flipflow.studies.quantities import MOTION_VALUES
 from flipflow.studies.sensitivity import one_at_a_time
 
+pytestmark = pytest.mark.numerical
 SEVEN = (
     "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
     "shear_stiffness", "shear_damping",

@@ -10,6 +10,7 @@ import pytest
 import flipflow as ff
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 TURN = 2.0 * math.pi / 120.0
 BLOWS = (
     ff.Impulse(10.3 * TURN, "main", 200.0),

@@ -16,6 +16,7 @@ from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.drive import assumed_drive
 
+pytestmark = pytest.mark.numerical
 RPM = np.pi / 30.0
 WORKING = 850.0 * RPM
 W01 = 22.493898  # rad/s, K v = w^2 M v of the machine without contact

@@ -10,6 +10,7 @@ import pytest
 import flipflow as ff
 from flipflow.errors import Cancelled
 
+pytestmark = pytest.mark.numerical
 FOLD_UP, FOLD_DOWN = 206.405559, 198.649272  # rad/s, reference values
 
 

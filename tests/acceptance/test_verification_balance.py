@@ -12,6 +12,7 @@ import flipflow as ff
 from conftest import LIGHT_DAMPING
 from judge import close, kinds, relative_amplitude, upper_orbit
 
+pytestmark = pytest.mark.numerical
 THIRD_ORDER_PERCENT = {100.0: -0.58, 120.0: -0.13, 140.0: 0.22}
 ORDERS = (1, 2, 3, 5, 9, 15, 21, 31)
 MACHINES = {"nominal": {}, "light damping": LIGHT_DAMPING, "c3 = 0": {"stop_damping": 0.0}}

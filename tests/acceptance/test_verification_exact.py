@@ -13,6 +13,7 @@ import flipflow as ff
 from judge import GAP, close, relative_amplitude, upper_orbit
 from reference import integrate, two_event
 
+pytestmark = pytest.mark.numerical
 AMPLITUDES = {100.0: 7.888703398e-3, 120.0: 9.969835637e-3, 140.0: 12.878842732e-3}
 AMPLITUDES_MM = {
     85.0: 6.488906, 90.0: 6.969572, 95.0: 7.427901, 110.0: 8.864270, 130.0: 11.277296,

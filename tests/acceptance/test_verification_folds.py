@@ -14,6 +14,7 @@ from conftest import LIGHT_DAMPING
 from judge import close
 from reference import integrate, two_event
 
+pytestmark = pytest.mark.numerical
 VARIANTS = {
     "e = 8 mm": ({"clearance": 8e-3}, (198.64747, 164.12941), (198.67, 164.08)),
     "m0r x0.7": ({"eccentric_moment": 0.7 * 4.16825}, (196.69246, 157.87730), (196.72, 157.84)),

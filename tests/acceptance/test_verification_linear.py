@@ -17,6 +17,7 @@ import flipflow as ff
 from flipflow.continuation.branch import Branch
 from judge import GAP, close, relative_amplitude
 
+pytestmark = pytest.mark.numerical
 FREE = {40.0: 1.001225259e-3, 60.0: 2.281714696e-3, 80.0: 5.681819427e-3}
 BONDED_120 = 2.083974467e-3
 METHODS = (ff.PiecewiseExact(), ff.HarmonicBalance(3))

@@ -14,6 +14,7 @@ import flipflow as ff
 from judge import close, upper_orbit
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 SHARES = {100.0: 0.394690, 120.0: 0.536373, 140.0: 0.655145}
 POWER_120 = {"input": 2415.4, "isolation": 117.1, "shear": 1740.1, "stop": 558.3}
 TO_RELATIVE = np.kron(np.eye(2), [[1.0, 0.0], [1.0, -1.0]])

@@ -14,6 +14,7 @@ from judge import close, kinds, minmax, upper_orbit
 from reference import integrate
 from reference.runge_kutta import rk4_turn
 
+pytestmark = pytest.mark.numerical
 WINDOW_2MM = (56.9837, 58.4409)
 LEANING_2MM = (2.024274e-3, -2.130097e-3)
 

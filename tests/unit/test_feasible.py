@@ -8,6 +8,7 @@ import flipflow as ff
 from flipflow.continuation.branch import Branch
 from flipflow.studies.feasible import STABILITY, case_window
 
+pytestmark = pytest.mark.numerical
 SPAN = (40.0, 75.0)
 
 

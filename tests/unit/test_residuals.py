@@ -17,6 +17,7 @@ from judge import close
 from kernel_calls import balance, central_differences, jump, residual_of, sampled, shoot
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 LAWS = ("paper", "compression-only")
 CASES = {"symmetric": None, "unequal gaps": 5e-3, "one-sided": math.inf}
 LENGTH = 6e-3

@@ -20,6 +20,7 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4
 from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper
 
+pytestmark = pytest.mark.numerical
 OMEGA = 120.0
 TURN = 2.0 * np.pi / OMEGA
 

@@ -12,6 +12,8 @@ from scipy import stats
 from flipflow.errors import MissingExtra
 from flipflow.studies.sobol import saltelli_sample, sobol_indices
 
+pytestmark = pytest.mark.numerical
+
 
 def ishigami(u):
     """Ishigami's function with a = 7, b = 0.1 at points of the unit cube, (..., 3)."""

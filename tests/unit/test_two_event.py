@@ -10,17 +10,18 @@ import kernel_calls
 from flipflow.dynamics.machine import machine_arrays
 from flipflow.periodic.two_event import TwoEventProblem
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.mark.parametrize(
     "changes",
     [{}, {"clearance": 8e-3}, {"shear_stiffness": 3510e3}, {"stop_damping": 0.0}],
     ids=["nominal", "wide gap", "stiff", "no stop damping"],
 )
-def test_every_contact_point_of_the_branch_is_a_zero(changes):
+def test_every_contact_point_of_the_branch_is_a_zero(response, changes):
     """f(s, omega) = |F| - 1 vanishes at the shares of all shooting points, stable or not."""
-    screen = ff.load("ffs0827").replace(**changes)
-    branch = ff.frequency_response(screen, (5.0, 250.0))
-    problem = TwoEventProblem(machine_arrays(screen.system()))
+    branch = response(**changes)
+    problem = TwoEventProblem(machine_arrays(branch.system))
     orbits = [branch.orbit(i) for i in range(0, branch.omega.size, 7)]
     touching = [orbit for orbit in orbits if len(orbit.contact_intervals) == 2]
     assert len(touching) > 20
@@ -35,11 +36,9 @@ def test_every_contact_point_of_the_branch_is_a_zero(changes):
 
 
 @pytest.mark.parametrize("omega", [85.0, 120.0, 190.0, 199.0, 203.0, 215.0])
-def test_all_touching_motions_are_found_without_a_guess(omega):
-    screen = ff.load("ffs0827")
-    branch = ff.frequency_response(screen, (5.0, 250.0))
+def test_all_touching_motions_are_found_without_a_guess(screen, exact, omega):
     states, shares = TwoEventProblem(machine_arrays(screen.system())).states(omega)
-    known = [orbit for orbit in branch.orbits_at(omega) if orbit.contact_intervals]
+    known = [orbit for orbit in exact.orbits_at(omega) if orbit.contact_intervals]
     assert len(shares) == len(known)
     for orbit in known:
         nearest = np.abs(shares - orbit.contact_share()).argmin()

@@ -163,10 +163,11 @@ class Lanes:
         """
         label, turns, code = (np.zeros(part.stop - part.start, np.int64) for _ in range(3))
         states = run.states[part].copy()
+        nothing = np.empty((states.shape[0], 0, states.shape[1]))
         problem = new_shooting(self.machine, half_turn=False, length=1.0)
         settle_lanes(
             problem, new_shooting_work(self.machine), states, begin[part], self.omega,
-            capture.centre, capture.form, capture.owner, most, label, turns, code,
+            capture.centre, capture.form, capture.owner, most, nothing, label, turns, code,
         )  # fmt: skip
         run.states[part], run.label[part] = states, label
         run.turns[part], run.code[part] = turns, code

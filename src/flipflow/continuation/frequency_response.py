@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.continuation import arclength
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
+from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -165,18 +166,25 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def lowest_contact(solver: Solver, omega: float) -> float | None:
     """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
     scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
-    _, first = solver.contact_free(scan, stop_at_contact=True)
-    return float(scan[first]) if first < scan.size else None
+    beyond = _meets_a_gap(solver, complex_amplitudes(solver.system, scan))
+    return float(scan[beyond.argmax()]) if beyond.any() else None
 
 
 def contact_free(solver: Solver, omega: float) -> bool:
     """Whether the linear motion at ``omega`` stays within all gaps."""
-    return solver.contact_free(np.array([omega]))[1] == 1
+    X = complex_amplitudes(solver.system, np.array([omega]))
+    return not _meets_a_gap(solver, X)[0]
+
+
+def _meets_a_gap(solver: Solver, X: Complex) -> NDArray[np.bool_]:
+    """Where linear motions X (n, N) reach the gap of any spring, (n,)."""
+    gaps = solver.machine.stops.gap.min(axis=1)
+    return np.asarray((np.abs(X @ solver.machine.direction.T) >= gaps).any(axis=1))
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = solver.contact_free(np.array([omega]))[0][0]
+    X = complex_amplitudes(solver.system, np.array([omega]))[0]
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])

@@ -17,7 +17,6 @@ from flipflow.continuation import arclength
 from flipflow.continuation.follow import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.machine import MachineArrays, machine_arrays
-from flipflow.dynamics.modes import contact_free
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
@@ -246,21 +245,6 @@ class Solver(ABC):
         none = np.zeros((1, 0, 0))
         return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
 
-    def contact_free(self, omega: Real, *, stop_at_contact: bool = False) -> tuple[Complex, int]:
-        """X (n, N) in x = Re(X exp(i omega t)) with all springs open; the first index in contact.
-
-        Raises
-        ------
-        IncompleteError
-            When the open machine has no modes.
-        """
-        answer = np.zeros((omega.size, self.system.size), np.complex128)
-        modes = self.flow.modes
-        first = contact_free(self.machine, modes, omega, answer, stop_at_contact)
-        if first < 0:
-            raise IncompleteError("no modes of the machine with all stops open could be found")
-        return answer, first
-
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
         record = self.new_branch(POINTS_MOST)
@@ -336,11 +320,11 @@ class Solver(ABC):
         return found
 
     def _open_rates(self) -> Complex:
-        """Eigenvalues of the open machine in 1/s, (2 N,)."""
-        self.contact_free(np.ones(1))
-        modes = self.flow.modes
-        rate = modes.rate[0, : modes.mode_count[0]]
-        return np.concatenate([rate, rate[rate.imag > 0.0].conj()])
+        """Eigenvalues of the machine with all springs open in 1/s, (2 N,)."""
+        n = self.system.size
+        motion = np.concatenate([np.zeros((n, n)), np.eye(n)], axis=1)
+        forces = np.concatenate([-self.machine.stiffness, -self.machine.damping], axis=1)
+        return eigenvalues(np.concatenate([motion, forces]))
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""

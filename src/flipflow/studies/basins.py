@@ -16,7 +16,7 @@ from flipflow.batch.lanes import Run
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_count, checked_monitor, checked_numbers, checked_word
+from flipflow.model.arguments import checked_count, checked_monitor, checked_reals, checked_word
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
@@ -218,9 +218,12 @@ def _axes(system: MechanicalSystem, kind: Kind, window: Window | None) -> list[G
         system.coordinate(which)
         field = f"{kind}[{which!r}]"
         remedy = f"give finite numbers in {UNITS[kind]}"
-        values = np.atleast_1d(checked_numbers(field, given, remedy)).copy()
+        # However large: states that grow beyond all bounds are cells that did not settle.
+        values = np.atleast_1d(checked_reals(field, given, remedy)).copy()
         if values.ndim != 1 or values.size == 0:
             raise InputError(field, f"shape {values.shape}", "give a row of at least one value")
+        if not np.isfinite(values).all():
+            raise InputError(field, given, remedy)
         made.append(GridAxis(kind, which, values))
     return made
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.frequency_response import first_unknowns
+from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.errors import IncompleteError
 from flipflow.model.arguments import (
     checked_count,
@@ -120,7 +121,7 @@ class _Search:
         """Rest, the branch from below, a cloud of states, and stepped speeds."""
         solver = self.settling.solver
         n = solver.system.size
-        X = np.abs(solver.contact_free(np.array([self.omega]))[0][0])
+        X = np.abs(complex_amplitudes(solver.system, np.array([self.omega]))[0])
         gaps = [g for s in solver.springs for g in s.gaps if math.isfinite(g)]
         size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
         box = np.concatenate([size, self.omega * size])
