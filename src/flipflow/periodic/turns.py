@@ -1,4 +1,4 @@
-"""Many motions (lanes) of one machine, each carried turn after turn until one is recognised."""
+"""Many motions (lanes) of one machine, run turn after turn until a known motion catches them."""
 
 from __future__ import annotations
 
