@@ -184,7 +184,7 @@ def test_an_error_of_a_worker_reaches_the_one_who_waits():
 def test_a_fold_over_a_wide_interval_closes():
     """From 0 to 250 m about a gap of 6 mm: the two folds of the gap are one closed curve.
 
-    One end is the cusp of row 19 of the trusted values, 1e-3; beyond the other no gap has folds.
+    One end is the cusp, whose reference value is known to 1e-3; beyond the other no gap has folds.
     """
     wide = ff.continue_fold(folded().folds[0], "clearance", (0, 250))
     assert wide.complete

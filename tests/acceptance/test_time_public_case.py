@@ -1,4 +1,4 @@
-"""Row 24 in time: period-doubled, quasi-periodic and coexisting motions against brute force.
+"""A two-mass chain in time: period-doubled, quasi-periodic and coexisting motions by brute force.
 
 The brute force is a stroboscopic run of our own with nothing but DOP853 with events (at a few
 frequencies) or the exact flow turn by turn (at all): no settling criterion, no shooting.
@@ -61,8 +61,8 @@ def same(one, other) -> bool:
 
 
 @pytest.mark.parametrize("direction", [1, -1], ids=["up", "down"])
-def test_row_24_sweeps_agree_with_brute_force_frequency_by_frequency(chain, direction) -> None:
-    """Must show 3: both sweeps, from 0.5 to 0.8, against a stroboscopic run.
+def test_sweeps_agree_with_brute_force_frequency_by_frequency(chain, direction) -> None:
+    """Both sweeps, from 0.5 to 0.8, against a stroboscopic run.
 
     At four frequencies, where rounding decides which motion is reached, the run goes on from the
     end of the sweep's own, and finds that it stays on the motion that the sweep has named.
@@ -78,7 +78,7 @@ def test_row_24_sweeps_agree_with_brute_force_frequency_by_frequency(chain, dire
         assert row.settled or omega in MAY_NOT_SETTLE, omega
 
 
-def test_row_24_where_rounding_decides_several_motions_are_stable(chain) -> None:
+def test_where_rounding_decides_several_motions_are_stable(chain) -> None:
     """At 0.62 a motion of one period and one of four, as a random start takes it."""
     ends = Stroboscope(chain).from_anywhere(0.62)
     assert {period for period, _, _ in ends} == {1, 4}
@@ -86,8 +86,8 @@ def test_row_24_where_rounding_decides_several_motions_are_stable(chain) -> None
     assert all(same(end, one) or same(end, four) for end in ends)
 
 
-def test_row_24_kinds_of_motion_are_found_in_the_sweeps(chain) -> None:
-    """Must show 3: period-doubled, quasi-periodic and coexisting motions."""
+def test_kinds_of_motion_are_found_in_the_sweeps(chain) -> None:
+    """Period-doubled, quasi-periodic and coexisting motions."""
     up = ff.sweep(chain, SPEEDS, most_turns=TURNS)
     down = ff.sweep(chain, SPEEDS[::-1], most_turns=TURNS)
     assert 2 in up.periods[np.isclose(SPEEDS, 0.74)]
@@ -100,7 +100,7 @@ def test_row_24_kinds_of_motion_are_found_in_the_sweeps(chain) -> None:
 
 
 @pytest.mark.parametrize("omega", [0.6, 0.74, 0.745])
-def test_row_24_periodic_orbits_close_under_dop853(chain, omega) -> None:
+def test_periodic_orbits_close_under_dop853(chain, omega) -> None:
     """Every motion found returns to itself after its periods by an independent integration."""
     machine = integrate.Machine.of(chain)
     orbits = ff.periodic_orbits(chain, omega, 6)

@@ -138,7 +138,7 @@ def test_jacobians_with_several_springs() -> None:
 
 
 def test_saltation_kernel(screen) -> None:
-    """Row 12: in (x1, x2) the entries are -c3/m1, -c3 (1/m1 + 1/m2); at the exit with +."""
+    """In (x1, x2) the entries are -c3/m1, -c3 (1/m1 + 1/m2); at the exit with +."""
     arrays = machine_arrays(screen.system())
     c3, m1, m2 = screen.stop_damping, screen.main_mass, screen.floating_mass
     to_relative = np.kron(np.eye(2), [[1.0, 0.0], [1.0, -1.0]])

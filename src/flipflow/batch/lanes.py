@@ -23,8 +23,8 @@ from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from flipflow.periodic.turns import NOT_SETTLED, settle_lanes
 
 Int = NDArray[np.int64]
-CHUNK = 64
-MOST_THREADS = 256
+CHUNK = 64  # lanes that one task of a thread runs
+MOST_THREADS = 256  # that may be asked for
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,7 +78,7 @@ class ShortenedStep:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Periodic motions followed over frequency, in the order in which they hang together.
+    """Periodic motions followed over frequency, in their order along the branch.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
     points; it is what :func:`flipflow.frequency_response` returns, and
@@ -161,7 +161,7 @@ class Branch:
 
     @cached_property
     def error(self) -> Real:
-        """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
+        """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
         return self.formulation.solver().errors(self.traced.u, self.omega)
 
     @property
@@ -315,7 +315,7 @@ class Branch:
                 try:
                     point = solver.between(self.traced, p, share)
                 except IncompleteError:
-                    return math.inf  # not every motion between two sharp bends can be had
+                    return math.inf  # Newton may fail between two sharp bends
                 low, high, _ = solver.extremes(point.u[None], np.array([point.omega]), vector)
                 return sign * float(high[0, 0] - low[0, 0])
 

@@ -37,8 +37,8 @@ from flipflow.periodic.stability import (
     stability_words,
 )
 
-SETTLING_TURNS = 4000
-SCAN_POINTS = 2000
+SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
+SCAN_POINTS = 2000  # equally spaced frequencies at which contact is looked for
 BACK, BACK_MOST = 0.96, 170  # steps down in search of a motion without contact, to a thousandth
 STEPS_UP = 16  # least steps from there up to the frequency asked for
 SAMPLED = (
@@ -52,7 +52,7 @@ def frequency_response(
 ) -> Branch:
     """Follow the periodic motions of a machine over an interval of frequency.
 
-    The branch is the one reached from below: it starts from the motion that hangs together with
+    The branch is the one reached from below: it starts from the motion that is connected with
     the contact-free one at lower frequency, and is followed through its folds by pseudo-arclength
     until it leaves the interval. Every point has its stability and error, every special point is
     refined. Motions detached from this branch are not seen.
@@ -109,11 +109,9 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
     return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
 
 
-def solver_for(
-    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
-) -> Solver:
+def solver_for(system: MechanicalSystem, method: Method) -> Solver:
     """A solver of a method's equations for a machine: see :func:`formulation_of`."""
-    return formulation_of(system, method, half_turn=half_turn, turns=turns).solver()
+    return formulation_of(system, method).solver()
 
 
 def formulation_of(
@@ -147,9 +145,9 @@ def method_of(formulation: Formulation) -> Method:
 def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
-    Where no lower frequency touches a stop that is the contact-free motion. Otherwise the branch
-    is followed up from a frequency without contact, and where there is none, the machine is let
-    settle from rest.
+    Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
+    followed up from a frequency without contact; where there is none, the machine is left to settle
+    from rest.
     """
     lower = lowest_contact(solver, omega)
     if lower is None:
@@ -247,5 +245,5 @@ def _finished(
 
 
 def word_of(kind: str) -> str | None:
-    """Where stability changes the motion is neither; elsewhere its multipliers tell."""
+    """The stability where it changes, which is neither; None leaves it to the multipliers."""
     return UNDETERMINED if kind in STABILITY_CHANGES else None

@@ -7,8 +7,8 @@ v_i and l_i of the state's matrix A,
 
 one term for a conjugate pair (weight 2) and one for a real eigenvalue (weight 1), so that
 overdamped machines need no special case. Which side of a stop is engaged does not change the
-matrix: a contact state is told by the kinds of force that its springs have, and the place where it
-would stand still follows from the gaps on whichever side.
+matrix. A contact state is therefore identified by the kinds of force that its springs have; where
+the machine would stand still follows from the gaps on the engaged sides.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ from flipflow.errors import InputError
 from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 
 NEARLY_DEFECTIVE = 1e6  # condition of the basis of eigenvectors from which it has lost six digits
-NUDGE, MOST_NUDGES = 1e-10, 3  # relative change of damping that splits a double eigenvalue
-MOST_STATES = 2**12
+NUDGE = 1e-10  # relative change of damping that splits a double eigenvalue
+MOST_NUDGES = 3  # such changes tried, each larger by one nudge
+MOST_STATES = 2**12  # contact states for which tables are kept
 MOST_BYTES = 2**32  # of tables, of which only what is met is ever touched
 
 
@@ -111,8 +112,8 @@ def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
 def prepare(machine: MachineArrays, modes: Modes, number: int) -> int:
     """Fill the tables of one contact state; returns a status.
 
-    Exactly critical damping has no full set of eigenvectors; a damping changed in its tenth digit
-    has one, and costs less than the digits a defective basis would.
+    With exactly critical damping there is no full set of eigenvectors. A change of the damping in
+    its tenth digit gives one, and loses fewer digits than a defective basis would.
     """
     modes.ready[number] = -1
     for nudge in range(MOST_NUDGES + 1):
@@ -236,7 +237,7 @@ def _inverted(modes: Modes, number: int) -> float:
 
 @kernel
 def _seen_from_outside(machine: MachineArrays, modes: Modes, number: int) -> None:
-    """What the modes take up from the exciter and the gaps, and show at the gaps."""
+    """How the exciter and the gaps act on the modes, and how the modes move the gaps."""
     m, n = machine.direction.shape
     for i in range(modes.mode_count[number]):
         force = 0j

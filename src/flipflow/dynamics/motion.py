@@ -24,7 +24,7 @@ from flipflow.model.contact_law import engaged_side
 from flipflow.model.system import MechanicalSystem
 
 TIMES = "give finite times in s"
-MOST_SAMPLES = 10_000_000
+MOST_SAMPLES = 10_000_000  # times in a grid over one period
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class Motion:
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""
         found: list[ContactInterval] = []
-        # Where a piece ends the next one starts, to the last digit: touches are joined by it.
+        # A piece ends where the next one starts, to the last digit: so touches can be joined.
         ends = np.concatenate([self.start[1:], self.start[-1:] + self.length[-1:]])
         for j, spring in enumerate(self.system.springs):
             side = engaged_side(spring.law, self.regime[:, j])

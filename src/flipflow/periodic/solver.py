@@ -1,4 +1,4 @@
-"""What the two solvers of periodic motions share: the branch trace and what is read off points."""
+"""What the solvers of periodic motions share: the branch trace and what is read off points."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from flipflow.periodic.observe import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 
 STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size
-POINTS_MOST = 20_000  # of one branch; a few hundred are usual
+POINTS_MOST = 20_000  # that one branch can record; a few hundred are usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class Traced:
         ends = (status.REACHED_UPPER, status.REACHED_LOWER, status.FOLLOWED)
         code = self.code if self.code not in ends else ahead.code
         code = status.FOLLOWED if code in ends else code
-        # What is told of a step stands at its end, which is its other point when read backwards.
+        # Counts and reasons of a step stand at its end: read backwards, at its other point.
         none = np.zeros(1, np.int64)
         rejected, reason = (
             np.concatenate([none, mine[turned], its[1:]])
@@ -136,7 +136,7 @@ class Formulation:
     options: tuple[float, ...] = ()
 
     def solver(self) -> Solver:
-        """A solver of its own for whoever asks."""
+        """A new solver, with scratch that no other caller uses."""
         return self.kind(self.system, *self.options, half_turn=self.half_turn, turns=self.turns)
 
 
@@ -276,13 +276,6 @@ class Solver(ABC):
             self.problem, self.scratch, self.corrector, record, u, omega, course, p, *shares, test
         )
 
-    def trace_through(self, u: Real, omega: float, course: arclength.Course) -> Traced:
-        """Follow the branch from (u, omega) both ways, in rising omega at the start."""
-        ahead = self.trace(u, omega, course._replace(direction=1.0))
-        if ahead.code == status.CLOSED or ahead.omega.size == 0:
-            return ahead
-        return self.trace(u, omega, course._replace(direction=-1.0)).reversed_into(ahead)
-
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
         return self.zero_between(traced, FOLD, p, share, share)[1]
@@ -348,7 +341,7 @@ class Solver(ABC):
         One Newton step of the exact flow corrects the state by delta = (I - M)^-1 (flow(z) - z);
         the largest difference of any displacement over the turn between the corrected flow and
         the motion is the estimate. Where a second step does not shrink, as close to a fold,
-        nothing is promised.
+        there is no estimate.
         """
         harmonics, series = self.series(u, omega)
         states = self.states(u, omega)

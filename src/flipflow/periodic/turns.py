@@ -1,4 +1,4 @@
-"""Many motions of one machine, turn after turn: the only loops over lanes."""
+"""Many motions (lanes) of one machine, run turn after turn until a known motion catches them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flipflow.compiled.compile import kernel
 from flipflow.dynamics.flow import run_flow
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
-NOT_SETTLED = -1
+NOT_SETTLED = -1  # label of a lane that nothing has caught
 
 
 @kernel

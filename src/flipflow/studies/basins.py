@@ -24,7 +24,7 @@ from flipflow.periodic.turns import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
 Int = NDArray[np.int64]
-NORMAL_95 = 1.959963984540054
+NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +129,9 @@ class Basins:
 
 Window = Mapping[Coordinate, ArrayLike]
 Kind = Literal["displacement", "velocity"]
-MOST_CELLS = 4_000_000
-MOST_TURNS = 1_000_000
-INDEPENDENT = 1e-9
+MOST_CELLS = 4_000_000  # cells of a grid
+MOST_TURNS = 1_000_000  # forcing periods that a cell may be asked to run
+INDEPENDENT = 1e-9  # singular value above which unit rows count as independent
 UNITS = {"displacement": "m", "velocity": "m/s"}
 
 

@@ -22,9 +22,9 @@ from flipflow.studies.blows import Blows
 from flipflow.transient.settle import is_stable
 
 Real = NDArray[np.float64]
-PHASES = 60
-LONE_STRIDE = 6
-MOST_IMPULSE = 1e9
+PHASES = 60  # in each forcing period at which blows fall
+LONE_STRIDE = 6  # every so many phases serve where no other motion is known
+MOST_IMPULSE = 1e9  # kg m/s, largest impulse that may be asked for
 NO_OTHER = "No other motion found: it cannot jump."
 
 

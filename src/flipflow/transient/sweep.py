@@ -138,8 +138,8 @@ class Sweep:
         return {}
 
 
-MAX_PERIODS = 6
-JUMP_SHARE = 0.05
+MAX_PERIODS = 6  # longest period looked for, in forcing periods, unless told otherwise
+JUMP_SHARE = 0.05  # distance, relative to the motion, beyond which it is another one: a jump
 
 
 def sweep(
@@ -195,7 +195,7 @@ def sweep(
     rows: list[Settled] = []
     jumps: list[Jump] = []
     for k, speed in enumerate(speeds):
-        row = settling.settle(z, float(speed), most=most_turns)
+        row = settling.settle(z, float(speed), most_turns)
         if rows and _jumped(settling, rows[-1], row, float(speed)):
             jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
         rows.append(_kept(row))
