@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -133,6 +134,12 @@ class Branch:
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
         return self.formulation.system
+
+    @property
+    def solver(self) -> object:
+        """A solver of the branch's equations, made anew; use ``formulation.solver()``."""
+        warnings.warn("Branch.solver: use Branch.formulation.solver()", DeprecationWarning, 2)
+        return self.formulation.solver()
 
     @property
     def periods(self) -> int:

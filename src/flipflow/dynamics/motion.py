@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,50 +79,11 @@ class Motion:
     harmonic: Complex
     order: Real
 
-    @classmethod
-    def of_flow(cls, system: MechanicalSystem, flow: Flow, omega: float, period: float) -> Self:
-        """The motion that the exact flow has recorded."""
-        e, n = int(flow.segments[0]), system.size
-        slot, modes = flow.slot[:e], flow.modes
-        shape = modes.weight[slot][:, None, :] * modes.right[slot, :n]
-        return cls(
-            system=system,
-            omega=omega,
-            period=period,
-            start=flow.start[:e].copy(),
-            length=flow.length[:e].copy(),
-            regime=flow.regimes[:e].copy(),
-            offset=flow.rest[:e].copy(),
-            amplitude=shape * flow.q[:e, None, :],
-            rate=modes.rate[slot],
-            harmonic=flow.drive[slot, :n][:, :, None],
-            order=np.ones(1),
-        )
-
-    @classmethod
-    def of_series(
-        cls,
-        system: MechanicalSystem,
-        flow: Flow,
-        omega: float,
-        order: Int,
-        series: Complex,
-    ) -> Self:
-        """A Fourier series (n_h, N) with the contacts that were recorded along it."""
-        e, n = int(flow.segments[0]), system.size
-        return cls(
-            system=system,
-            omega=omega,
-            period=2.0 * np.pi / omega,
-            start=flow.start[:e].copy(),
-            length=flow.length[:e].copy(),
-            regime=flow.regimes[:e].copy(),
-            offset=np.zeros((e, n)),
-            amplitude=np.zeros((e, n, 0), np.complex128),
-            rate=np.zeros((e, 0), np.complex128),
-            harmonic=np.repeat(series.T[None], e, axis=0),
-            order=order.astype(float),
-        )
+    @property
+    def pieces(self) -> Motion:
+        """The motion itself, which holds start, length and regime of its pieces."""
+        warnings.warn("Motion.pieces: start, length, regime stand in Motion", DeprecationWarning, 2)
+        return self
 
     def derivative(self, t: ArrayLike, order: int) -> Real:
         """x, x' or x'' (order 0, 1, 2) at times t, shape (..., N)."""
@@ -166,7 +127,10 @@ class Motion:
 
     def extremes(self, coordinates: Real) -> tuple[Real, Real, Complex]:
         """Least and greatest value and first harmonic, (G,) each, of coordinates (G, N)."""
-        seen = np.ascontiguousarray(coordinates, dtype=float)
+        remedy = f"give vectors of {self.system.size} finite numbers, one a row"
+        seen = np.ascontiguousarray(checked_numbers("coordinates", coordinates, remedy))
+        if seen.ndim != 2 or seen.shape[1] != self.system.size:
+            raise InputError("coordinates", coordinates, remedy)
         rates = self.rate.shape[1] + self.order.size
         scratch = new_gap_motion(seen.shape[0], np.zeros(rates, np.complex128))
         low, high = np.full(seen.shape[0], np.inf), np.full(seen.shape[0], -np.inf)
@@ -199,6 +163,50 @@ class Motion:
             side = engaged_side(spring.law, self.regime[:, j])
             found += _joined(j, side, self.start, ends, self.period)
         return tuple(sorted(found, key=lambda interval: interval.start))
+
+
+def motion_of_flow(system: MechanicalSystem, flow: Flow, omega: float, period: float) -> Motion:
+    """The motion that the exact flow has recorded."""
+    e, n = int(flow.segments[0]), system.size
+    slot, modes = flow.slot[:e], flow.modes
+    shape = modes.weight[slot][:, None, :] * modes.right[slot, :n]
+    return Motion(
+        system=system,
+        omega=omega,
+        period=period,
+        start=flow.start[:e].copy(),
+        length=flow.length[:e].copy(),
+        regime=flow.regimes[:e].copy(),
+        offset=flow.rest[:e].copy(),
+        amplitude=shape * flow.q[:e, None, :],
+        rate=modes.rate[slot],
+        harmonic=flow.drive[slot, :n][:, :, None],
+        order=np.ones(1),
+    )
+
+
+def motion_of_series(
+    system: MechanicalSystem,
+    flow: Flow,
+    omega: float,
+    order: Int,
+    series: Complex,
+) -> Motion:
+    """A Fourier series (n_h, N) with the contacts that were recorded along it."""
+    e, n = int(flow.segments[0]), system.size
+    return Motion(
+        system=system,
+        omega=omega,
+        period=2.0 * np.pi / omega,
+        start=flow.start[:e].copy(),
+        length=flow.length[:e].copy(),
+        regime=flow.regimes[:e].copy(),
+        offset=np.zeros((e, n)),
+        amplitude=np.zeros((e, n, 0), np.complex128),
+        rate=np.zeros((e, 0), np.complex128),
+        harmonic=np.repeat(series.T[None], e, axis=0),
+        order=order.astype(float),
+    )
 
 
 def _joined(

@@ -8,7 +8,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.motion import Motion
+from flipflow.dynamics.motion import Motion, motion_of_series
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import describe_balance, describe_sampled, observe_series
 from flipflow.periodic.sampled import Sampled, SampledWork, new_sampled, new_sampled_work
@@ -123,7 +123,7 @@ class BalanceSolver(Solver):
 
     def motion(self, u: Real, omega: float) -> Motion:
         series = self._read_off(u[None], np.array([omega]), whole_turn=True)
-        return Motion.of_series(self.system, self.flow, omega, self.harmonics, series[0])
+        return motion_of_series(self.system, self.flow, omega, self.harmonics, series[0])
 
     def unknowns_from(self, motion: Motion) -> Real:
         count = 16 * (self.order + 1)

@@ -10,7 +10,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.motion import Motion
+from flipflow.dynamics.motion import Motion, motion_of_flow
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import observe_flow
@@ -108,7 +108,7 @@ class ExactSolver(Solver):
         if np.isnan(low).any():
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
         period = 2.0 * np.pi / omega * self.whole.fraction
-        return Motion.of_flow(self.system, self.flow, omega, period)
+        return motion_of_flow(self.system, self.flow, omega, period)
 
     def _observe(
         self,
