@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.dynamics.machine import machine_arrays
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.sampled import new_sampled, new_sampled_work
 from flipflow.periodic.series import new_balance, new_balance_work

@@ -7,7 +7,7 @@ import pytest
 
 import flipflow as ff
 import kernel_calls
-from flipflow.dynamics.machine import machine_arrays
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.periodic.two_event import TwoEventProblem
 
 pytestmark = pytest.mark.numerical

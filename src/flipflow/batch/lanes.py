@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
-from flipflow.dynamics.machine import machine_arrays
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import new_shooting, new_shooting_work

@@ -314,6 +314,68 @@ def _stationary_value(
     return y
 
 
+@kernel(entry=True)
+def observe_motion(
+    start: Real,
+    length: Real,
+    offset: Real,
+    amplitude: Complex,
+    rate: Complex,
+    harmonic: Complex,
+    order: Real,
+    omega: float,
+    motion: GapMotion,
+    low: Real,
+    high: Real,
+    first: Complex,
+) -> None:
+    """Extremes of G coordinates over all pieces, and int y exp(-i omega t) dt.
+
+    Offsets are (G, E), amplitudes (G, E, R) and harmonics (G, E, H) seen in the coordinates.
+    """
+    modes, count = rate.shape[1], rate.shape[1] + order.shape[0]
+    for e in range(start.shape[0]):
+        for i in range(modes):
+            motion.rate[i] = rate[e, i]
+        for h in range(order.shape[0]):
+            motion.rate[modes + h] = 1j * (order[h] * omega)
+        for g in range(low.shape[0]):
+            motion.offset[g] = offset[g, e]
+            for i in range(modes):
+                motion.amplitude[g, i] = amplitude[g, e, i]
+            for h in range(order.shape[0]):
+                turn = exponential(1j * (order[h] * omega * start[e]))
+                motion.amplitude[g, modes + h] = harmonic[g, e, h] * turn
+        prepare_search(motion, count)
+        for g in range(low.shape[0]):
+            least, most = extremes(motion, count, g, length[e])
+            low[g], high[g] = min(low[g], least), max(high[g], most)
+            first[g] += first_harmonic(motion, count, g, start[e], length[e], omega)
+
+
+@kernel(inline=True)
+def first_harmonic(
+    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
+) -> complex:
+    """int y exp(-i omega t) dt over one piece, in closed form."""
+    turn = exponential(-1j * omega * start)
+    total = motion.offset[g] * _integral_of_exponential(-1j * omega, length)
+    for i in range(count):
+        amplitude = motion.amplitude[g, i]
+        total += 0.5 * amplitude * _integral_of_exponential(motion.rate[i] - 1j * omega, length)
+        conjugate = motion.rate[i].conjugate() - 1j * omega
+        total += 0.5 * amplitude.conjugate() * _integral_of_exponential(conjugate, length)
+    return total * turn
+
+
+@kernel
+def _integral_of_exponential(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt."""
+    if abs(rate) * length < 1e-9:
+        return length * (1.0 + 0.5 * rate * length)
+    return (exponential(rate * length) - 1.0) / rate
+
+
 def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:
     """Scratch for a sum of exponentials at some gaps or coordinates."""
     shape = (gaps, rates.size)

@@ -8,9 +8,14 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
-from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
+from flipflow.dynamics.contact_search import (
+    GapMotion,
+    exponential,
+    extremes,
+    first_harmonic,
+    prepare_search,
+)
 from flipflow.dynamics.flow import run_flow, segment_motion, segment_state
-from flipflow.dynamics.motion import first_harmonic
 from flipflow.periodic.balance import contact_forces, prepare_receptance
 from flipflow.periodic.sampled import Sampled, SampledWork, sampled_forces
 from flipflow.periodic.series import (

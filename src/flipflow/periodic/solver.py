@@ -15,8 +15,9 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import arclength
 from flipflow.continuation.follow import FOLD, TRACE_ALL, follow
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.machine import MachineArrays, machine_arrays
+from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem

@@ -15,7 +15,7 @@ a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting must confirm each zero.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,9 @@ from flipflow.dynamics.contact_search import exponential
 from flipflow.dynamics.flow import Flow, new_flow, prepare_drive, run_flow
 from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, prepare
-from flipflow.model.system import MechanicalSystem
+
+if TYPE_CHECKING:
+    from flipflow.model.system import MechanicalSystem
 
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual

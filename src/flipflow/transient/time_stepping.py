@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.dynamics.machine import stops_of
+from flipflow.dynamics.assembly import stops_of
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_number, checked_positive, checked_word
 from flipflow.model.contact_law import stored_energy
