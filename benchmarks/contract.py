@@ -38,7 +38,7 @@ def summit(branch, fold):
     index = int(fold.position)
     share = fold.position - index
     before, after = (
-        branch.solver.between(branch.traced, index, share + sign * SHARE).omega
+        branch.formulation.solver().between(branch.traced, index, share + sign * SHARE).omega
         for sign in (-1.0, 1.0)
     )
     bend = before - 2.0 * fold.omega + after

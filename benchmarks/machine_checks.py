@@ -27,7 +27,7 @@ def examine(seed, number, harmonics=HARMONICS):
         "interval": [round(omega, 3) for omega in interval],
         "exact": branch_record(exact),
         "balance": branch_record(balance),
-        "errors": compare(balance, exact.solver),
+        "errors": compare(balance, exact.formulation.solver()),
         "special": compare_special(screen, exact, balance),
     }
     return record | {"seconds": round(time.perf_counter() - begin, 3)}
@@ -52,8 +52,8 @@ def branch_record(branch):
 def compare(balance, exact_solver):
     """Stated against true error of the series, at the same omega and the same motion."""
     stated, omega = balance.error, balance.omega
-    states = balance.solver.states(balance.traced.u, omega)
-    harmonics, series = balance.solver.series(balance.traced.u, omega)
+    states = balance.formulation.solver().states(balance.traced.u, omega)
+    harmonics, series = balance.formulation.solver().series(balance.traced.u, omega)
     theta = 2.0 * np.pi * np.arange(GRID) / GRID
     basis = np.exp(1j * np.outer(harmonics, theta))
     true = np.full(omega.size, np.inf)
@@ -99,7 +99,7 @@ def compare_special(screen, exact, balance):
     for method, other in (("exact", "balance"), ("balance", "exact")):
         ours = points[method]
         partner = partners(ours, points[other])
-        beside = Beside(screen, branches[method], exact.solver)
+        beside = Beside(screen, branches[method], exact.formulation.solver())
         apart = nearest_neighbours(ours)
         for i, point in enumerate(ours):
             reason = independent(beside, point, apart[i])

@@ -35,18 +35,20 @@ class Beside:
     def __init__(self, screen, branch, exact_solver):
         self.screen, self.branch, self.exact = screen, branch, exact_solver
         self.full = ExactSolver(screen.system(), half_turn=False)
-        self.is_exact = isinstance(branch.solver, ExactSolver)
+        self.is_exact = branch.formulation.kind is ExactSolver
 
     def at(self, position):
         """State and omega of the exact motion at a position along the branch; None if none."""
         index = min(max(int(position), 0), self.branch.omega.size - 2)
         try:
-            point = self.branch.solver.between(self.branch.traced, index, position - index)
+            solver = self.branch.formulation.solver()
+            point = solver.between(self.branch.traced, index, position - index)
         except IncompleteError:
             return None
         if self.is_exact:
             return point.u, point.omega
-        state = self.branch.solver.states(point.u[None], np.array([point.omega]))[0]
+        at = point.u[None], np.array([point.omega])
+        state = self.branch.formulation.solver().states(*at)[0]
         reached = self.exact.solve(state, point.omega)
         return None if reached is None else (reached.u, point.omega)
 

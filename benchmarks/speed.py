@@ -61,7 +61,7 @@ def response(machine, method, target, runs):
     if isinstance(method, ff.PiecewiseExact):
         found = [fold.omega for fold in branch.folds]
         assert np.allclose(found, EXACT_FOLDS, rtol=0.0, atol=FOLD_TOLERANCE), found
-    solver, traced = branch.solver, branch.traced
+    solver, traced = branch.formulation.solver(), branch.traced
     row = timed(lambda: ff.frequency_response(machine, INTERVAL, method), runs)
     error = timed(lambda: solver.errors(traced.u, traced.omega), runs)
     return row | {

@@ -48,7 +48,7 @@ def peer(screen, up):
         end = carried(system, begin, float(SPEEDS[k]), count, RTOL, ATOL)
         seconds += time.perf_counter() - start
         turns += count
-        ours = up.solver.section(begin, float(SPEEDS[k]), count)[-1]
+        ours = up.formulation.solver().section(begin, float(SPEEDS[k]), count)[-1]
         away = max(away, float(np.abs(end[:2] - ours[:2]).max()))
     return {"seconds_a_turn": seconds / turns, "turns": turns, "largest_difference_m": away}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import signal
 import sys
 from collections.abc import Callable
 
@@ -14,6 +15,20 @@ from flipflow.continuation.branch import Branch
 from flipflow.paper.reproduce import Reproduction
 
 LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
+
+
+def pytest_configure() -> None:
+    """A shell ignores Ctrl-C in what it runs in the background, and so would all that we start."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Tests of a file stay on one process: what they share is then made once."""
+    from xdist.scheduler import LoadFileScheduling  # noqa: PLC0415  only with pytest-xdist
+
+    return LoadFileScheduling(config, log)
 
 
 @pytest.fixture(scope="session")

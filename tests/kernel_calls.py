@@ -12,6 +12,7 @@ from flipflow.dynamics.flow import saltation
 from flipflow.periodic.balance import balance_residual
 from flipflow.periodic.sampled import sampled_residual
 from flipflow.periodic.shooting import shooting_residual
+from flipflow.periodic.two_event import force_excess
 
 
 @kernel(entry=True)
@@ -52,6 +53,12 @@ def balance(problem, work, u, omega, r, J):
 def sampled(problem, work, u, omega, r, J):
     """``sampled_residual``."""
     return sampled_residual(problem, work, u, omega, r, J)
+
+
+@kernel(entry=True)
+def excess(machine, work, omega, share):
+    """``force_excess``."""
+    return force_excess(machine, work, omega, share)
 
 
 @kernel(entry=True)

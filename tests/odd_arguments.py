@@ -35,7 +35,7 @@ from flipflow.model.arguments import members_of
 from flipflow.model.project import Document
 from flipflow.paper.reproduce import Reproduction
 from flipflow.periodic.orbit import Orbit
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins, GridAxis
 from flipflow.studies.jump_risk import JumpRisk

@@ -49,7 +49,7 @@ def test_folder_holds_report_and_data(analyzed):
 
 
 def test_data_agree_with_each_other(analyzed):
-    """The folds of the empty machine (row 7) in JSON; as many points in NetCDF as in CSV."""
+    """The exact folds of the empty machine in JSON; as many points in NetCDF as in CSV."""
     _, folder = analyzed
     document = json.loads((folder / "results.json").read_text())
     assert document["schema"] == "flipflow/assessment/1"
@@ -127,7 +127,7 @@ def test_no_damping_at_all_is_refused_with_the_reason(monkeypatch, capsys, tmp_p
 
 
 def test_harmonic_balance_of_the_paper_on_request(monkeypatch, capsys, tmp_path):
-    """Third order lies within 2e-3 of its folds in the table (row 8)."""
+    """Third order lies within 2e-3 rad/s of the reference values of its own folds."""
     words = ("--harmonics", "3", "-o", tmp_path / "out", "--json", "-")
     assert run(monkeypatch, "analyze", "ffs0827", *words) == 0
     region = json.loads(capsys.readouterr().out)["region"]

@@ -13,6 +13,8 @@ from flipflow.report.blocks import FigureBlock, Heading, Text
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def project():

@@ -10,6 +10,7 @@ from flipflow.errors import Cancelled, InputError
 from flipflow.periodic.exact_solver import ExactSolver
 from settling import settled_on
 
+pytestmark = pytest.mark.numerical
 OMEGA = 203.0
 X = np.linspace(-0.08, 0.08, 41)
 V = np.linspace(-16.0, 16.0, 41)
@@ -21,7 +22,7 @@ def found(screen):
 
 
 def test_two_stable_motions_coexist_between_the_folds(found):
-    """Between the folds (rows 7 and 20) there are exactly two: about 40 mm, and the small one."""
+    """Between the folds there are exactly two: about 40 mm, and the small one."""
     assert len(found.orbits) == 2
     large, small = (orbit.amplitude("relative") for orbit in found.orbits)
     assert large == pytest.approx(39.2e-3, abs=0.1e-3)
@@ -58,7 +59,7 @@ def test_result_does_not_depend_on_threads_or_chunks(screen, found):
 
 
 def test_mirrored_motions_are_distinct():
-    """e = 2 mm at 57.7 rad/s (row 25): a motion and its mirror, whose basins mirror each other."""
+    """e = 2 mm at 57.7 rad/s: a motion and its mirror, whose basins mirror each other."""
     screen = ff.load("ffs0827").replace(clearance=2e-3)
     x = np.linspace(-5e-3, 5e-3, 11)
     here = ff.basins(screen, 57.7, {"relative": x}, {"relative": [0.0]})

@@ -9,6 +9,7 @@ import flipflow as ff
 from judge import GAP, close
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 MASSES = 20
 MASS, STIFFNESS, DAMPING = 50.0, 2.0e6, 1.5e3
 INTERVAL = (15.0, 45.0)

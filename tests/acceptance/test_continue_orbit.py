@@ -1,7 +1,8 @@
 """Any periodic motion followed over frequency or over a field, and branches switched to.
 
-Rows 19, 24 and 25 of the trusted values; the rest is judged by other routes: the branch from
-below, the folds of a machine made with the value found, and DOP853 that knows nothing of kernels.
+Cusps, the two-mass chain and leaning motions have reference values (see tests/reference). The
+rest is judged by other routes: the branch from below, the folds of a machine made with the value
+found, and DOP853 that knows nothing of kernels.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from flipflow.periodic.orbit import Orbit
 from judge import close, kinds, minmax
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 WINDOW_2MM = (56.9837, 58.4409)
 LEANING_2MM = (2.024274e-3, -2.130097e-3)
 CUSPS = {"stop_stiffness": (5.8231e6, 185.618), "clearance": (5.3021e-3, 210.416)}
@@ -39,7 +41,7 @@ def chain() -> ff.MechanicalSystem:
 
 @pytest.fixture(scope="module")
 def doubled(chain):
-    """The branch of two periods, switched to at the first period doubling of row 24."""
+    """The branch of two periods, switched to at the first period doubling of the two-mass chain."""
     one = ff.frequency_response(chain, (0.5, 0.8))
     return ff.switch_branch(one.points_of("period doubling")[0], (0.5, 0.8))
 
@@ -62,8 +64,8 @@ def subharmonic(screen) -> Orbit:
     pytest.fail("no motion of three periods at 440 rad/s")
 
 
-def test_row_25_leaning_motions_are_switched_to(leaning) -> None:
-    """Row 25: from either end of the window to the other; 1e-3 rad/s, 1e-4 mm."""
+def test_leaning_motions_are_switched_to(leaning) -> None:
+    """From either end of the window without symmetry to the other; 1e-3 rad/s, 1e-4 mm."""
     for branch, (first, last) in zip(leaning, (WINDOW_2MM, WINDOW_2MM[::-1]), strict=True):
         assert branch.status.complete, branch.status.value
         ends = [point.omega for point in branch.points_of("symmetry breaking")]
@@ -88,8 +90,8 @@ def test_a_leaning_motion_is_followed_to_both_ends_of_the_window(leaning) -> Non
     close("points reach them", branch.omega[[0, -1]], WINDOW_2MM, abs=2e-3)
 
 
-def test_row_24_period_two_is_switched_to(doubled) -> None:
-    """Row 24: the branch begins between 0.73 and 0.74, has a fold of its own and ends in 0.7556."""
+def test_period_two_is_switched_to(doubled) -> None:
+    """It begins between 0.73 and 0.74 rad/s, has a fold of its own and ends in 0.7556."""
     assert doubled.periods == 2
     assert doubled.status.complete
     assert kinds(doubled) == ["period doubling", "fold", "period doubling"]
@@ -102,7 +104,7 @@ def test_row_24_period_two_is_switched_to(doubled) -> None:
 
 
 @pytest.mark.parametrize("omega", [0.742, 0.748, 0.7545])
-def test_row_24_period_two_is_what_the_machine_does(chain, doubled, omega: float) -> None:
+def test_period_two_is_what_the_machine_does(chain, doubled, omega: float) -> None:
     """DOP853, 150 turns from the motion pushed by 1e-4: it comes back, after two turns not one."""
     orbit = doubled.orbits_at(omega)[0]
     assert orbit.stable
@@ -185,8 +187,8 @@ def test_leaning_motions_over_the_clearance(leaning, response) -> None:
 
 
 @pytest.mark.parametrize("field", ["clearance", "stop_stiffness"])
-def test_row_19_fold_curves_meet_in_the_cusp(exact, field: str) -> None:
-    """Row 19: from either fold through the cusp to the other; 1e-3 of the value."""
+def test_fold_curves_meet_in_the_cusp(exact, field: str) -> None:
+    """From either fold through the cusp to the other; 1e-3 of the value."""
     ends = []
     for fold in exact.folds:
         curve = ff.continue_fold(fold, field, INTERVALS[field])
@@ -201,8 +203,8 @@ def test_row_19_fold_curves_meet_in_the_cusp(exact, field: str) -> None:
     close("the same curve from both folds", ends[0], ends[1], abs=1e-6)
 
 
-def test_row_18_folds_lie_on_the_fold_curve(exact) -> None:
-    """Row 18: at e = 8 mm folds at 198.64747 and 164.12941 rad/s, 1e-4."""
+def test_folds_lie_on_the_fold_curve(exact) -> None:
+    """Reference values: at e = 8 mm folds at 198.64747 and 164.12941 rad/s, 1e-4."""
     curve = ff.continue_fold(exact.folds[0], "clearance", (2e-3, 8e-3))
     close("folds", sorted(curve.omega[[0, -1]]), [164.12941, 198.64747], abs=1e-4)
 

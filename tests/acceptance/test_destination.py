@@ -197,7 +197,7 @@ def test_ctrl_c_while_files_are_written_says_what_is_there(command, monkeypatch)
     def pressed(_figure, _path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flipflow.plotting.parts.Figure.write", pressed)
+    monkeypatch.setattr("flipflow.plotting.figure.Figure.write", pressed)
     code, _, err = command("sensitivity", *QUICK["sensitivity"], "-o", "out")
     assert code == 130
     assert err == "Stopped by the user; what was finished is in out.\n"

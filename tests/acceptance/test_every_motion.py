@@ -12,6 +12,8 @@ import flipflow as ff
 from flipflow.errors import IncompleteError
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def screen() -> ff.FlipFlowScreen:
@@ -20,7 +22,7 @@ def screen() -> ff.FlipFlowScreen:
 
 @pytest.mark.parametrize("max_periods", [1, 6])
 def test_203_has_three_motions_one_unstable(screen, max_periods) -> None:
-    """Must show 4: all three motions at 203 rad/s."""
+    """Between the folds, at 203 rad/s, there are three motions; the middle one is unstable."""
     orbits = ff.periodic_orbits(screen, 203.0, max_periods)
     assert [orbit.stability for orbit in orbits] == ["stable", "unstable", "stable"]
     assert {orbit.periods for orbit in orbits} == {1}
@@ -28,7 +30,7 @@ def test_203_has_three_motions_one_unstable(screen, max_periods) -> None:
 
 @pytest.mark.parametrize("omega", [20.0, 70.0, 110.0, 150.0, 190.0, 198.0, 207.0, 220.0])
 def test_nothing_that_is_not_there(screen, omega) -> None:
-    """Row 20: one motion outside the folds, no subharmonic, none that leans."""
+    """One motion outside the folds, no subharmonic, none that leans."""
     orbits = ff.periodic_orbits(screen, omega, 6)
     assert len(orbits) == 1
     assert orbits[0].periods == 1
@@ -36,7 +38,7 @@ def test_nothing_that_is_not_there(screen, omega) -> None:
 
 
 def test_leaning_motions_come_with_their_mirrors(screen) -> None:
-    """Row 25: e = 2 mm at 57.7 rad/s."""
+    """e = 2 mm at 57.7 rad/s, where the symmetric motion is unstable."""
     leaning = screen.replace(clearance=2e-3)
     stable = [o for o in ff.periodic_orbits(leaning, 57.7, 2) if o.stable]
     ends = sorted(
@@ -49,7 +51,7 @@ def test_leaning_motions_come_with_their_mirrors(screen) -> None:
 
 
 def test_motions_of_several_periods_far_above_the_resonance(screen) -> None:
-    """Must show 4: from 350 to 541 rad/s there are motions of three periods; as DOP853 says."""
+    """From 350 to 541 rad/s there are motions of three periods; as DOP853 says."""
     machine = integrate.Machine.of(screen.system())
     orbits = ff.periodic_orbits(screen, 450.0, 3)
     several = [orbit for orbit in orbits if orbit.periods == 3]

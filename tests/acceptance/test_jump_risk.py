@@ -11,6 +11,7 @@ from flipflow.errors import InputError
 from flipflow.periodic.exact_solver import ExactSolver
 from settling import settled_on
 
+pytestmark = pytest.mark.numerical
 OMEGA = 203.0
 
 

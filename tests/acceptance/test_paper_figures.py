@@ -1,7 +1,8 @@
 """Sobol indices, the smooth law, sweeps and the rig: figures 1, 3, 5 to 7, 9 to 11 of the paper.
 
-Published numbers: Lin et al., Minerals 2024, 14, 406. Folds are rows 7 of the trusted values; the
-rest of the tolerances is the paper's reading accuracy, 2 or 3 %, unless a test says otherwise.
+Published numbers: Lin et al., Minerals 2024, 14, 406. Folds are the reference values of
+tests/reference; the other tolerances are the paper's reading accuracy, 2 or 3 %, unless a test says
+otherwise.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from flipflow.errors import InputError
 from flipflow.plotting.drawing import Drawing
 from judge import close
 from reference import integrate
+
+pytestmark = pytest.mark.numerical
 
 FOLD_UP, FOLD_DOWN = 206.405559, 198.649272
 
@@ -77,7 +80,7 @@ def test_runge_kutta_sweeps_jump_at_the_folds(reproduction, way, fold) -> None:
 @pytest.mark.parametrize("which", ["main frame (x1)", "relative (x2)"])
 @pytest.mark.parametrize("way", ["rising", "falling"])
 def test_harmonic_balance_is_within_a_per_cent_of_runge_kutta(reproduction, which, way) -> None:
-    """Row 6: 0.6 % of the relative amplitude; fixed steps of RK4 cost less than 0.1 %."""
+    """0.6 % of the relative amplitude; fixed steps of RK4 cost less than 0.1 %."""
     most = 1.05 if "main" in which else 0.65
     assert value(reproduction, "N1", f"greatest difference, {which}, speed {way}") < most
     assert value(reproduction, "N1", f"Runge-Kutta against exact sweep, {which}, speed {way}") < 0.1

@@ -1,4 +1,4 @@
-"""Row 24: a public case of another code, through the same solvers as the screen.
+"""A public case, example 03 of the code NLvib, through the same solvers as the screen.
 
 Two masses of 1, springs none, 1, 1 and dampers 0.03 times the springs, a stop of stiffness 100
 on mass 1 beyond x1 = 1, force 0.1 cos(w t) on mass 2. Shooting is exact and checked by
@@ -14,6 +14,7 @@ import flipflow as ff
 from judge import close
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 INTERVAL = (0.5, 0.8)
 SPEEDS = (0.55, 0.6, 0.635, 0.66, 0.7, 0.72, 0.735, 0.75, 0.755, 0.78)
 
@@ -39,8 +40,8 @@ def omegas(branch, kind: str) -> list[float]:
     return [point.omega for point in branch.points_of(kind)]
 
 
-def test_row_24_kinds_of_special_points(shooting, balance) -> None:
-    """Row 24: turning points, period doubling and Neimark-Sacker points appear, by both methods."""
+def test_kinds_of_special_points(shooting, balance) -> None:
+    """Turning points, period doubling and Neimark-Sacker points appear, by both methods."""
     for branch in (shooting, balance):
         assert branch.status.complete, branch.status.value
         assert branch.notes == ()
@@ -48,8 +49,8 @@ def test_row_24_kinds_of_special_points(shooting, balance) -> None:
         assert {"fold", "period doubling", "Neimark-Sacker"} <= found, found
 
 
-def test_row_24_where_motions_change(shooting) -> None:
-    """Row 24, with its own speeds.
+def test_where_motions_change(shooting) -> None:
+    """What changes at which speed, in rad/s.
 
     0.635 is stable, 0.600 beyond a Neimark-Sacker point; the upper branch doubles its period
     between 0.73 and 0.74 and ends between 0.75 and 0.76.
@@ -68,8 +69,8 @@ def test_row_24_where_motions_change(shooting) -> None:
     assert 0.75 < end < 0.76, f"upper branch ends at {end}, expected in (0.75, 0.76)"
 
 
-def test_row_24_no_motion_of_one_period_is_stable_at_0_600(chain, shooting) -> None:
-    """Row 24: at 0.600 DOP853 does not come to rest in period one, at 0.635 it does.
+def test_no_motion_of_one_period_is_stable_at_0_600(chain, shooting) -> None:
+    """At 0.600 DOP853 does not come to rest in period one, at 0.635 it does.
 
     120 turns from the motion itself, slightly pushed; the distance between successive turns.
     """
@@ -84,7 +85,7 @@ def test_row_24_no_motion_of_one_period_is_stable_at_0_600(chain, shooting) -> N
 
 
 @pytest.mark.parametrize("omega", SPEEDS)
-def test_row_24_shooting_is_exact(chain, shooting, omega: float) -> None:
+def test_shooting_is_exact(chain, shooting, omega: float) -> None:
     """DOP853 started on each motion, stable or not, comes back to 1e-8 of its amplitude."""
     reference = integrate.Machine.of(chain)
     for orbit in shooting.orbits_at(omega):
@@ -93,7 +94,7 @@ def test_row_24_shooting_is_exact(chain, shooting, omega: float) -> None:
 
 
 @pytest.mark.parametrize("omega", SPEEDS)
-def test_row_24_harmonic_balance_agrees_with_shooting(shooting, balance, omega: float) -> None:
+def test_harmonic_balance_agrees_with_shooting(shooting, balance, omega: float) -> None:
     """As many motions, amplitudes within the stated error and within 2e-3 of their size.
 
     The stop is a hundred times stiffer than the spring; a touch lasts a thirtieth of the turn,
@@ -109,7 +110,7 @@ def test_row_24_harmonic_balance_agrees_with_shooting(shooting, balance, omega: 
 
 
 @pytest.mark.parametrize("omega", SPEEDS)
-def test_row_24_no_wrong_word_of_stability(shooting, balance, omega: float) -> None:
+def test_no_wrong_word_of_stability(shooting, balance, omega: float) -> None:
     """Where harmonic balance says "stable" or "unstable", shooting says the same.
 
     "undetermined" is an honest answer of a truncated series; a wrong word is not.
@@ -123,7 +124,7 @@ def test_row_24_no_wrong_word_of_stability(shooting, balance, omega: float) -> N
         )
 
 
-def test_row_24_special_points_of_both_methods(shooting, balance) -> None:
+def test_special_points_of_both_methods(shooting, balance) -> None:
     """Folds and contact to 1e-4 rad/s; loss of stability to 1e-2, for the touch is short."""
     for kind, tolerance in (
         ("fold", 1e-4), ("contact begin", 1e-8), ("contact end", 1e-4),

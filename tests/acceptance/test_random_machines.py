@@ -13,7 +13,7 @@ import pytest
 MACHINES = 12
 SEED = 0
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.numerical, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from flipflow.paper.claims import Claim
 from flipflow.paper.reproduce import Reproduction
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Traced
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.jump_risk import JumpRisk

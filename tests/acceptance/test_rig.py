@@ -16,6 +16,7 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 from judge import close
 
+pytestmark = pytest.mark.numerical
 LOWER, UPPER = 1.25, 2.6
 
 

@@ -7,6 +7,8 @@ import pytest
 
 import flipflow as ff
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.fixture(scope="module")
 def screen() -> ff.FlipFlowScreen:
@@ -28,7 +30,7 @@ def test_a_periodic_motion_is_one_point(screen) -> None:
 
 
 def test_two_periods_are_two_points(chain) -> None:
-    """Row 24: beyond 0.7388 the upper motion repeats after two periods."""
+    """Two-mass chain: beyond 0.7388 the upper motion repeats after two periods."""
     upper = next(o for o in ff.periodic_orbits(chain, 0.74, 2) if o.periods == 2)
     states = ff.poincare_section(chain, 0.74, 40, initial=upper, skip=0).states
     assert np.abs(states[::2] - states[0]).max() < 1e-8
@@ -37,7 +39,7 @@ def test_two_periods_are_two_points(chain) -> None:
 
 
 def test_a_quasi_periodic_motion_fills_a_curve(chain) -> None:
-    """Row 24: past the Neimark-Sacker point; the points lie along a curve."""
+    """Two-mass chain: past the Neimark-Sacker point; the points lie along a curve."""
     branch = ff.frequency_response(chain, (0.5, 0.8))
     start = branch.orbits_at(0.612)[0].state + np.array([1e-3, 0.0, 0.0, 0.0])
     states = ff.poincare_section(chain, 0.612, 600, initial=start, skip=4000).states

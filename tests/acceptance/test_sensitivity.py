@@ -19,6 +19,7 @@ from flipflow.studies.feasible import working_motion
 from flipflow.studies.quantities import MOTION_VALUES
 from flipflow.studies.sensitivity import one_at_a_time
 
+pytestmark = pytest.mark.numerical
 SEVEN = (
     "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",
     "shear_stiffness", "shear_damping",
@@ -172,7 +173,7 @@ def test_a_quantity_that_does_not_vary(linear, screen):
 
 
 def test_motion_with_stop(with_stop, screen):
-    """At 120 rad/s the gap decides; the nominal machine is row 4 of the trusted values."""
+    """At 120 rad/s the gap decides; the nominal machine has its reference amplitude."""
     assert with_stop.first_order.shape == with_stop.total.shape == (2,)
     assert with_stop.nominal == pytest.approx(9.969835637e-3, rel=1e-8)
     assert with_stop.total[0] > 0.6 > with_stop.total[1]
@@ -220,7 +221,7 @@ def test_the_branch_that_is_meant(screen):
     ],
 )  # fmt: skip
 def test_quantities_of_the_whole_response(screen, name, known, tolerance):
-    """Trusted values, rows 7, 9 and 10 with their tolerances; w_ea and w_ar by their formulas."""
+    """Folds, peak and begin of contact have reference values; w_ea and w_ar their formulas."""
     result = ff.sensitivity(screen, GAP, name, n=2)
     assert result.nominal == pytest.approx(known, abs=tolerance)
     assert result.total.shape == (1,)

@@ -10,6 +10,7 @@ import pytest
 import flipflow as ff
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 TURN = 2.0 * math.pi / 120.0
 BLOWS = (
     ff.Impulse(10.3 * TURN, "main", 200.0),
@@ -46,7 +47,7 @@ def reference_run(screen, periods: float, blows=()) -> np.ndarray:
 
 @pytest.mark.parametrize("blows", [(), BLOWS], ids=["undisturbed", "disturbed"])
 def test_simulation_agrees_with_dop853_over_70_periods(screen, blows) -> None:
-    """Must show 2: DOP853 with events at 1e-11, to 1e-9 m over 70 periods."""
+    """DOP853 with events at 1e-11, to 1e-9 m over 70 periods."""
     history = ff.simulate(screen, 120.0, 70, disturbances=blows)
     z = reference_run(screen, 70.0, blows)
     assert np.abs(history.x[-1] - z[:2]).max() < 1e-9
@@ -56,7 +57,7 @@ def test_simulation_agrees_with_dop853_over_70_periods(screen, blows) -> None:
 @pytest.mark.parametrize("law", ["paper", "compression-only"])
 @pytest.mark.parametrize("blows", [(), BLOWS], ids=["undisturbed", "disturbed"])
 def test_energy_balances(screen, law, blows) -> None:
-    """Must show 2: energy balances to 1e-9 with impulses and load steps in it."""
+    """Energy balances to 1e-9 with impulses and load steps in it."""
     history = ff.simulate(screen.replace(stop_law=law), 120.0, 70, disturbances=blows)
     e = history.energy
     gained = e["input"] + e["impulses"] + e["loads"]

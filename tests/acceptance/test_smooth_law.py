@@ -14,6 +14,7 @@ from flipflow.model.smooth import smooth_force
 from flipflow.studies.smooth_law import compare_laws
 from judge import close, kinds, relative_amplitude
 
+pytestmark = pytest.mark.numerical
 WHAT_BELONGS = ["contact begin", "fold", "fold", "contact end"]
 
 

@@ -15,6 +15,7 @@ import pytest
 
 import flipflow as ff
 
+pytestmark = pytest.mark.numerical
 SEED = 0
 SPEC = importlib.util.spec_from_file_location(
     "machine_draw", Path(__file__).parents[2] / "benchmarks" / "machine_draw.py"

@@ -16,9 +16,10 @@ from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.drive import assumed_drive
 
+pytestmark = pytest.mark.numerical
 RPM = np.pi / 30.0
 WORKING = 850.0 * RPM
-W01 = 22.493898  # rad/s, row 3 of the trusted values
+W01 = 22.493898  # rad/s, K v = w^2 M v of the machine without contact
 
 
 def drive_of(screen, power):
@@ -155,7 +156,7 @@ def test_a_motion_of_two_turns_has_settled(screen):
 
 
 def test_slow_profile_follows_the_branch(screen):
-    """Very slowly, the motion is at every speed that of constant speed: 100 rad/s, row 4."""
+    """Very slowly, the motion is at every speed that of constant speed; known at 100 rad/s."""
     run = ff.start_up(screen, ff.SpeedProfile((0.0, 10.0, 60.0), (90.0, 90.0, 100.0)))
     last = run.history.t > run.duration - 2.0 * np.pi / 100.0
     x = run.history.displacement("relative")[last]

@@ -10,7 +10,8 @@ import pytest
 import flipflow as ff
 from flipflow.errors import Cancelled
 
-FOLD_UP, FOLD_DOWN = 206.405559, 198.649272  # row 7
+pytestmark = pytest.mark.numerical
+FOLD_UP, FOLD_DOWN = 206.405559, 198.649272  # rad/s, reference values
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def branch(screen):
 @pytest.mark.parametrize("step", [0.01, 0.05, 0.3, 2.0])
 @pytest.mark.parametrize("rising", [True, False], ids=["up", "down"])
 def test_sweeps_jump_within_one_step_of_the_exact_folds(screen, branch, step, rising) -> None:
-    """Must show 1: steps from 0.01 to 2 rad/s, both directions, 30 steps across the fold."""
+    """Steps from 0.01 to 2 rad/s, both directions, 30 steps across the fold."""
     fold = FOLD_UP if rising else FOLD_DOWN
     sign = 1.0 if rising else -1.0
     speeds = fold + sign * step * (np.arange(30) - 20.3)
@@ -42,7 +43,7 @@ def test_sweeps_jump_within_one_step_of_the_exact_folds(screen, branch, step, ri
 
 
 def test_swept_amplitudes_are_those_of_exact_orbits(screen, branch) -> None:
-    """Must show 1: away from the jumps amplitudes agree with exact orbits to 1e-6."""
+    """Away from the jumps amplitudes agree with exact orbits to 1e-6."""
     speeds = np.arange(150.0, 222.0, 4.0)
     for order in (speeds, speeds[::-1]):
         swept = ff.sweep(screen, order)
@@ -53,7 +54,7 @@ def test_swept_amplitudes_are_those_of_exact_orbits(screen, branch) -> None:
 
 
 def test_up_and_down_differ_only_between_the_folds(screen) -> None:
-    """Row 20: two stable motions only between the folds."""
+    """Two stable motions only between the folds."""
     speeds = np.arange(190.0, 215.0, 1.0)
     up = ff.sweep(screen, speeds).amplitude("relative")
     down = ff.sweep(screen, speeds[::-1]).amplitude("relative")[::-1]
@@ -118,7 +119,7 @@ def test_a_falling_speed_jumps_late_beyond_the_other_fold(screen) -> None:
 
 
 def test_a_ramp_that_begins_not_far_above_the_folds(screen):
-    """Row 17: folds at 200.1 and 214.1 rad/s; 240 is reached from below only past both."""
+    """Light damping: folds at 200.1 and 214.1 rad/s; 240 is reached from below only past both."""
     light = screen.replace(isolation_damping=3000.0, shear_damping=600.0, stop_damping=600.0)
     glide = ff.ramp(light, (240.0, 245.0), 5.0)
     (orbit,) = ff.periodic_orbits(light, 240.0)
@@ -127,7 +128,7 @@ def test_a_ramp_that_begins_not_far_above_the_folds(screen):
 
 
 def test_a_ramp_begins_with_a_motion_that_leans_where_the_symmetric_one_is_unstable(screen):
-    """Row 25: e = 2 mm at 57.7 rad/s."""
+    """e = 2 mm at 57.7 rad/s."""
     narrow = screen.replace(clearance=2e-3)
     glide = ff.ramp(narrow, (57.7, 57.8), 0.1)
     leaning = [orbit for orbit in ff.periodic_orbits(narrow, 57.7) if orbit.stable]

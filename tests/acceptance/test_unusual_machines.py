@@ -15,6 +15,7 @@ import flipflow as ff
 from judge import close
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 MAIN, RELATIVE = (1.0, 0.0), (1.0, -1.0)
 
 

@@ -1,6 +1,6 @@
-"""Rows 6, 8, 21 and the curves that must complete: harmonic balance of any order.
+"""Harmonic balance of any order: its error, its folds, its convergence, and complete curves.
 
-Judged by the exact motions, which rows 4 and 7 tie to an independent integration.
+Judged by the exact motions, which test_verification_exact.py ties to an independent integration.
 """
 
 from __future__ import annotations
@@ -12,30 +12,31 @@ import flipflow as ff
 from conftest import LIGHT_DAMPING
 from judge import close, kinds, relative_amplitude, upper_orbit
 
-ROW_6 = {100.0: -0.58, 120.0: -0.13, 140.0: 0.22}
+pytestmark = pytest.mark.numerical
+THIRD_ORDER_PERCENT = {100.0: -0.58, 120.0: -0.13, 140.0: 0.22}
 ORDERS = (1, 2, 3, 5, 9, 15, 21, 31)
 MACHINES = {"nominal": {}, "light damping": LIGHT_DAMPING, "c3 = 0": {"stop_damping": 0.0}}
 WHAT_BELONGS = ["contact begin", "fold", "fold", "contact end"]
 
 
-@pytest.mark.parametrize("omega", ROW_6)
-def test_row_6_third_order_against_exact(exact, response, omega: float) -> None:
-    """Row 6: the percentages are the method's own error; each within a tenth of itself."""
+@pytest.mark.parametrize("omega", THIRD_ORDER_PERCENT)
+def test_third_order_against_exact(exact, response, omega: float) -> None:
+    """The percentages are the method's own error; each within a tenth of itself."""
     series = relative_amplitude(response(ff.HarmonicBalance(3)), omega)
     percent = 100.0 * (series / relative_amplitude(exact, omega) - 1.0)
-    close("H = 3 against exact, %", percent, ROW_6[omega], rel=0.1)
+    close("H = 3 against exact, %", percent, THIRD_ORDER_PERCENT[omega], rel=0.1)
 
 
 @pytest.mark.parametrize(("order", "folds"), [(3, (206.415, 198.661)), (1, (206.453, 198.002))])
-def test_row_8_folds_of_low_order(response, order: int, folds: tuple[float, float]) -> None:
-    """Row 8: 2e-3 rad/s, as the table says."""
+def test_folds_of_low_order(response, order: int, folds: tuple[float, float]) -> None:
+    """Reference values of the folds of the truncated equations, given to 1e-3: 2e-3 rad/s."""
     found = [fold.omega for fold in response(ff.HarmonicBalance(order)).folds]
     close(f"folds by H = {order}", found, folds, abs=2e-3)
 
 
 @pytest.mark.parametrize("omega", [100.0, 120.0, 140.0])
-def test_row_21_convergence_of_harmonics(exact, response, omega: float) -> None:
-    """Row 21: order 2.5 +- 0.5 in L2, for x2'' jumps at the contact.
+def test_convergence_of_harmonics(exact, response, omega: float) -> None:
+    """Order 2.5 +- 0.5 in L2, for x2'' jumps at the contact.
 
     A jump in the second derivative makes the series fall as h^-3 and its tail as H^-2.5. The error
     swings with the contact share, hence a fit over many orders.

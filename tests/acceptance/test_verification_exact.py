@@ -1,4 +1,4 @@
-"""Rows 4, 5, 7, 9, 11 and 16: exact motions of FFS0827.
+"""Exact motions of FFS0827 against the reference values that tests/reference tells of.
 
 Routes: shooting on the closed-form flow (the default method), the scalar two-event problem and
 event-located DOP853 of ``tests/reference``, and harmonic balance of high order.
@@ -13,8 +13,9 @@ import flipflow as ff
 from judge import GAP, close, relative_amplitude, upper_orbit
 from reference import integrate, two_event
 
-ROW_4 = {100.0: 7.888703398e-3, 120.0: 9.969835637e-3, 140.0: 12.878842732e-3}
-ROW_5 = {
+pytestmark = pytest.mark.numerical
+AMPLITUDES = {100.0: 7.888703398e-3, 120.0: 9.969835637e-3, 140.0: 12.878842732e-3}
+AMPLITUDES_MM = {
     85.0: 6.488906, 90.0: 6.969572, 95.0: 7.427901, 110.0: 8.864270, 130.0: 11.277296,
     150.0: 14.906462, 170.0: 21.160284, 190.0: 33.162076, 198.0: 39.117403, 202.0: 39.833897,
 }  # fmt: skip
@@ -22,9 +23,9 @@ MULTIPLIERS_120 = np.array([0.319490 + 0.745924j, -0.418910 + 0.417301j])
 FOLDS = ((206.405559, 26.28591e-3), (198.649272, 8.427351e-3))
 
 
-@pytest.mark.parametrize("omega", ROW_4)
-def test_row_4_exact_amplitude(screen, exact, response, omega: float) -> None:
-    """Row 4: 1e-8 of the value by shooting and by DOP853 started on the motion's state.
+@pytest.mark.parametrize("omega", AMPLITUDES)
+def test_exact_amplitude(screen, exact, response, omega: float) -> None:
+    """1e-8 of the value by shooting and by DOP853 started on the motion's state.
 
     That the integrator comes back to the state after the turn shows that it is the motion;
     harmonic balance with 31 harmonics meets it within its stated error.
@@ -32,25 +33,25 @@ def test_row_4_exact_amplitude(screen, exact, response, omega: float) -> None:
     orbit = upper_orbit(exact, omega)
     turn = 2.0 * np.pi / omega
     path = integrate.flow(integrate.Machine.of(screen.system()), orbit.state, omega, 0.0, turn)
-    close("shooting", orbit.amplitude("relative"), ROW_4[omega], rel=1e-8)
-    close("DOP853", integrate.amplitude(path, GAP, 0.0, turn), ROW_4[omega], rel=1e-8)
+    close("shooting", orbit.amplitude("relative"), AMPLITUDES[omega], rel=1e-8)
+    close("DOP853", integrate.amplitude(path, GAP, 0.0, turn), AMPLITUDES[omega], rel=1e-8)
     close("DOP853 after a turn", path.final, orbit.state, abs=1e-11)
     series = upper_orbit(response(ff.HarmonicBalance(31)), omega)
-    close("H = 31", series.amplitude("relative"), ROW_4[omega], abs=max(series.error, 1e-12))
+    close("H = 31", series.amplitude("relative"), AMPLITUDES[omega], abs=max(series.error, 1e-12))
     assert series.error < 1e-6, f"stated error of H = 31: {series.error}"
 
 
-@pytest.mark.parametrize("omega", ROW_5)
-def test_row_5_exact_amplitude(exact, response, omega: float) -> None:
-    """Row 5: 1e-6 mm; harmonic balance (31) within a micrometre, as its stated error says."""
+@pytest.mark.parametrize("omega", AMPLITUDES_MM)
+def test_exact_amplitude_to_a_nanometre(exact, response, omega: float) -> None:
+    """1e-6 mm; harmonic balance (31) within a micrometre, as its stated error says."""
     got = relative_amplitude(exact, omega) * 1e3
-    close("shooting, mm", got, ROW_5[omega], abs=1e-6)
+    close("shooting, mm", got, AMPLITUDES_MM[omega], abs=1e-6)
     series = upper_orbit(response(ff.HarmonicBalance(31)), omega)
-    close("H = 31, mm", series.amplitude("relative") * 1e3, ROW_5[omega], abs=1e-3)
+    close("H = 31, mm", series.amplitude("relative") * 1e3, AMPLITUDES_MM[omega], abs=1e-3)
 
 
-def test_row_7_folds(screen, exact, response) -> None:
-    """Row 7: 1e-6 rad/s by shooting and by f = f_s = 0 of the two-event problem.
+def test_folds(screen, exact, response) -> None:
+    """1e-6 rad/s by shooting and by f = f_s = 0 of the two-event problem.
 
     The amplitudes are given to seven digits; half of the last one is allowed. Harmonic balance
     of order 31 comes within 1e-4 rad/s.
@@ -66,16 +67,16 @@ def test_row_7_folds(screen, exact, response) -> None:
         close("fold by H = 31", series.omega, omega, abs=1e-4)
 
 
-def test_row_9_largest_amplitude(exact, response) -> None:
-    """Row 9: 1e-3 mm, by shooting and harmonic balance (31); the summit is flat: 0.01 rad/s."""
+def test_largest_amplitude(exact, response) -> None:
+    """1e-3 mm, by shooting and harmonic balance (31); the summit is flat: 0.01 rad/s."""
     for branch in (exact, response(ff.HarmonicBalance(31))):
         peak = branch.peak("relative")
         close("largest amplitude, mm", peak.amplitude("relative") * 1e3, 40.0311, abs=1e-3)
         close("where", peak.omega, 200.90, abs=1e-2)
 
 
-def test_row_11_multipliers(screen, exact, response) -> None:
-    """Row 11: 1e-5, by shooting and from differences of the DOP853 flow.
+def test_multipliers(screen, exact, response) -> None:
+    """1e-5, by shooting and from differences of the DOP853 flow.
 
     Harmonic balance (31) takes them over its own contact times and comes within 1e-3.
     """
@@ -102,8 +103,8 @@ def test_row_11_multipliers(screen, exact, response) -> None:
     "method", [ff.PiecewiseExact(), ff.HarmonicBalance(9)], ids=["exact", "H9"]
 )
 @pytest.mark.parametrize("omega", [60.0, 120.0, 195.0])
-def test_row_16_doubling_gap_and_unbalance(screen, response, method, omega: float) -> None:
-    """Row 16: the equations are homogeneous in (e, m0r, x), so 1e-12: nothing but rounding."""
+def test_doubling_gap_and_unbalance(screen, response, method, omega: float) -> None:
+    """The equations are homogeneous in (e, m0r, x), so 1e-12: nothing but rounding."""
     doubled = response(
         method, clearance=2.0 * screen.clearance, eccentric_moment=2.0 * screen.eccentric_moment
     )

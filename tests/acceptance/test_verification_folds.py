@@ -1,6 +1,7 @@
-"""Rows 17, 18 and 19: folds of other machines, and where folds are born.
+"""Folds of other machines, and where folds are born, against reference values.
 
-Routes: shooting, harmonic balance, and the scalar two-event problem of ``tests/reference``.
+Routes: shooting, harmonic balance, and the scalar two-event problem of ``tests/reference``, which
+tells where the reference values come from.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from conftest import LIGHT_DAMPING
 from judge import close
 from reference import integrate, two_event
 
-ROW_18 = {
+pytestmark = pytest.mark.numerical
+VARIANTS = {
     "e = 8 mm": ({"clearance": 8e-3}, (198.64747, 164.12941), (198.67, 164.08)),
     "m0r x0.7": ({"eccentric_moment": 0.7 * 4.16825}, (196.69246, 157.87730), (196.72, 157.84)),
     "k2 x1.3": ({"shear_stiffness": 1.3 * 2.7e6}, (216.60646, 215.13238), (216.61, 215.13)),
@@ -39,8 +41,8 @@ def fold_pair(branch, where: str) -> list[float]:
     return found
 
 
-def test_row_17_light_damping(screen, response) -> None:
-    """Row 17: folds to 1e-4 rad/s, exact by two routes and by H = 3; the peak to 1e-2 mm."""
+def test_light_damping(screen, response) -> None:
+    """Folds to 1e-4 rad/s, exact by two routes and by H = 3; the peak to 1e-2 mm."""
     exact = response(**LIGHT_DAMPING)
     folds = [fold.omega for fold in exact.folds]
     close("folds, exact", folds, (214.08570, 200.08830), abs=1e-4)
@@ -54,10 +56,10 @@ def test_row_17_light_damping(screen, response) -> None:
     close("largest amplitude by H = 31, mm", high.amplitude("relative") * 1e3, 165.78, abs=1e-2)
 
 
-@pytest.mark.parametrize("variant", ROW_18)
-def test_row_18_folds_of_variants(screen, response, variant: str) -> None:
-    """Row 18: exact folds to 1e-4 by two routes; by H = 3 to 5e-2, as the table says."""
-    changes, folds, third_order = ROW_18[variant]
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_folds_of_variants(screen, response, variant: str) -> None:
+    """Exact folds to 1e-4 by two routes; by H = 3 to 5e-2, for two decimals are given."""
+    changes, folds, third_order = VARIANTS[variant]
     exact = response(**changes)
     close("folds, exact", [fold.omega for fold in exact.folds], folds, abs=1e-4)
     close(
@@ -77,16 +79,16 @@ def test_row_18_folds_of_variants(screen, response, variant: str) -> None:
     + [{"clearance": e} for e in (4e-3, 3e-3, 2e-3)],
     ids=str,
 )
-def test_row_19_no_folds(response, method, changes: dict[str, float]) -> None:
-    """Row 19: no folds for k3 <= 2 k2 = 5.4 MN/m, nor for e <= 4 mm."""
+def test_no_folds(response, method, changes: dict[str, float]) -> None:
+    """No folds for k3 <= 2 k2 = 5.4 MN/m, nor for e <= 4 mm."""
     branch = response(method, **changes)
     assert branch.status.complete
     assert branch.folds == (), f"folds at {[fold.omega for fold in branch.folds]}, expected none"
 
 
 @pytest.mark.parametrize("field", CUSPS)
-def test_row_19_cusp_by_the_scalar_problem(screen, response, field: str) -> None:
-    """Row 19: f = f_s = f_ss = 0, solved from a machine beyond the cusp; 1e-3 of the value."""
+def test_cusp_by_the_scalar_problem(screen, response, field: str) -> None:
+    """f = f_s = f_ss = 0, solved from a machine beyond the cusp; 1e-3 of the value."""
     value, omega, beyond = CUSPS[field]
     folds = response(**{field: beyond[-1]}).folds
     share = float(np.mean([fold.orbit.contact_share() for fold in folds]))
@@ -97,8 +99,8 @@ def test_row_19_cusp_by_the_scalar_problem(screen, response, field: str) -> None
 
 @pytest.mark.parametrize("method", [None, ff.HarmonicBalance(21)], ids=["exact", "H21"])
 @pytest.mark.parametrize("field", CUSPS)
-def test_row_19_cusp_by_merging_folds(response, field: str, method) -> None:
-    """Row 19: near a cusp the folds part as (p - p_c)^1.5, so gap^(2/3) is smooth in p.
+def test_cusp_by_merging_folds(response, field: str, method) -> None:
+    """Near a cusp the folds part as (p - p_c)^1.5, so gap^(2/3) is smooth in p.
 
     A parabola through four machines beyond the cusp is carried to gap 0; 1e-3 of the value.
     """
@@ -112,15 +114,15 @@ def test_row_19_cusp_by_merging_folds(response, field: str, method) -> None:
     close("its frequency", middle, omega, rel=1e-3)
 
 
-def test_row_19_no_folds_on_the_near_side_of_the_cusps(response) -> None:
-    """Row 19: two thousandths before the cusp there is none, as far beyond there are two."""
+def test_no_folds_on_the_near_side_of_the_cusps(response) -> None:
+    """Two thousandths before the cusp there is none, as far beyond there are two."""
     for field, (value, _, _) in CUSPS.items():
         assert response(**{field: 0.998 * value}).folds == (), f"{field} before its cusp"
         fold_pair(response(**{field: 1.002 * value}), f"{field} beyond its cusp")
 
 
-def test_row_19_a_small_pair_just_above_contact_is_real(screen, response) -> None:
-    """Row 19 speaks of the folds of the resonance. At 1 mm there is another pair at 40 rad/s.
+def test_a_small_pair_just_above_contact_is_real(screen, response) -> None:
+    """The resonance has no folds at small gaps. At 1 mm there is another pair at 40 rad/s.
 
     Within 0.1 rad/s above contact three motions coexist. Both methods find the pair, and DOP853
     comes back to each of the three after ten turns (rounding grows by the multiplier 1.17).

@@ -1,4 +1,4 @@
-"""Rows 1, 2, 3 and 10 of the trusted values: where the machine is linear.
+"""Where the machine is linear: without contact, and with the stop bonded.
 
 Routes: the closed form (K - w^2 M + i w C) X = F written out here, the linear analysis, and the
 same nonlinear solvers that serve the rest.
@@ -17,6 +17,7 @@ import flipflow as ff
 from flipflow.continuation.branch import Branch
 from judge import GAP, close, relative_amplitude
 
+pytestmark = pytest.mark.numerical
 FREE = {40.0: 1.001225259e-3, 60.0: 2.281714696e-3, 80.0: 5.681819427e-3}
 BONDED_120 = 2.083974467e-3
 METHODS = (ff.PiecewiseExact(), ff.HarmonicBalance(3))
@@ -35,8 +36,8 @@ def receptance_amplitude(screen: ff.FlipFlowScreen, omega: float, stop: float = 
 
 
 @pytest.mark.parametrize("omega", FREE)
-def test_row_1_linear_amplitude_by_linear_analysis(screen, omega: float) -> None:
-    """Row 1: closed form; 1e-9 of the value, for ten digits are given."""
+def test_linear_amplitude_by_linear_analysis(screen, omega: float) -> None:
+    """Closed form; 1e-9 of the value, for ten digits are given."""
     from flipflow.dynamics.linear_response import linear_response  # noqa: PLC0415
 
     linear = linear_response(ff.load("ffs0827-linear"), np.array([omega]))
@@ -46,8 +47,8 @@ def test_row_1_linear_amplitude_by_linear_analysis(screen, omega: float) -> None
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "balance"])
 @pytest.mark.parametrize("omega", FREE)
-def test_row_1_linear_amplitude_by_the_solvers(screen, response, omega: float, method) -> None:
-    """Row 1: below contact, and without any stop, both solvers meet the closed form to 1e-9."""
+def test_linear_amplitude_by_the_solvers(screen, response, omega: float, method) -> None:
+    """Below contact, and without any stop, both solvers meet the closed form to 1e-9."""
     expected = receptance_amplitude(screen, omega)
     close("closed form", expected, FREE[omega], rel=1e-9)
     close("with stop, not reached", relative_amplitude(response(method), omega), expected, rel=1e-9)
@@ -56,17 +57,17 @@ def test_row_1_linear_amplitude_by_the_solvers(screen, response, omega: float, m
 
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "balance"])
-def test_row_2_no_clearance_is_the_bonded_machine(
+def test_no_clearance_is_the_bonded_machine(
     screen, response: Callable[..., Branch], method
 ) -> None:
-    """Row 2: e = 0 at 120 rad/s against the closed form with k2 + k3, c2 + c3; 1e-9."""
+    """e = 0 at 120 rad/s against the closed form with k2 + k3, c2 + c3; 1e-9."""
     got = relative_amplitude(response(method, clearance=0.0), 120.0)
     close("e = 0", got, BONDED_120, rel=1e-9)
     close("closed form", receptance_amplitude(screen, 120.0, stop=1.0), BONDED_120, rel=1e-9)
 
 
-def test_row_2_a_vanishing_clearance_tends_to_it(screen) -> None:
-    """Row 2: contact at e = 1 nm differs from e = 0 by the share e takes of the stroke, 1e-6."""
+def test_a_vanishing_clearance_tends_to_it(screen) -> None:
+    """Contact at e = 1 nm differs from e = 0 by the share e takes of the stroke, 1e-6."""
     small = ff.frequency_response(screen.replace(clearance=1e-9), (110.0, 130.0))
     close("e = 1 nm", relative_amplitude(small, 120.0), BONDED_120, rel=2e-6)
 
@@ -74,11 +75,11 @@ def test_row_2_a_vanishing_clearance_tends_to_it(screen) -> None:
 @pytest.mark.parametrize(
     ("stop", "expected"), [(0.0, (22.493898, 108.807505)), (1.0, (22.625997, 216.344494))]
 )
-def test_row_3_natural_frequencies(screen, stop: float, expected: tuple[float, float]) -> None:
-    """Row 3: undamped, free and bonded, against the eigenvalue problem written out here.
+def test_natural_frequencies(screen, stop: float, expected: tuple[float, float]) -> None:
+    """Undamped, free and bonded, against the eigenvalue problem written out here.
 
-    The table gives eight or nine digits: 1e-8 between the two routes, half of the last printed
-    digit against the table.
+    1e-8 between the two routes, and half of the last digit of the reference values, which have
+    eight or nine.
     """
     from flipflow.dynamics.linear_response import linear_response  # noqa: PLC0415
 
@@ -94,8 +95,8 @@ def test_row_3_natural_frequencies(screen, stop: float, expected: tuple[float, f
 
 
 @pytest.mark.parametrize("method", [*METHODS, ff.HarmonicBalance(15)], ids=["exact", "H3", "H15"])
-def test_row_10_contact_begins_and_ends(screen, response, method) -> None:
-    """Row 10: where the contact-free amplitude passes e, to 1e-6 rad/s as the table says."""
+def test_contact_begins_and_ends(screen, response, method) -> None:
+    """Where the contact-free amplitude passes e, to 1e-6 rad/s."""
 
     def beyond(omega: float) -> float:
         return receptance_amplitude(screen, omega) - screen.clearance
@@ -110,8 +111,8 @@ def test_row_10_contact_begins_and_ends(screen, response, method) -> None:
 
 
 @pytest.mark.parametrize("clearance", [4.0e-3, 4.54e-3])
-def test_row_10_contact_never_ends_at_small_gaps(screen, response, clearance: float) -> None:
-    """Row 10: for e <= m0r/m1 = 4.550 mm the contact never ends.
+def test_contact_never_ends_at_small_gaps(screen, response, clearance: float) -> None:
+    """For e <= m0r/m1 = 4.550 mm the contact never ends.
 
     Far above all resonances the amplitude tends to m0r/m1 from above; 5 % more gap lets it end.
     """

@@ -1,4 +1,4 @@
-"""Rows 12 to 15: what happens to a disturbance and to energy over one turn.
+"""What happens to a disturbance and to energy over one turn.
 
 Routes: the kernels' monodromy, its closed form assembled here from matrix exponentials and
 saltations, differences of the independent flow, and the divergence of the flow.
@@ -14,6 +14,7 @@ import flipflow as ff
 from judge import close, upper_orbit
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 SHARES = {100.0: 0.394690, 120.0: 0.536373, 140.0: 0.655145}
 POWER_120 = {"input": 2415.4, "isolation": 117.1, "shear": 1740.1, "stop": 558.3}
 TO_RELATIVE = np.kron(np.eye(2), [[1.0, 0.0], [1.0, -1.0]])
@@ -56,8 +57,8 @@ def assembled_monodromy(screen: ff.FlipFlowScreen, orbit) -> np.ndarray:
     return scipy.linalg.expm((engaged if inside else free) * (turn - t)) @ M
 
 
-def test_row_12_saltation_entries(screen) -> None:
-    """Row 12: the closed form has the table's entries in (x1, x2): 1e-9; -11.247 as printed."""
+def test_saltation_entries(screen) -> None:
+    """-c3/m1 and -c3 (1/m1 + 1/m2) = -11.247 in (x1, x2), at the exit with the other sign: 1e-9."""
     S = TO_RELATIVE @ entry_saltation(screen) @ np.linalg.inv(TO_RELATIVE)
     c3, m1, m2 = screen.stop_damping, screen.main_mass, screen.floating_mass
     close("x1' by x2", S[2, 1], -c3 / m1, rel=1e-9)
@@ -67,8 +68,8 @@ def test_row_12_saltation_entries(screen) -> None:
 
 
 @pytest.mark.parametrize("omega", [100.0, 120.0, 140.0, 202.0])
-def test_row_12_saltation_in_the_monodromy(screen, exact, omega: float) -> None:
-    """Row 12: the kernels' matrix is the assembled one to 1e-9, with the jumps of row 12 in it.
+def test_saltation_in_the_monodromy(screen, exact, omega: float) -> None:
+    """The kernels' matrix is the assembled one to 1e-9, with the jumps at contact in it.
 
     Without them it differs by percents: the test would notice.
     """
@@ -82,8 +83,8 @@ def test_row_12_saltation_in_the_monodromy(screen, exact, omega: float) -> None:
 
 
 @pytest.mark.parametrize(("side", "sign"), [("entry", 1.0), ("exit", -1.0)])
-def test_row_12_saltation_by_differences(screen, exact, side: str, sign: float) -> None:
-    """Row 12: differences of the DOP853 flow across one contact; 1e-6 is what differences give."""
+def test_saltation_by_differences(screen, exact, side: str, sign: float) -> None:
+    """Differences of the DOP853 flow across one contact; 1e-6 is what differences give."""
     orbit = upper_orbit(exact, 120.0)
     touch = next(i for i in orbit.motion.contact_intervals() if i.side > 0)
     at = touch.start if side == "entry" else touch.end
@@ -100,8 +101,8 @@ def test_row_12_saltation_by_differences(screen, exact, side: str, sign: float) 
 
 
 @pytest.mark.parametrize("omega", SHARES)
-def test_row_13_determinant(screen, exact, response, omega: float) -> None:
-    """Row 13: det M = exp(-T (c1/m1 + c2 v) - t_c c3 v) to 1e-9; shares as printed.
+def test_determinant(screen, exact, response, omega: float) -> None:
+    """det M = exp(-T (c1/m1 + c2 v) - t_c c3 v), v = 1/m1 + 1/m2, to 1e-9; shares to six digits.
 
     The multipliers of a series are those of the exact motion one Newton step beside it, so that
     its determinant belongs to the exact contact share too, to the square of that step.
@@ -122,8 +123,8 @@ def test_row_13_determinant(screen, exact, response, omega: float) -> None:
 
 
 @pytest.mark.parametrize(("omega", "which"), [(100.0, 0), (140.0, 0), (202.0, 0), (202.0, 1)])
-def test_row_14_monodromy_by_differences(screen, exact, omega: float, which: int) -> None:
-    """Row 14: 1e-6 against central differences of the independent flow, stable or not.
+def test_monodromy_by_differences(screen, exact, omega: float, which: int) -> None:
+    """1e-6 against central differences of the independent flow, stable or not.
 
     Velocities are measured in omega times metres, so that all entries are of one size.
     """
@@ -135,8 +136,8 @@ def test_row_14_monodromy_by_differences(screen, exact, omega: float, which: int
     close("monodromy", got, M * scale / scale[:, None], abs=1e-6)
 
 
-def test_row_15_energy_balance(screen, exact, response) -> None:
-    """Row 15: 1e-4, and no finer than the printed tenth of a watt.
+def test_energy_balance(screen, exact, response) -> None:
+    """1e-4, and no finer than the tenth of a watt to which the reference values are given.
 
     The balance itself, and harmonic balance (31) against the exact motion, to 1e-4.
     """
@@ -147,8 +148,8 @@ def test_row_15_energy_balance(screen, exact, response) -> None:
         close(f"{name} by H = 31, W", series[name], value, rel=1e-4)
 
 
-def test_row_15_energy_balance_by_integration(screen, exact) -> None:
-    """Row 15: the same by Simpson's rule on every piece of the DOP853 trajectory."""
+def test_energy_balance_by_integration(screen, exact) -> None:
+    """The same by Simpson's rule on every piece of the DOP853 trajectory."""
     orbit = upper_orbit(exact, 120.0)
     machine = integrate.Machine.of(screen.system())
     path = integrate.flow(machine, orbit.state, 120.0, 0.0, orbit.period)

@@ -1,4 +1,4 @@
-"""Rows 20, 22 and 25: which motions exist besides the mirror-symmetric one, and the flow's order.
+"""Which motions exist besides the mirror-symmetric one, and the flow's order.
 
 Routes: branches by both methods, settling from random states, a search for coexisting motions,
 and event-located integrations that know nothing of the kernels.
@@ -14,21 +14,22 @@ from judge import close, kinds, minmax, upper_orbit
 from reference import integrate
 from reference.runge_kutta import rk4_turn
 
+pytestmark = pytest.mark.numerical
 WINDOW_2MM = (56.9837, 58.4409)
 LEANING_2MM = (2.024274e-3, -2.130097e-3)
 
 
 @pytest.mark.parametrize("order", [None, 3, 9, 21])
-def test_row_20_nothing_but_two_folds(response, order: int | None) -> None:
-    """Row 20: no period doubling, no torus, no loss of symmetry, 20 ... 220 rad/s."""
+def test_nothing_but_two_folds(response, order: int | None) -> None:
+    """No period doubling, no torus, no loss of symmetry, 20 ... 220 rad/s."""
     branch = response(None if order is None else ff.HarmonicBalance(order), (20.0, 220.0))
     assert branch.status.complete
     assert kinds(branch) == ["contact begin", "fold", "fold"]
 
 
 @pytest.mark.parametrize("order", [None, 9])
-def test_row_20_two_stable_motions_only_between_the_folds(response, order: int | None) -> None:
-    """Row 20: stable motions on the branch, counted every 5 rad/s and finer between the folds."""
+def test_two_stable_motions_only_between_the_folds(response, order: int | None) -> None:
+    """Stable motions on the branch, counted every 5 rad/s and finer between the folds."""
     branch = response(None if order is None else ff.HarmonicBalance(order))
     low, high = sorted(fold.omega for fold in branch.folds)
     for omega in [*np.arange(20.0, 221.0, 5.0), 198.7, 199.0, 202.5, 204.0, 206.3, 206.5]:
@@ -38,8 +39,8 @@ def test_row_20_two_stable_motions_only_between_the_folds(response, order: int |
 
 
 @pytest.mark.parametrize("omega", [*np.arange(20.0, 221.0, 20.0), 199.5, 203.0, 206.0])
-def test_row_20_every_start_settles_on_the_branch(exact, omega: float) -> None:
-    """Row 20: from random states up to three gaps and more the machine settles on the branch.
+def test_every_start_settles_on_the_branch(exact, omega: float) -> None:
+    """From random states up to three gaps and more the machine settles on the branch.
 
     A subharmonic, a leaning motion or a detached one would be another state. The slowest mode
     decays by exp(-4 t); 400 turns leave nothing of it at these speeds.
@@ -54,8 +55,8 @@ def test_row_20_every_start_settles_on_the_branch(exact, omega: float) -> None:
 
 
 @pytest.mark.parametrize("omega", [100.0, 150.0, 195.0])
-def test_row_22_order_of_event_located_runge_kutta(screen, exact, omega: float) -> None:
-    """Row 22: at least 3.7 against the exact flow; only steps cut at the contact keep order 4."""
+def test_order_of_event_located_runge_kutta(screen, exact, omega: float) -> None:
+    """At least 3.7 against the exact flow; only steps cut at the contact keep order 4."""
     orbit = upper_orbit(exact, omega)
     scale = np.array([1.0, 1.0, omega, omega])
     steps = np.array([40, 80, 160, 320])
@@ -69,15 +70,15 @@ def test_row_22_order_of_event_located_runge_kutta(screen, exact, omega: float) 
 
 
 @pytest.mark.parametrize("method", [None, ff.HarmonicBalance(31)], ids=["exact", "H31"])
-def test_row_25_window_of_lost_symmetry(response, method) -> None:
-    """Row 25: e = 2 mm; 1e-3 rad/s for the exact window, 2e-2 for harmonic balance (31)."""
+def test_window_of_lost_symmetry(response, method) -> None:
+    """e = 2 mm; 1e-3 rad/s for the exact window, 2e-2 for harmonic balance (31)."""
     found = response(method, clearance=2e-3).points_of("symmetry breaking")
     tolerance = 1e-3 if method is None else 2e-2
     close("window", [point.omega for point in found], WINDOW_2MM, abs=tolerance)
 
 
-def test_row_25_the_symmetric_motion_is_unstable_inside(response) -> None:
-    """Row 25: between the two points the symmetric motion does not return, beside them it does."""
+def test_the_symmetric_motion_is_unstable_inside(response) -> None:
+    """Between the two points the symmetric motion does not return, beside them it does."""
     branch = response(clearance=2e-3)
     words = {w: upper_orbit(branch, w).stability for w in (56.95, 57.1, 57.7, 58.4, 58.5)}
     assert words == {
@@ -85,8 +86,8 @@ def test_row_25_the_symmetric_motion_is_unstable_inside(response) -> None:
     }  # fmt: skip
 
 
-def test_row_25_leaning_motions(screen) -> None:
-    """Row 25: the stable motion at 57.7 and its mirror image, displacements to 1e-4 mm.
+def test_leaning_motions(screen) -> None:
+    """The stable motion at 57.7 and its mirror image, displacements to 1e-4 mm.
 
     DOP853 started on its state comes back after a turn, which says that it is a motion.
     """
@@ -103,8 +104,8 @@ def test_row_25_leaning_motions(screen) -> None:
     assert any(not orbit.stable for orbit in found), "the symmetric motion is there, too"
 
 
-def test_row_25_leaning_motion_by_settling(screen) -> None:
-    """Row 25: DOP853 alone, 60 turns from the symmetric motion pushed aside; 1e-4 mm."""
+def test_leaning_motion_by_settling(screen) -> None:
+    """DOP853 alone, 60 turns from the symmetric motion pushed aside; 1e-4 mm."""
     machine = screen.replace(clearance=2e-3)
     reference, turn = integrate.Machine.of(machine.system()), 2.0 * np.pi / 57.7
     symmetric = upper_orbit(ff.frequency_response(machine, (50.0, 57.7)), 57.7)
@@ -118,16 +119,16 @@ def test_row_25_leaning_motion_by_settling(screen) -> None:
 
 @pytest.mark.parametrize("order", [None, 3, 9, 31])
 @pytest.mark.parametrize("clearance", [4e-3, 5e-3, 6e-3])
-def test_row_25_none_at_larger_gaps(response, clearance: float, order: int | None) -> None:
-    """Row 25: none at 4, 5 and 6 mm, by either method."""
+def test_none_at_larger_gaps(response, clearance: float, order: int | None) -> None:
+    """None at 4, 5 and 6 mm, by either method."""
     method = None if order is None else ff.HarmonicBalance(order)
     branch = response(method, clearance=clearance)
     found = [point.omega for point in branch.points_of("symmetry breaking")]
     assert found == [], f"symmetry lost at {found}, expected nowhere"
 
 
-def test_row_25_at_3_mm_symmetry_is_lost_too(screen, response) -> None:
-    """Row 25 says to look at 3 mm: there is a window, and DOP853 leans inside and not beside it.
+def test_at_3_mm_symmetry_is_lost_too(screen, response) -> None:
+    """At 3 mm there is a window, too, and DOP853 leans inside and not beside it.
 
     The window is this package's own finding, so it is held to 1e-3 by two methods (H = 31 to
     5e-2) and judged by integration 0.3 rad/s to either side of its ends.

@@ -23,6 +23,10 @@ from flipflow.model.screen import FlipFlowScreen
 Number = float | complex
 STEP = 1e-30
 SECOND_STEP = 1e-4
+# Shares of the unknowns: both solvers still end with noise of 1e-13 put upon f and f_s. Asked for
+# less than rounding they warn that they make no progress, on one processor and not on another.
+FOLD_SHARP = 1e-10
+CUSP_SHARP = 1e-7
 
 
 def required_moment_squared(screen: FlipFlowScreen, s: Number, omega: float) -> Number:
@@ -79,7 +83,7 @@ def fold(screen: FlipFlowScreen, s: float, omega: float) -> tuple[float, float]:
         share, w = u[0], u[1] * omega
         return [float(mismatch(screen, share, w)), slope(screen, share, w)]
 
-    share, scaled = fsolve(both, [s, 1.0], xtol=1e-13)
+    share, scaled = fsolve(both, [s, 1.0], xtol=FOLD_SHARP)
     return float(share), float(scaled * omega)
 
 
@@ -96,7 +100,7 @@ def cusp(
             curvature(machine, u[1], w),
         ]
 
-    scaled, _, frequency = fsolve(three, [1.0, s, 1.0], xtol=1e-12)
+    scaled, _, frequency = fsolve(three, [1.0, s, 1.0], xtol=CUSP_SHARP)
     return float(scaled * value), float(frequency * omega)
 
 

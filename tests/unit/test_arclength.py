@@ -15,6 +15,7 @@ from flipflow.continuation.arclength import new_branch, new_corrector
 from flipflow.periodic.stability import determinant_minus, determinant_plus
 from kernel_calls import predicted
 
+pytestmark = pytest.mark.numerical
 ANYWHERE = arclength.Course(1.0, 100.0, 1.0, 1.0, 1.0, arclength.QUICK)
 TURN = 1.0 / math.sqrt(2.0)
 

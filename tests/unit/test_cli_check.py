@@ -119,7 +119,7 @@ def test_help_loads_nothing_heavy():
     """Seconds depend on the machine that runs the test; what is imported does not."""
     code = (
         "import sys; from flipflow.cli.main import app; "
-        "heavy = {'numpy', 'scipy', 'numba', 'xarray', 'pint', 'pydantic', 'rich', 'plotly'}; "
+        "heavy = {'numpy', 'scipy', 'numba', 'xarray', 'pint', 'rich', 'plotly'}; "
         "print(sorted(heavy & set(sys.modules)))"
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

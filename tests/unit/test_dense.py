@@ -8,6 +8,8 @@ import pytest
 from judge import close
 from kernel_calls import solve
 
+pytestmark = pytest.mark.numerical
+
 
 @pytest.mark.parametrize("n", [1, 2, 5, 30])
 @pytest.mark.parametrize("seed", range(5))

@@ -8,12 +8,13 @@ import flipflow as ff
 from flipflow.continuation.branch import Branch
 from flipflow.studies.feasible import STABILITY, case_window
 
+pytestmark = pytest.mark.numerical
 SPAN = (40.0, 75.0)
 
 
 @pytest.mark.parametrize("points", [40, 400])
 def test_stable_speeds_end_where_symmetry_is_lost(screen, points):
-    """Row 25: e = 2 mm, the symmetric motion is unstable between 56.9837 and 58.4409 rad/s.
+    """e = 2 mm, the symmetric motion is unstable between 56.9837 and 58.4409 rad/s.
 
     With 40 points the whole window lies within two steps of the branch.
     """

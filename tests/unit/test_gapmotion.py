@@ -19,6 +19,7 @@ from flipflow.model.contact_law import NUMBER
 from judge import close
 from kernel_calls import change_after, range_of
 
+pytestmark = pytest.mark.numerical
 OPEN, PLUS, MINUS, RELEASED_PLUS = 0, 1, -1, 2
 NOTHING = (-1, 0)
 SAMPLES = 200_001

@@ -226,7 +226,7 @@ def _toml(tables):
     return "\n".join(lines)
 
 
-# No deadline: the first file read also imports pint and pydantic.
+# No deadline: the first file read also imports pint.
 ANY_FILE = settings(
     max_examples=100,
     deadline=None,

@@ -6,6 +6,7 @@ import pytest
 import flipflow as ff
 from flipflow.periodic.balance_solver import BalanceSolver
 
+pytestmark = pytest.mark.numerical
 OMEGA = 0.9
 
 

@@ -10,6 +10,8 @@ from flipflow.continuation.field_path import FieldEquations, FoldEquations
 from flipflow.continuation.predictor_corrector import Equations, follow, follow_both_ways
 from judge import close
 
+pytestmark = pytest.mark.numerical
+
 
 class Curve(Equations):
     """f(x, p) = 0 with its gradient; the steps are a tenth long."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.dynamics.machine import machine_arrays
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.sampled import new_sampled, new_sampled_work
 from flipflow.periodic.series import new_balance, new_balance_work
@@ -17,6 +17,7 @@ from judge import close
 from kernel_calls import balance, central_differences, jump, residual_of, sampled, shoot
 from reference import integrate
 
+pytestmark = pytest.mark.numerical
 LAWS = ("paper", "compression-only")
 CASES = {"symmetric": None, "unequal gaps": 5e-3, "one-sided": math.inf}
 LENGTH = 6e-3
@@ -137,7 +138,7 @@ def test_jacobians_with_several_springs() -> None:
 
 
 def test_saltation_kernel(screen) -> None:
-    """Row 12: in (x1, x2) the entries are -c3/m1, -c3 (1/m1 + 1/m2); at the exit with +."""
+    """In (x1, x2) the entries are -c3/m1, -c3 (1/m1 + 1/m2); at the exit with +."""
     arrays = machine_arrays(screen.system())
     c3, m1, m2 = screen.stop_damping, screen.main_mass, screen.floating_mass
     to_relative = np.kron(np.eye(2), [[1.0, 0.0], [1.0, -1.0]])

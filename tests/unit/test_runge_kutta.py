@@ -20,6 +20,7 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4
 from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper
 
+pytestmark = pytest.mark.numerical
 OMEGA = 120.0
 TURN = 2.0 * np.pi / OMEGA
 
@@ -122,7 +123,7 @@ def missed(system, start, end, method):
     ("dopri5", 4.7, (25, 50, 100, 200)),
 ])  # fmt: skip
 def test_order_across_contacts(shaken, formula, least, counts):
-    """Row 22: the observed order of RK4 is at least 3.7; of the 5(4) pair likewise 4.7."""
+    """The observed order of RK4 is at least 3.7; of the 5(4) pair likewise 4.7."""
     errors = [missed(*shaken, RungeKutta(formula, step=TURN / n))[0] for n in counts]
     slope = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert slope >= least, (slope, errors)

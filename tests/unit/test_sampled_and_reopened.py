@@ -5,6 +5,7 @@ import pytest
 import flipflow as ff
 from flipflow.errors import SampledContactWarning
 
+pytestmark = pytest.mark.numerical
 METHOD = ff.SampledHarmonicBalance(3, 256, 1e6)
 
 

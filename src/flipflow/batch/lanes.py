@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
-from flipflow.dynamics.machine import machine_arrays
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from flipflow.periodic.turns import NOT_SETTLED, settle_lanes
 
 Int = NDArray[np.int64]
-CHUNK = 64
-MOST_THREADS = 256
+CHUNK = 64  # lanes that one task of a thread runs
+MOST_THREADS = 256  # that may be asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +163,11 @@ class Lanes:
         """
         label, turns, code = (np.zeros(part.stop - part.start, np.int64) for _ in range(3))
         states = run.states[part].copy()
+        nothing = np.empty((states.shape[0], 0, states.shape[1]))
         problem = new_shooting(self.machine, half_turn=False, length=1.0)
         settle_lanes(
             problem, new_shooting_work(self.machine), states, begin[part], self.omega,
-            capture.centre, capture.form, capture.owner, most, label, turns, code,
+            capture.centre, capture.form, capture.owner, most, nothing, label, turns, code,
         )  # fmt: skip
         run.states[part], run.label[part] = states, label
         run.turns[part], run.code[part] = turns, code

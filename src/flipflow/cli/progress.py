@@ -24,9 +24,13 @@ def progress(begin: str) -> Iterator[Monitor]:
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
 
     terminal = Console(stderr=True)
+    if not terminal.is_terminal:
+        # rich before 14.3 ends even a bar that is switched off with an empty line.
+        yield lambda _sentence, _share: None
+        return
     bar = Progress(
         SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20),
-        console=terminal, transient=True, disable=not terminal.is_terminal,
+        console=terminal, transient=True,
     )  # fmt: skip
     with bar:
         task = bar.add_task(begin, total=1.0)

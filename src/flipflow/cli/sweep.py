@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from flipflow.model.project import Project
-    from flipflow.plotting.parts import Figure
+    from flipflow.plotting.figure import Figure
     from flipflow.studies.ramp import Ramp
     from flipflow.transient.sweep import Sweep
 

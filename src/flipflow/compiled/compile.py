@@ -67,7 +67,7 @@ _ENTRY = _PART = _LANGUAGE
 _COMPILED_BY = "numba alone"
 if OWN_CACHE:
     from flipflow.compiled.cache import KernelCache
-    from flipflow.compiled.parts import OPTIMISATION, EntryCompiler, PartCompiler
+    from flipflow.compiled.parts import OPTIMISATION, EntryCompiler, PartCompiler, without_literals
 
     _ENTRY = _LANGUAGE | {"no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": EntryCompiler}
     _PART = _ENTRY | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler}
@@ -88,8 +88,11 @@ def _compile(function: Callable[P, R], *, entry: bool, inline: bool) -> Callable
         plain = _by_numba_alone(function) if entry else numba.njit(**_PART)(function)
         return cast("Callable[P, R]", plain)
     compiled = numba.njit(forceinline=inline, **(_ENTRY if entry else _PART))(function)
-    if entry and not config.DISABLE_JIT:
+    if config.DISABLE_JIT:
+        return function
+    if entry:
         compiled._cache = KernelCache(function, compiled_by())  # noqa: SLF001  numba offers no other way
+    compiled = without_literals(compiled)
     return cast("Callable[P, R]", compiled)
 
 

@@ -21,11 +21,11 @@ import numpy as np
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.compile import kernel
 
-EPS = 2.220446049250313e-16
-MOST_SWEEPS = 60  # a block of two usually splits off after two or three
+EPS = 2.220446049250313e-16  # relative rounding: spacing of floating-point numbers at 1
+MOST_SWEEPS = 60  # QR sweeps for one eigenvalue or pair; two or three are usual
 STUCK = 10  # sweeps after which a shift from outside breaks a cycle
 BALANCED = 0.95  # a scaling that saves less than this is not worth its pass
-MOST_PASSES = 20
+MOST_PASSES = 20  # of balancing over all rows
 
 
 class Schur(NamedTuple):

@@ -21,8 +21,8 @@ from pathlib import Path
 
 logger = logging.getLogger("flipflow")
 
-DAY = 86400.0
-KEPT_DAYS = 30.0
+DAY = 86400.0  # s
+KEPT_DAYS = 30.0  # after which compiled code that nobody has used is removed
 _CHECKSUM_BYTES = hashlib.sha256().digest_size
 
 

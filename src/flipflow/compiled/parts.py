@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba.core import config
+from numba.core import config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -36,12 +36,10 @@ class EntryCompiler(Compiler):
 
 
 class PartLibrary(JITCodeLibrary):
-    """A kernel with those it calls, neither optimised together nor made machine code of."""
+    """A kernel alone: what it calls is neither taken in nor made machine code of."""
 
     def finalize(self) -> None:
-        """Take in what the kernel calls; nothing can be added any more."""
-        for library in dict.fromkeys(self._linking_libraries):
-            self._final_module.link_in(library._get_module_for_linking(), preserve=True)  # noqa: SLF001  as numba's own does
+        """Nothing can be added any more."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -60,7 +58,9 @@ class PartLowering(NativeLowering):
         # Callers find the code by a built-in function of its own; called from Python this one,
         # the look-up in an empty dictionary, raises, whatever the arguments.
         name = dict[Any, Any]().__getitem__
-        state.targetctx.insert_user_function(name, state.cr.fndesc, [state.library])
+        # Callers take in what this kernel calls, too, so that an entry links each part once.
+        libraries = dict.fromkeys([state.library, *state.library._linking_libraries])  # noqa: SLF001
+        state.targetctx.insert_user_function(name, state.cr.fndesc, list(libraries))
         state.cr = state.cr._replace(cfunc=name)
         return True
 
@@ -76,3 +76,15 @@ class PartCompiler(CompilerBase):
         ]
         passes.finalize()
         return [passes]
+
+
+def without_literals(dispatcher: Any) -> Any:
+    """Call a kernel with 0 or True as with any number: numba compiles it anew for each of them."""
+    resolve = dispatcher.get_call_template
+
+    def widened(args: tuple[types.Type, ...], kws: dict[str, types.Type]) -> Any:
+        plain = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return resolve(tuple(types.unliteral(kind) for kind in args), plain)
+
+    dispatcher.get_call_template = widened
+    return dispatcher

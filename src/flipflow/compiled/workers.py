@@ -20,7 +20,7 @@ from flipflow.compiled.digest import module_digest
 from flipflow.compiled.folders import FOLDERS
 
 logger = logging.getLogger("flipflow")
-POLL_SECONDS = 0.2
+POLL_SECONDS = 0.2  # between two looks at whether the workers have ended
 
 
 def compile_parts(module: str, parts: Iterable[str], tell: Callable[[float], None]) -> None:

@@ -1,7 +1,7 @@
 """Pseudo-arclength continuation of a branch in omega, compiled whole.
 
 Unknowns w = (u, omega) are measured in steps: each unknown by its own size times ``u_step``,
-omega by ``omega_step``, so that a step of length one is as long as is wanted in any of them.
+omega by ``omega_step``, so that a step of length one is the longest that is wanted in each.
 """
 
 from __future__ import annotations
@@ -17,16 +17,28 @@ from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.continuation.problem import depths, residual, signature, unknown_scale
 
-NEWTON_MOST = 8
-NEWTON_FEW, NEWTON_MANY = 3, 4
-QUICK, SHARP = 1e-6, 1e-10
-GROW, SHRINK, HALVE = 1.5, 0.7, 0.5
-LONGEST, SHORTEST = 1.0, 1e-10
-FAR = 2.0
-TOLERATED = 1e-4
-TURN_MOST, ASTRAY_MOST, ASTRAY_AT_CORNER = 0.90, 0.05, 0.3
-AWAY, BACK = 3.0, 0.9
-CONTACT_STEP, STRAND_STEP, SHORT_STEP = 0.03, 1e-4, 1e-3
+# Lengths are measured in steps, as the unknowns are.
+NEWTON_MOST = 8  # iterations after which a correction has failed
+NEWTON_FEW = 3  # iterations up to which the next step grows
+NEWTON_MANY = 4  # iterations from which the next step shrinks; with more the step is refused
+QUICK = 1e-6  # last Newton step where a branch is followed; below it, one that stalls is rounding
+SHARP = 1e-10  # last Newton step where a single point is refined
+GROW = 1.5  # factor on the step after few iterations
+SHRINK = 0.7  # factor on the step after many iterations
+HALVE = 0.5  # factor on a step that was refused
+LONGEST = 1.0  # length beyond which a step does not grow
+SHORTEST = 1e-10  # length below which the branch is given up
+FAR = 2.0  # from this many chords on, the tangent predicts a step, not the cubic
+TOLERATED = 1e-4  # last Newton step, at most this share of the step along the branch
+TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
+ASTRAY_MOST = 0.05  # largest distance of the corrected point from the guess, as a share of the step
+ASTRAY_AT_CORNER = 0.3  # the same for a step up to SHORT_STEP
+AWAY = 3.0  # distance from its first point that a branch must reach before it can close
+BACK = 0.9  # share of a step within which it has then come back to that point
+CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
+STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
+SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
+# Why a step was refused, as a branch records it.
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
 
@@ -237,8 +249,9 @@ def chord_to(work: Corrector, branch: Branch, p: int) -> float:
 def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> None:
     """Turn the guess on the tangent of point p into one on the cubic through p - 1 and p.
 
-    With h the chord, left in work.b by ``chord_to``, d its direction, t and t' the tangents at p
-    and p - 1 and r = step / h, that is step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')) farther.
+    With h the chord, which ``chord_to`` left in work.b, d its direction, t and t' the tangents at
+    p and p - 1, and r = step / h, the guess moves by
+    step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')).
     """
     norm = 0.0
     for k in range(work.b.shape[0]):
@@ -255,7 +268,7 @@ def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> 
 
 @kernel
 def astray(work: Corrector) -> float:
-    """Distance of the corrected point from the guess, in steps: far away is another strand."""
+    """Distance of the corrected point from the guess, in steps; far away lies another strand."""
     square = 0.0
     for k in range(work.w.shape[0]):
         square += ((work.w[k] - work.guess[k]) / work.scale[k]) ** 2
@@ -323,11 +336,11 @@ def trace(
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
 
-    The first point is corrected at fixed omega, the last stands exactly on the bound; a branch
-    that comes back to its first point is closed there. A step is
-    refused and halved when Newton fails, when the tangent turns too far, and, down to a small
-    length, when the contacts of a turn change: points then gather where a contact begins, for
-    what is narrow hides there.
+    The first point is corrected at fixed omega, the last one stands exactly on the bound; a branch
+    that comes back to its first point is closed there. A step is refused and halved when Newton
+    fails, when the tangent turns too far, and, down to a small length, when the contacts of a turn
+    change. Points then gather where a contact begins, because narrow details of the branch stand
+    there.
     """
     n = work.r.shape[0]
     for k in range(n):
@@ -363,7 +376,7 @@ def trace(
         branch.iterations[p] = iterations
         distance = from_start(work, branch)
         travelled = max(travelled, distance)
-        # Beside a fold the other strand passes the first point, too, with omega the other way.
+        # Beside a fold the other strand also passes the first point, but with omega the other way.
         same_way = branch.tangent[p, n] * branch.tangent[0, n] > 0.0
         back = travelled > AWAY and distance < BACK * step and same_way
         ended = arrival(branch, course, p, ends, back)

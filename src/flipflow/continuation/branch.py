@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
@@ -78,7 +79,7 @@ class ShortenedStep:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Periodic motions followed over frequency, in the order in which they hang together.
+    """Periodic motions followed over frequency, in their order along the branch.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
     points; it is what :func:`flipflow.frequency_response` returns, and
@@ -135,6 +136,12 @@ class Branch:
         return self.formulation.system
 
     @property
+    def solver(self) -> object:
+        """A solver of the branch's equations, made anew; use ``formulation.solver()``."""
+        warnings.warn("Branch.solver: use Branch.formulation.solver()", DeprecationWarning, 2)
+        return self.formulation.solver()
+
+    @property
     def periods(self) -> int:
         """Number of forcing periods after which the motions repeat."""
         return self.formulation.turns
@@ -161,7 +168,7 @@ class Branch:
 
     @cached_property
     def error(self) -> Real:
-        """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
+        """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
         return self.formulation.solver().errors(self.traced.u, self.omega)
 
     @property
@@ -315,7 +322,7 @@ class Branch:
                 try:
                     point = solver.between(self.traced, p, share)
                 except IncompleteError:
-                    return math.inf  # not every motion between two sharp bends can be had
+                    return math.inf  # Newton may fail between two sharp bends
                 low, high, _ = solver.extremes(point.u[None], np.array([point.omega]), vector)
                 return sign * float(high[0, 0] - low[0, 0])
 

@@ -1,12 +1,15 @@
-"""Special points of a truncated series held against the exact flow.
+"""Special points of a truncated series, checked against the exact flow.
 
-Where a motion has sharper detail than the harmonics kept, the series wiggles about it: it turns
-back where the exact motion does not, and the exact motion that Newton reaches from it is now one,
-now another. A fold of the series is one of the machine when the exact motions before and after it,
-up to the next folds of the series, lie on opposite sides of an eigenvalue +1, and on the sides
-that the number of folds passed tells. Any other special point is one when the exact branch, taken
-between exact motions on both sides of it, has a zero of the test function. Beside a fold, where
-there is no exact motion at the speed of the series, the exact branch is followed past it.
+Where a motion has sharper details than the harmonics kept can follow, the series wiggles about the
+exact motion. The branch of the series then turns back where the exact branch does not, and Newton's
+method reaches now one exact motion from the series, now another.
+
+A fold of the series is one of the machine when the exact motions before and after it, up to the
+next folds of the series, lie on opposite sides of an eigenvalue +1, and on the sides that follow
+from the number of folds passed. Any other special point of the series is one of the machine when
+its test function has a zero on the exact branch, between exact motions on both sides of the point.
+Beside a fold there is no exact motion at the speed of the series; there the exact branch is
+followed past the fold.
 """
 
 from __future__ import annotations
@@ -28,11 +31,11 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import determinant_minus
 
-BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)
-FOLLOWED = (1.0, 4.0)
-EDGE = 1e-6
-ZERO = 1e-3
-LISTED = 8
+BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)  # steps to both sides, in this order
+FOLLOWED = (1.0, 4.0)  # steps before and after a point over which the exact branch is followed
+EDGE = 1e-6  # relative widening of that interval of speeds
+ZERO = 1e-3  # a test below this share of its values at the ends has a zero there, not a jump
+LISTED = 8  # speeds that a note names
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,7 @@ class ExactBeside:
         return self.exact.solve(state, near.omega)
 
     def crosses(self, position: float, room: float, test: Callable[[Real], float]) -> bool:
-        """Whether the exact branch has a zero of a test less than ``room`` steps off a position."""
+        """Whether a test has a zero on the exact branch within ``room`` / 2 steps of a position."""
         for share in BESIDE:
             sides = [self.at(position + sign * share) for sign in (-1.0, 1.0) if share < 0.5 * room]
             ends = [side for side in sides if side is not None]
@@ -71,9 +74,9 @@ class ExactBeside:
     def passes(self, position: float, room: float, test: Callable[[Traced, Real], Real]) -> bool:
         """Whether the exact branch, followed past a position, has a zero of a test there.
 
-        It is followed by its own arc length from an exact motion behind the position over the
-        speeds of the series up to as far ahead: past folds, where no exact motion has the speed
-        of the series.
+        The exact branch is followed by its own arc length, from an exact motion before the position
+        over the speeds that the series has up to as far after it. That also leads past folds, where
+        no exact motion has the speed of the series.
         """
         omega, course = self.traced.omega, self.traced.course
         for steps in FOLLOWED:

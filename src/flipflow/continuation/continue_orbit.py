@@ -34,7 +34,7 @@ from flipflow.periodic.orbit import Orbit, checked_orbit
 from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Solver
 from flipflow.periodic.stability import UNDETERMINED
 
-SYMMETRIC = 1e-9
+SYMMETRIC = 1e-9  # distance from its mirror image, relative: a motion within it is symmetric
 SPECIAL_SHARE = 0.8  # of the work is done where the special points are sought
 
 
@@ -110,8 +110,8 @@ def switch_branch(
 ) -> Branch:
     """Follow the motions that branch off at a period doubling or a symmetry breaking.
 
-    From a period doubling those of twice the periods, from a symmetry breaking those that lean to
-    one side; the mirror images of the latter are motions, too, of the same amplitudes. The first
+    From a period doubling come motions of twice the periods, from a symmetry breaking motions that
+    lean to one side; the mirror images of these are motions too, of the same amplitudes. The first
     motion lies a small way along the critical eigenvector of the return map and is solved for in
     the plane of fixed amplitude, omega being unknown. Motions are exact, whatever the method
     that found the point.
@@ -160,7 +160,7 @@ def switch_branch(
 def formulation_like(orbit: Orbit, kind: type[Solver]) -> Formulation:
     """A formulation of a kind for the orbit's periods, mirror-symmetric where the orbit is.
 
-    The orbit's own where that is such a one.
+    The orbit's own formulation where it is of that kind already.
     """
     own = orbit.point.formulation
     symmetric = own.half_turn

@@ -38,7 +38,7 @@ class FieldSpecialPoint(SpecialPoint):
 class FieldBranch:
     """Periodic motions, or folds, followed over a field of the machine.
 
-    Arrays are (n,) over its points, in the order in which they hang together. It is what
+    Arrays are (n,) over its points, in their order along the branch. It is what
     :func:`flipflow.continue_orbit` returns for a field of the machine, and
     :func:`flipflow.continue_fold`.
 
@@ -100,7 +100,7 @@ class FieldBranch:
 
     @cached_property
     def error(self) -> Real:
-        """Estimated distance of each motion from the exact one in m, (n,); inf: no promise."""
+        """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
         return np.array([orbit.error for orbit in self.orbits])
 
     @property

@@ -19,18 +19,19 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import determinant_plus
 
-POINTS = 200
-# Differences are shares of an unknown's own size: a share of a wide interval would swamp the value.
+POINTS = 200  # the longest step in the field is the interval divided by this
+# Step of a difference quotient, as a share of the unknown's own size: the same share of a wide
+# interval would swamp the value.
 DIFFERENCE = 1e-6
-# A step moves the frequency, and the field, by no more than these shares of their own size.
-OMEGA_SHARE, VALUE_SHARE = 0.02, 0.05
-SOLVERS_KEPT = 8
+OMEGA_SHARE = 0.02  # longest step in the frequency, as a share of it
+VALUE_SHARE = 0.05  # longest step in the field, as a share of its size
+SOLVERS_KEPT = 8  # values of the field whose machines are kept flattened
 SystemAt = Callable[[float], MechanicalSystem]
 
 
 @dataclass(frozen=True, eq=False)
 class FieldPoint(Point):
-    """A motion of the machine whose field has a value; ``omega_tangent`` is the share in it."""
+    """A motion at a value of the field; ``omega_tangent`` is the tangent's share in the value."""
 
     value: float = np.nan
 
@@ -45,7 +46,7 @@ class FieldEquations(Equations):
     bounds
         (lower, upper) values.
     own
-        The machine's own value, which says how large values of the field are.
+        The machine's own value, which sets the scale of the field.
     omega
         Frequency in rad/s.
     half_turn, turns

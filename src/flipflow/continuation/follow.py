@@ -1,4 +1,4 @@
-"""A branch followed whole, and its points and special points between those that were stored.
+"""A branch followed from end to end; points, folds and contacts between its stored points.
 
 A fold is a zero of the tangent's share in omega, a contact begins or ends at a zero of the depth
 beyond its gap. Both are sought on corrected points, never interpolated.
@@ -26,10 +26,10 @@ from flipflow.continuation.arclength import (
 )
 from flipflow.continuation.problem import depths, residual
 
-TRACE_ALL = -1
-FOLD = -1
-SHARE_TOLERANCE = 1e-10
-MOST_ROOT_STEPS = 100
+TRACE_ALL = -1  # in place of a step: follow the whole branch
+FOLD = -1  # number of the test for a fold; those from 0 on are depths beyond gaps
+SHARE_TOLERANCE = 1e-10  # share of a step to which a zero is located
+MOST_ROOT_STEPS = 100  # steps of the search for one zero
 
 
 @kernel
@@ -42,11 +42,10 @@ def correct_between(
     share: float,
     course: Course,
 ) -> int:
-    """A point of the branch between points p and p + 1: beside ``share`` of the cubic through them.
+    """Find a point of the branch between points p and p + 1, near ``share`` of the cubic on them.
 
-    The plane to solve in stands across their chord.
-    It stands in work.w, its Jacobian in work.J, its tangent, in the branch's direction, in
-    work.tangent (scaled by work.scale).
+    The plane to solve in is normal to their chord. The point is left in work.w, its Jacobian in
+    work.J, and its tangent, in the branch's direction, in work.tangent (scaled by work.scale).
     """
     n = work.r.shape[0]
     recall(problem, work, branch, p + 1, course)
@@ -86,9 +85,10 @@ def height_between(
     test: int,
     course: Course,
 ) -> tuple[int, float]:
-    """Status and the test at a share of step p; at its ends as it was recorded.
+    """Status, and the value of a test at a share of step p; at the step's ends the recorded one.
 
-    Where a branch turns within a step its ends corrected anew would run along the chord.
+    Where a branch turns within a step, an end that is corrected anew would get its tangent along
+    the chord.
     """
     if not 0.0 < share < 1.0:
         end = p + int(share)
@@ -162,9 +162,9 @@ def follow(
 ) -> tuple[int, int, float]:
     """Trace the branch from (u, omega), or find a point within step p >= 0.
 
-    That is the one at the share ``low`` when ``high`` is the same, else the zero of a test between
-    the two. Returns status, points and share. One entry for all: each is optimised anew with all
-    that it calls.
+    Within a step it is the point at the share ``low`` where ``high`` is the same, else the zero of
+    a test between the two shares. Returns status, points and share. One entry serves all, because
+    every entry is compiled together with all that it calls.
     """
     if p == TRACE_ALL:
         code, points = trace(problem, scratch, work, branch, u, omega, course)

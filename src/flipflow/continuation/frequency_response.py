@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.continuation import arclength
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
+from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -36,8 +37,10 @@ from flipflow.periodic.stability import (
     stability_words,
 )
 
-SETTLING_TURNS = 4000
-SCAN_POINTS = 2000
+SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
+SCAN_POINTS = 2000  # equally spaced frequencies at which contact is looked for
+BACK, BACK_MOST = 0.96, 170  # steps down in search of a motion without contact, to a thousandth
+STEPS_UP = 16  # least steps from there up to the frequency asked for
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -49,7 +52,7 @@ def frequency_response(
 ) -> Branch:
     """Follow the periodic motions of a machine over an interval of frequency.
 
-    The branch is the one reached from below: it starts from the motion that hangs together with
+    The branch is the one reached from below: it starts from the motion that is connected with
     the contact-free one at lower frequency, and is followed through its folds by pseudo-arclength
     until it leaves the interval. Every point has its stability and error, every special point is
     refined. Motions detached from this branch are not seen.
@@ -106,11 +109,9 @@ def described(machine: Machine, method: Method, solver: Solver, traced: Traced) 
     return _finished(machine, method, solver, traced, maps, found, notes, eigenvalues)
 
 
-def solver_for(
-    system: MechanicalSystem, method: Method, *, half_turn: bool | None = None, turns: int = 1
-) -> Solver:
+def solver_for(system: MechanicalSystem, method: Method) -> Solver:
     """A solver of a method's equations for a machine: see :func:`formulation_of`."""
-    return formulation_of(system, method, half_turn=half_turn, turns=turns).solver()
+    return formulation_of(system, method).solver()
 
 
 def formulation_of(
@@ -144,41 +145,41 @@ def method_of(formulation: Formulation) -> Method:
 def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
-    Where no lower frequency touches a stop that is the contact-free motion. Otherwise the branch
-    is followed up from a frequency without contact, and where there is none, the machine is let
-    settle from rest.
+    Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
+    followed up from a frequency without contact; where there is none, the machine is left to settle
+    from rest.
     """
     lower = lowest_contact(solver, omega)
     if lower is None:
         return contact_free_unknowns(solver, omega)
-    while lower > 1e-3 * omega:
-        lower *= 0.96
-        if contact_free(solver, lower):
-            course = arclength.Course(
-                lower, omega, (omega - lower) / 50, STEP_SHARE, 1.0, arclength.QUICK
-            )
-            traced = solver.trace(contact_free_unknowns(solver, lower), lower, course)
-            if traced.code == status.REACHED_UPPER:
-                return np.asarray(traced.u[-1])
-            break
+    starts = lower * BACK ** np.arange(1.0, BACK_MOST)
+    free = ~_meets_a_gap(solver, complex_amplitudes(solver.system, starts))
+    if free.any():
+        start = float(starts[free.argmax()])
+        step = (omega - start) / STEPS_UP
+        course = arclength.Course(start, omega, step, STEP_SHARE, 1.0, arclength.QUICK)
+        traced = solver.trace(contact_free_unknowns(solver, start), start, course)
+        if traced.code == status.REACHED_UPPER:
+            return np.asarray(traced.u[-1])
     return settled_unknowns(solver, omega)
 
 
 def lowest_contact(solver: Solver, omega: float) -> float | None:
     """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
     scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
-    _, first = solver.contact_free(scan, stop_at_contact=True)
-    return float(scan[first]) if first < scan.size else None
+    beyond = _meets_a_gap(solver, complex_amplitudes(solver.system, scan))
+    return float(scan[beyond.argmax()]) if beyond.any() else None
 
 
-def contact_free(solver: Solver, omega: float) -> bool:
-    """Whether the linear motion at ``omega`` stays within all gaps."""
-    return solver.contact_free(np.array([omega]))[1] == 1
+def _meets_a_gap(solver: Solver, X: Complex) -> NDArray[np.bool_]:
+    """Where linear motions X (n, N) reach the gap of any spring, (n,)."""
+    gaps = solver.machine.stops.gap.min(axis=1)
+    return np.asarray((np.abs(X @ solver.machine.direction.T) >= gaps).any(axis=1))
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = solver.contact_free(np.array([omega]))[0][0]
+    X = complex_amplitudes(solver.system, np.array([omega]))[0]
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])
@@ -244,5 +245,5 @@ def _finished(
 
 
 def word_of(kind: str) -> str | None:
-    """Where stability changes the motion is neither; elsewhere its multipliers tell."""
+    """The stability where it changes, which is neither; None leaves it to the multipliers."""
     return UNDETERMINED if kind in STABILITY_CHANGES else None

@@ -35,12 +35,16 @@ from flipflow.continuation.arclength import (
 from flipflow.model.monitor import Monitor, silent
 
 Real = NDArray[np.float64]
-FIRST_STEP = 0.1
+FIRST_STEP = 0.1  # length of the first step
 # Steps tried one way, refused ones too: a curve of folds through two cusps takes about 200.
 TRIES_MOST = 3000
 # A step along the tangent strays farther, and Newton takes longer, than one along the cubic.
-ASTRAY_MOST, NEWTON_MANY = 0.2, 5
-NEAR, CLOSE, SAME = 1e-2, 1e-3, 1e-7
+ASTRAY_MOST = 0.2  # largest distance of the corrected point from the guess, as a share of the step
+NEWTON_MANY = 5  # iterations from which the next step shrinks; with more the step is refused
+# Distances of a motion from the parent branch, relative to the motion.
+NEAR = 1e-2  # a branch that stalls within it has met its parent
+CLOSE = 1e-3  # points within it are left out at a meeting
+SAME = 1e-7  # a motion within it is one of the parent's
 
 
 class Equations(ABC):
@@ -63,7 +67,7 @@ class Equations(ABC):
 
     @abstractmethod
     def apart(self, w: Real) -> float:
-        """How far a solution is from the branch that this one may come from; infinite: none."""
+        """Distance of a solution from the parent branch, relative; infinite where there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +178,7 @@ def stalled(equations: Equations, points: list[Solved]) -> Path:
 
 
 def met(equations: Equations, points: list[Solved]) -> Path:
-    """A path that ends on another branch, without the points that are one with it to rounding."""
+    """A path that ends on its parent branch, without the points that rounding puts there."""
     kept = len(points)
     while kept > 1 and equations.apart(points[kept - 1].w) < CLOSE:
         kept -= 1

@@ -28,9 +28,12 @@ from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
-DIP, SHARP_DIP, LOW = 0.5, 0.3, 1e-3
-BOTTOM_STEPS = 15
-QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
+# A dip of |test| is followed to its bottom where any of these three holds.
+DIP = 0.5  # the parabola through it falls below this share of its lowest point
+SHARP_DIP = 0.3  # that point lies below this share of both its neighbours
+LOW = 1e-3  # that point lies below this share of the largest value along the branch
+BOTTOM_STEPS = 15  # evaluations in the search for the bottom of a dip
+QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a step at which a suspected dip is looked for
 
 FOLD = "fold"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
@@ -151,7 +154,7 @@ def _neimark_sacker_along(traced: Traced, maps: Real) -> Real:  # noqa: ARG001
     return neimark_sacker(eigenvalues_of(maps))
 
 
-# Both stand where a branch turns, and where no exact motion has the speed of the series.
+# These may stand where a branch turns back, so that no exact motion has the speed of the series.
 _ALONG: dict[str, Callable[[Traced, Real], Real]] = {
     FOLD: _fold_along,
     NEIMARK_SACKER: _neimark_sacker_along,
@@ -236,9 +239,10 @@ def _brackets(
 
 
 def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> tuple[int, ...]:
-    """Steps with contact and no change of sign which the slope at one end carries the test across.
+    """Steps without a change of sign in which the slope at an end would take the test through zero.
 
-    A motion without contact has the eigenvalues of the linear machine, all within the circle.
+    Only steps with contact: without it the eigenvalues are those of the linear machine, all within
+    the unit circle.
     """
     slope = np.diff(values) / np.diff(arc)
     step = np.diff(arc)[1:-1]
@@ -258,7 +262,7 @@ def _arc(traced: Traced) -> Real:
 
 
 def _dips(values: Real) -> list[int]:
-    """Interior points where |test| is least and by its neighbours may fall to nothing."""
+    """Interior points where |test| is least and, judged by its neighbours, may fall to zero."""
     inner = np.abs(values[1:-1])
     before, after = np.abs(values[:-2]), np.abs(values[2:])
     same = (np.sign(values[:-2]) == np.sign(values[1:-1])) & (
@@ -277,7 +281,8 @@ def _dips(values: Real) -> list[int]:
 def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool) -> float | None:
     """Share in step p where the test has the other sign, None when it never has.
 
-    A plunge that is nowhere between lower than at the ends has ended.
+    With ``plunges`` three points within the step are tried first: where none is lower than both
+    ends, there is no dip.
     """
     sign = float(np.sign(test.values[p]))
     low, high = 0.0, 1.0
@@ -328,7 +333,7 @@ def _zero_between(
 
 
 def _is_real(solver: Follower, found: Found) -> bool:
-    """A product of two real eigenvalues passing one also zeroes the Neimark-Sacker test."""
+    """False where two real eigenvalues of product 1, not a complex pair, make the test zero."""
     if found.kind != NEIMARK_SACKER:
         return True
     return has_unit_pair(eigenvalues_of(solver.return_map(found.point)))

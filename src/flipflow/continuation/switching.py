@@ -23,9 +23,10 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus
 
-FINER = (1.0, 0.05, 0.01, 0.001)
-SMALL = 1e-3
-SECANT, SECANT_MOST = 1e-6, 30
+FINER = (1.0, 0.05, 0.01, 0.001)  # factors on the step, tried until no point lands on the parent
+SMALL = 1e-3  # distance of a child's first motion from its parent, relative to the motion
+SECANT = 1e-6  # relative distance in omega of the first two points of the secant method
+SECANT_MOST = 30  # its iterations
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,8 @@ class Followed:
 def parent_of(solver: Solver) -> ExactSolver | None:
     """The solver of the motions from which this solver's may branch off; None where there is none.
 
-    A series of one forcing period whose machine is symmetric holds odd harmonics only.
+    A series has none: it spans one forcing period, with odd harmonics only if the machine is
+    symmetric.
     """
     if not isinstance(solver, ExactSolver) or solver.half_turn:
         return None
@@ -100,8 +102,9 @@ def follow_until_meeting(
 ) -> tuple[Traced, Point | None]:
     """Follow the branch one way until it leaves the interval or meets its parent.
 
-    With the motion where it does. A long step may land on the parent, which looks like the child
-    where the two meet: the branch is then followed anew with finer steps.
+    Returns the branch, and the motion at the meeting or None. A long step may land on the parent,
+    which looks like the child where the two meet; the branch is then followed again with finer
+    steps.
     """
     parent = parent_of(solver)
     if parent is None:
@@ -124,7 +127,7 @@ def follow_until_meeting(
         state, at = traced.u[p], float(traced.omega[p])
         point = meeting(parent, (state + image(parent, state, at)) / 2.0, at)
         if point is not None:
-            # Beside the meeting two branches are one to rounding; nothing is read off there.
+            # Close to the meeting rounding cannot tell the two branches apart: no point is kept.
             clear = int(np.flatnonzero(apart[: p + 1] > CLOSE).max(initial=0))
             return traced.first(clear + 1), point
     return traced, None

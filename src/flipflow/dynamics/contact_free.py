@@ -1,6 +1,7 @@
-r"""The motion without contact in closed form, written once: :math:`Z(\omega) X = F`.
+r"""The motion without contact in closed form: :math:`Z(\omega) X = F`.
 
-One machine over frequencies, many machines at many frequencies, one degree of freedom or many.
+It serves one machine over frequencies, many machines at many frequencies, and any number of degrees
+of freedom.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def complex_amplitudes(system: MechanicalSystem, omega: Real) -> Complex:
 
 
 def _of_two(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) -> Complex:
-    """Two degrees of freedom by the adjugate, whose few passes cost a sixth of LAPACK's calls."""
+    """Two degrees of freedom by the adjugate: a sixth of the time that LAPACK's calls take."""
     Z11, Z12, Z22 = (_impedance(M, C, K, omega, at) for at in ((0, 0), (0, 1), (1, 1)))
     scale = 1.0 / (Z11 * Z22 - Z12 * Z12)
     Z11 *= scale

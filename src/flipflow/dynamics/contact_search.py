@@ -4,12 +4,12 @@ Both a free flight of the exact flow and a truncated Fourier series are, at gap 
 
     y_j(t) = offset_j + Re sum_i amplitude_ji exp(rate_i t),
 
-so one search serves both. With a bound |h''| <= B on all that is still to come, a switching
-function of value h > 0 and slope h' cannot vanish before the positive root of
-h + h' s - B s^2 / 2. Stepping to that root again and again converges to the first zero and can
-never jump over one, nor over two close together. With a bound B3 on the third derivative besides,
-the curvature over the next S seconds is known to stay above h'' - B3 S, which close to a zero is
-a far smaller B: the search then converges like the third power.
+so one search serves both. Let a switching function have the value h > 0 and the slope h', and let
+|h''| <= B hold at all later times. The function then cannot vanish before the positive root of
+h + h' s - B s^2 / 2. Steps to that root, repeated, converge to the first zero and never jump over
+a zero, nor over two that are close together. With a bound B3 on the third derivative, the curvature
+over the next S seconds stays above h'' - B3 S. Close to a zero that allows a far smaller B, and the
+search converges with third order.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from flipflow.model.contact_law import ENTERED, MOST_EXITS, NO_EXIT, OPEN
 NOTHING = -9  # no regime: nothing has changed yet
 MAX_SEARCH = 20_000  # steps of one search; thirty are usual
 AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
-SMALLEST_STEP = 1e-11  # of the horizon: what bounds the steps of a search that grazes
+SMALLEST_STEP = 1e-11  # share of the horizon: least step, which bounds their number at grazing
 
 
 class GapMotion(NamedTuple):
@@ -42,7 +42,7 @@ class GapMotion(NamedTuple):
     bound: Real  # (m, r) its size
     size: Real  # (r,) |rate|
     turn: Complex  # (r,) terms of one gap, carried from sample to sample by ``extremes``
-    ratio: Complex  # (r,) what carries them
+    ratio: Complex  # (r,) factors from one sample to the next
     spacing: Int  # (1,) 0: any rates; s > 0: rates are i (r_0, r_0 + s, r_0 + 2 s, ...)
 
 
@@ -159,7 +159,7 @@ def root_of_bound(h: float, slope: float, bound: float) -> float:
 
 @kernel(inline=True)
 def safe_step(h: float, slope: float, curvature: float, second: float, third: float) -> float:
-    """No zero of h comes before this time; second and third bound its derivatives from now on."""
+    """Time before which h has no zero; second and third bound its derivatives from now on."""
     h = max(h, 0.0)
     certain = root_of_bound(h, slope, second)
     reach = root_of_bound(h, slope, -curvature)
@@ -236,7 +236,7 @@ def spring_change(
 
 @kernel(inline=True)
 def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]:
-    """Whichever changes now, else whichever cannot change for the shorter time."""
+    """The one that changes now; if none does, the one that may change sooner."""
     if one[1] != NOTHING or (two[1] == NOTHING and one[0] <= two[0]):
         return one
     return two
@@ -256,10 +256,11 @@ def _approach(
 
 @kernel
 def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[float, float]:
-    """Smallest and largest y_j over [0, duration]: its ends and every zero of y' between samples.
+    """Smallest and largest y_j over [0, duration], of both ends and of every zero of y' found.
 
-    The samples stand a third of a radian apart at the mean frequency of the motion; a pair of
-    zeros between two of them could hide only a ripple smaller than what the samples resolve.
+    A zero of y' is sought where y' changes sign between two samples, which stand a third of a
+    radian apart at the mean frequency of the motion. A pair of zeros between two samples could hide
+    only a ripple smaller than what the samples resolve.
     """
     weight = 0.0
     for i in range(count):
@@ -311,6 +312,68 @@ def _stationary_value(
             break
         t = new
     return y
+
+
+@kernel(entry=True)
+def observe_motion(
+    start: Real,
+    length: Real,
+    offset: Real,
+    amplitude: Complex,
+    rate: Complex,
+    harmonic: Complex,
+    order: Real,
+    omega: float,
+    motion: GapMotion,
+    low: Real,
+    high: Real,
+    first: Complex,
+) -> None:
+    """Extremes of G coordinates over all pieces, and int y exp(-i omega t) dt.
+
+    Offsets are (G, E), amplitudes (G, E, R) and harmonics (G, E, H) seen in the coordinates.
+    """
+    modes, count = rate.shape[1], rate.shape[1] + order.shape[0]
+    for e in range(start.shape[0]):
+        for i in range(modes):
+            motion.rate[i] = rate[e, i]
+        for h in range(order.shape[0]):
+            motion.rate[modes + h] = 1j * (order[h] * omega)
+        for g in range(low.shape[0]):
+            motion.offset[g] = offset[g, e]
+            for i in range(modes):
+                motion.amplitude[g, i] = amplitude[g, e, i]
+            for h in range(order.shape[0]):
+                turn = exponential(1j * (order[h] * omega * start[e]))
+                motion.amplitude[g, modes + h] = harmonic[g, e, h] * turn
+        prepare_search(motion, count)
+        for g in range(low.shape[0]):
+            least, most = extremes(motion, count, g, length[e])
+            low[g], high[g] = min(low[g], least), max(high[g], most)
+            first[g] += first_harmonic(motion, count, g, start[e], length[e], omega)
+
+
+@kernel(inline=True)
+def first_harmonic(
+    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
+) -> complex:
+    """int y exp(-i omega t) dt over one piece, in closed form."""
+    turn = exponential(-1j * omega * start)
+    total = motion.offset[g] * _integral_of_exponential(-1j * omega, length)
+    for i in range(count):
+        amplitude = motion.amplitude[g, i]
+        total += 0.5 * amplitude * _integral_of_exponential(motion.rate[i] - 1j * omega, length)
+        conjugate = motion.rate[i].conjugate() - 1j * omega
+        total += 0.5 * amplitude.conjugate() * _integral_of_exponential(conjugate, length)
+    return total * turn
+
+
+@kernel
+def _integral_of_exponential(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt."""
+    if abs(rate) * length < 1e-9:
+        return length * (1.0 + 0.5 * rate * length)
+    return (exponential(rate * length) - 1.0) / rate
 
 
 def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:

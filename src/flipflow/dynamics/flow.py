@@ -34,7 +34,7 @@ from flipflow.dynamics.law import (
 from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, new_modes, state_number
 
-MOST_SEGMENTS = 600
+MOST_SEGMENTS = 600  # that a flow can record; a turn has one more than changes of contact
 
 
 class Flow(NamedTuple):
@@ -269,7 +269,7 @@ def run_flow(
 
 @kernel(inline=True)
 def contact_number(flow: Flow) -> int:
-    """A number that changes when the contacts of the record change: how often each spring does."""
+    """A number that changes with the contacts of the record: a count of changes by spring."""
     total = 0
     for e in range(flow.segments[0] - 1):
         total += 1 + 1000 * flow.spring[e]

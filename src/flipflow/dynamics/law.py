@@ -77,16 +77,17 @@ def stored_energy(stops: Stops, j: int, regime: int, y: float) -> float:
 
 @kernel(inline=True)
 def exit_of(stops: Stops, j: int, regime: int, e: int) -> tuple[float, float, int]:
-    """Exit e of a regime: h = alpha p + beta p' falls through zero; the regime that follows.
+    """Exit e of a regime, where h = alpha p + beta p' falls through zero: alpha, beta, next regime.
 
-    NO_EXIT where there is none. With alpha = 1 and beta = 0 the exit stands at the gap.
+    The next regime is NO_EXIT where there is no such exit. With alpha = 1 and beta = 0 the exit
+    stands at the gap.
     """
     law, piece = stops.law[j], abs(regime)
     target = TARGET[law, piece, e]
     if target == NO_EXIT:
         return 0.0, 0.0, NO_EXIT
     if stops.damping[j] == 0.0 and KIND[law, target] == 0:
-        # Without damping a force is gone at the gap, not before: nothing is left to return.
+        # Without damping the force falls to zero at the gap and not before: the spring opens.
         target = OPEN
     alpha = EXITS[law, piece, e, 0] + EXITS[law, piece, e, 1] * stops.stiffness[j]
     beta = EXITS[law, piece, e, 2] + EXITS[law, piece, e, 3] * stops.damping[j]
@@ -95,7 +96,7 @@ def exit_of(stops: Stops, j: int, regime: int, e: int) -> tuple[float, float, in
 
 @kernel(inline=True)
 def regime_at(stops: Stops, j: int, y: float, v: float) -> int:
-    """Regime of spring j at position y and rate v; exactly at the gap the rate tells."""
+    """Regime of spring j at position y and rate v; exactly at the gap the rate decides."""
     plus, minus = stops.gap[j, 0], stops.gap[j, 1]
     if y > plus or (y == plus and v > 0.0):
         side = 1
@@ -117,8 +118,8 @@ def regime_at(stops: Stops, j: int, y: float, v: float) -> int:
 def tangent_kick(stops: Stops, j: int, before: int, after: int) -> float:
     """Sign of c M^-1 d d^T in the saltation of a change of regime.
 
-    At the gap the force jumps by the change of f_c c p', which kicks the tangent. Within a side
-    the pieces of a law meet without a jump, and so does the tangent.
+    At the gap the force jumps by the change of f_c c p', which kicks the tangent. From piece
+    to piece on one side of the gap the force does not jump, and the tangent is not kicked.
     """
     if before * after != 0:
         return 0.0

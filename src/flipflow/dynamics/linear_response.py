@@ -17,7 +17,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 
 Real = NDArray[np.float64]
-SCAN_POINTS = 4000
+SCAN_POINTS = 4000  # frequencies up to twice the highest natural one, to find peaks between
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
-
-import numpy as np
 
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.law import Stops
-from flipflow.errors import InputError
-from flipflow.model.contact_law import NUMBER
-from flipflow.model.elements import ClearanceSpring
-from flipflow.model.system import MechanicalSystem
 
 
 class MachineArrays(NamedTuple):
@@ -28,48 +21,3 @@ class MachineArrays(NamedTuple):
     push: Complex  # (N,) M^-1 f
     power: int  # the force grows with omega to this power: 2 unbalance, 0 constant
     stops: Stops
-
-
-def machine_arrays(system: MechanicalSystem) -> MachineArrays:
-    """Flatten a system whose springs can all open and close.
-
-    Raises
-    ------
-    InputError
-        Without any damping (no steady state is reached), and with a singular stiffness (nothing
-        holds the machine).
-    """
-    system.require_damping()
-    n, springs = system.size, system.springs
-    m = len(springs)
-    D = np.array([spring.direction for spring in springs]).reshape(m, n)
-    force = system.excitation.vector
-    right = np.column_stack([system.K, system.C, D.T, force.real, force.imag])
-    solved = np.linalg.solve(system.M, right)
-    stiffness, damping = solved[:, :n].copy(), solved[:, n : 2 * n].copy()
-    if np.linalg.matrix_rank(system.K) < n:
-        raise InputError(
-            "K",
-            "singular",
-            "with all stops open nothing holds the machine in place; give every free motion a "
-            "spring",
-        )
-    return MachineArrays(
-        stiffness=stiffness,
-        damping=damping,
-        direction=D,
-        reach=np.ascontiguousarray(solved[:, 2 * n : 2 * n + m].T),
-        push=solved[:, -2] + 1j * solved[:, -1],
-        power=system.excitation.power,
-        stops=stops_of(springs),
-    )
-
-
-def stops_of(springs: Sequence[ClearanceSpring]) -> Stops:
-    """Laws and numbers of springs."""
-    return Stops(
-        law=np.array([NUMBER[spring.law] for spring in springs], np.int64),
-        stiffness=np.array([spring.stiffness for spring in springs], float),
-        damping=np.array([spring.damping for spring in springs], float),
-        gap=np.array([spring.gaps for spring in springs], float).reshape(-1, 2),
-    )

@@ -7,8 +7,8 @@ v_i and l_i of the state's matrix A,
 
 one term for a conjugate pair (weight 2) and one for a real eigenvalue (weight 1), so that
 overdamped machines need no special case. Which side of a stop is engaged does not change the
-matrix: a contact state is told by the kinds of force that its springs have, and the place where it
-would stand still follows from the gaps on whichever side.
+matrix. A contact state is therefore identified by the kinds of force that its springs have; where
+the machine would stand still follows from the gaps on the engaged sides.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ from flipflow.errors import InputError
 from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 
 NEARLY_DEFECTIVE = 1e6  # condition of the basis of eigenvectors from which it has lost six digits
-NUDGE, MOST_NUDGES = 1e-10, 3  # relative change of damping that splits a double eigenvalue
-MOST_STATES = 2**12
+NUDGE = 1e-10  # relative change of damping that splits a double eigenvalue
+MOST_NUDGES = 3  # such changes tried, each larger by one nudge
+MOST_STATES = 2**12  # contact states for which tables are kept
 MOST_BYTES = 2**32  # of tables, of which only what is met is ever touched
 
 
@@ -66,14 +67,16 @@ def new_modes(machine: MachineArrays) -> Modes:
         For more springs than contact states can be kept of.
     """
     m, n = machine.direction.shape
-    kinds = KINDS[machine.stops.law]
-    states = math.prod(kinds.tolist())
+    place = [1]
+    for law in machine.stops.law:
+        place.append(place[-1] * int(KINDS[law]))
+    states = place.pop()
     modes = 2 * n
     if states > MOST_STATES or states * (2 * modes + 2 * m) * modes * 16 > MOST_BYTES:
         raise InputError("springs", m, "so many springs with a gap have too many contact states")
     table = (states, modes)
     return Modes(
-        place=np.concatenate([[1], np.cumprod(kinds[:-1])]).astype(np.int64)[:m],
+        place=np.array(place, np.int64),
         ready=np.zeros(states, np.int64),
         mode_count=np.zeros(states, np.int64),
         rate=np.zeros(table, np.complex128),
@@ -94,7 +97,7 @@ def new_modes(machine: MachineArrays) -> Modes:
     )
 
 
-@kernel
+@kernel(inline=True)
 def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
     """Number of the contact state of regimes (m,), its modes prepared; negative: there are none."""
     number = 0
@@ -109,8 +112,8 @@ def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
 def prepare(machine: MachineArrays, modes: Modes, number: int) -> int:
     """Fill the tables of one contact state; returns a status.
 
-    Exactly critical damping has no full set of eigenvectors; a damping changed in its tenth digit
-    has one, and costs less than the digits a defective basis would.
+    With exactly critical damping there is no full set of eigenvectors. A change of the damping in
+    its tenth digit gives one, and loses fewer digits than a defective basis would.
     """
     modes.ready[number] = -1
     for nudge in range(MOST_NUDGES + 1):
@@ -234,7 +237,7 @@ def _inverted(modes: Modes, number: int) -> float:
 
 @kernel
 def _seen_from_outside(machine: MachineArrays, modes: Modes, number: int) -> None:
-    """What the modes take up from the exciter and the gaps, and show at the gaps."""
+    """How the exciter and the gaps act on the modes, and how the modes move the gaps."""
     m, n = machine.direction.shape
     for i in range(modes.mode_count[number]):
         force = 0j
@@ -253,45 +256,3 @@ def _seen_from_outside(machine: MachineArrays, modes: Modes, number: int) -> Non
                 pick += modes.left[number, i, n + r] * machine.reach[j, r]
             modes.gap_shape[number, j, i] = shape
             modes.gap_pick[number, i, j] = pick
-
-
-@kernel(inline=True)
-def open_answer(modes: Modes, power: int, omega: float, k: int) -> complex:
-    """X_k in x = Re(X exp(i omega t)) of the machine with all springs open."""
-    total = 0j
-    for i in range(modes.mode_count[0]):
-        v = modes.right[0, k, i]
-        total += v * modes.force[0, i] / (1j * omega - modes.rate[0, i])
-        if modes.weight[0, i] == 2.0:
-            gap = 1j * omega - modes.rate[0, i].conjugate()
-            total += v.conjugate() * modes.force_conj[0, i] / gap
-    return total * omega**power
-
-
-@kernel(entry=True)
-def contact_free(
-    machine: MachineArrays, modes: Modes, omega: Real, answer: Complex, stop_at_contact: bool
-) -> int:
-    """X (n, N) in x = Re(X exp(i omega t)) without contact; the first index that meets a gap.
-
-    ``stop_at_contact``: nothing is written beyond it. n where no gap is met, negative where the
-    open machine has no modes.
-    """
-    if modes.ready[0] == 0:
-        prepare(machine, modes, 0)
-    if modes.ready[0] < 0:
-        return -1
-    m, n = machine.direction.shape
-    first = omega.shape[0]
-    for p in range(omega.shape[0]):
-        for k in range(n):
-            answer[p, k] = open_answer(modes, machine.power, omega[p], k)
-        for j in range(m):
-            y = 0j
-            for k in range(n):
-                y += machine.direction[j, k] * answer[p, k]
-            if abs(y) >= min(machine.stops.gap[j, 0], machine.stops.gap[j, 1]):
-                first = min(first, p)
-        if stop_at_contact and first <= p:
-            return first
-    return first

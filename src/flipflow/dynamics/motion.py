@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.compiled.arrays import Complex, Int, Real
-from flipflow.compiled.compile import kernel
-from flipflow.dynamics.contact_search import (
-    GapMotion,
-    exponential,
-    extremes,
-    new_gap_motion,
-    prepare_search,
-)
+from flipflow.dynamics.contact_search import new_gap_motion, observe_motion
 from flipflow.dynamics.flow import Flow
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_numbers
@@ -24,7 +17,7 @@ from flipflow.model.contact_law import engaged_side
 from flipflow.model.system import MechanicalSystem
 
 TIMES = "give finite times in s"
-MOST_SAMPLES = 10_000_000
+MOST_SAMPLES = 10_000_000  # times in a grid over one period
 
 
 @dataclass(frozen=True)
@@ -79,50 +72,11 @@ class Motion:
     harmonic: Complex
     order: Real
 
-    @classmethod
-    def of_flow(cls, system: MechanicalSystem, flow: Flow, omega: float, period: float) -> Self:
-        """The motion that the exact flow has recorded."""
-        e, n = int(flow.segments[0]), system.size
-        slot, modes = flow.slot[:e], flow.modes
-        shape = modes.weight[slot][:, None, :] * modes.right[slot, :n]
-        return cls(
-            system=system,
-            omega=omega,
-            period=period,
-            start=flow.start[:e].copy(),
-            length=flow.length[:e].copy(),
-            regime=flow.regimes[:e].copy(),
-            offset=flow.rest[:e].copy(),
-            amplitude=shape * flow.q[:e, None, :],
-            rate=modes.rate[slot],
-            harmonic=flow.drive[slot, :n][:, :, None],
-            order=np.ones(1),
-        )
-
-    @classmethod
-    def of_series(
-        cls,
-        system: MechanicalSystem,
-        flow: Flow,
-        omega: float,
-        order: Int,
-        series: Complex,
-    ) -> Self:
-        """A Fourier series (n_h, N) with the contacts that were recorded along it."""
-        e, n = int(flow.segments[0]), system.size
-        return cls(
-            system=system,
-            omega=omega,
-            period=2.0 * np.pi / omega,
-            start=flow.start[:e].copy(),
-            length=flow.length[:e].copy(),
-            regime=flow.regimes[:e].copy(),
-            offset=np.zeros((e, n)),
-            amplitude=np.zeros((e, n, 0), np.complex128),
-            rate=np.zeros((e, 0), np.complex128),
-            harmonic=np.repeat(series.T[None], e, axis=0),
-            order=order.astype(float),
-        )
+    @property
+    def pieces(self) -> Motion:
+        """The motion itself, which holds start, length and regime of its pieces."""
+        warnings.warn("Motion.pieces: start, length, regime stand in Motion", DeprecationWarning, 2)
+        return self
 
     def derivative(self, t: ArrayLike, order: int) -> Real:
         """x, x' or x'' (order 0, 1, 2) at times t, shape (..., N)."""
@@ -166,7 +120,10 @@ class Motion:
 
     def extremes(self, coordinates: Real) -> tuple[Real, Real, Complex]:
         """Least and greatest value and first harmonic, (G,) each, of coordinates (G, N)."""
-        seen = np.ascontiguousarray(coordinates, dtype=float)
+        remedy = f"give vectors of {self.system.size} finite numbers, one a row"
+        seen = np.ascontiguousarray(checked_numbers("coordinates", coordinates, remedy))
+        if seen.ndim != 2 or seen.shape[1] != self.system.size:
+            raise InputError("coordinates", coordinates, remedy)
         rates = self.rate.shape[1] + self.order.size
         scratch = new_gap_motion(seen.shape[0], np.zeros(rates, np.complex128))
         low, high = np.full(seen.shape[0], np.inf), np.full(seen.shape[0], -np.inf)
@@ -193,12 +150,56 @@ class Motion:
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""
         found: list[ContactInterval] = []
-        # Where a piece ends the next one starts, to the last digit: touches are joined by it.
+        # A piece ends where the next one starts, to the last digit: so touches can be joined.
         ends = np.concatenate([self.start[1:], self.start[-1:] + self.length[-1:]])
         for j, spring in enumerate(self.system.springs):
             side = engaged_side(spring.law, self.regime[:, j])
             found += _joined(j, side, self.start, ends, self.period)
         return tuple(sorted(found, key=lambda interval: interval.start))
+
+
+def motion_of_flow(system: MechanicalSystem, flow: Flow, omega: float, period: float) -> Motion:
+    """The motion that the exact flow has recorded."""
+    e, n = int(flow.segments[0]), system.size
+    slot, modes = flow.slot[:e], flow.modes
+    shape = modes.weight[slot][:, None, :] * modes.right[slot, :n]
+    return Motion(
+        system=system,
+        omega=omega,
+        period=period,
+        start=flow.start[:e].copy(),
+        length=flow.length[:e].copy(),
+        regime=flow.regimes[:e].copy(),
+        offset=flow.rest[:e].copy(),
+        amplitude=shape * flow.q[:e, None, :],
+        rate=modes.rate[slot],
+        harmonic=flow.drive[slot, :n][:, :, None],
+        order=np.ones(1),
+    )
+
+
+def motion_of_series(
+    system: MechanicalSystem,
+    flow: Flow,
+    omega: float,
+    order: Int,
+    series: Complex,
+) -> Motion:
+    """A Fourier series (n_h, N) with the contacts that were recorded along it."""
+    e, n = int(flow.segments[0]), system.size
+    return Motion(
+        system=system,
+        omega=omega,
+        period=2.0 * np.pi / omega,
+        start=flow.start[:e].copy(),
+        length=flow.length[:e].copy(),
+        regime=flow.regimes[:e].copy(),
+        offset=np.zeros((e, n)),
+        amplitude=np.zeros((e, n, 0), np.complex128),
+        rate=np.zeros((e, 0), np.complex128),
+        harmonic=np.repeat(series.T[None], e, axis=0),
+        order=order.astype(float),
+    )
 
 
 def _joined(
@@ -220,65 +221,3 @@ def _joined(
             touches[-1] = ContactInterval(spring, last.side, last.start, period + first.end)
             touches.pop(0)
     return touches
-
-
-@kernel(entry=True)
-def observe_motion(
-    start: Real,
-    length: Real,
-    offset: Real,
-    amplitude: Complex,
-    rate: Complex,
-    harmonic: Complex,
-    order: Real,
-    omega: float,
-    motion: GapMotion,
-    low: Real,
-    high: Real,
-    first: Complex,
-) -> None:
-    """Extremes of G coordinates over all pieces, and int y exp(-i omega t) dt.
-
-    Offsets are (G, E), amplitudes (G, E, R) and harmonics (G, E, H) seen in the coordinates.
-    """
-    modes, count = rate.shape[1], rate.shape[1] + order.shape[0]
-    for e in range(start.shape[0]):
-        for i in range(modes):
-            motion.rate[i] = rate[e, i]
-        for h in range(order.shape[0]):
-            motion.rate[modes + h] = 1j * (order[h] * omega)
-        for g in range(low.shape[0]):
-            motion.offset[g] = offset[g, e]
-            for i in range(modes):
-                motion.amplitude[g, i] = amplitude[g, e, i]
-            for h in range(order.shape[0]):
-                turn = exponential(1j * (order[h] * omega * start[e]))
-                motion.amplitude[g, modes + h] = harmonic[g, e, h] * turn
-        prepare_search(motion, count)
-        for g in range(low.shape[0]):
-            least, most = extremes(motion, count, g, length[e])
-            low[g], high[g] = min(low[g], least), max(high[g], most)
-            first[g] += first_harmonic(motion, count, g, start[e], length[e], omega)
-
-
-@kernel(inline=True)
-def first_harmonic(
-    motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
-) -> complex:
-    """int y exp(-i omega t) dt over one piece, in closed form."""
-    turn = exponential(-1j * omega * start)
-    total = motion.offset[g] * _integral_of_exponential(-1j * omega, length)
-    for i in range(count):
-        amplitude = motion.amplitude[g, i]
-        total += 0.5 * amplitude * _integral_of_exponential(motion.rate[i] - 1j * omega, length)
-        conjugate = motion.rate[i].conjugate() - 1j * omega
-        total += 0.5 * amplitude.conjugate() * _integral_of_exponential(conjugate, length)
-    return total * turn
-
-
-@kernel
-def _integral_of_exponential(rate: complex, length: float) -> complex:
-    """int_0^length exp(rate t) dt."""
-    if abs(rate) * length < 1e-9:
-        return length * (1.0 + 0.5 * rate * length)
-    return (exponential(rate * length) - 1.0) / rate

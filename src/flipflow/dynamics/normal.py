@@ -73,7 +73,7 @@ class NormalMotion:
 
 
 def normal_motion(screen: FlipFlowScreen, omega: float) -> NormalMotion | None:
-    """The motion normal to the surface, None where the file leaves its stiffness or damping out."""
+    """The motion normal to the surface; None for a screen without normal stiffness or damping."""
     k, c = screen.normal_stiffness, screen.normal_damping
     if k is None or c is None:
         return None

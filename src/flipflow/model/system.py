@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
+    LARGEST,
+    TOO_LARGE,
     checked_all,
     checked_index,
     checked_mapping,
@@ -154,7 +156,7 @@ class MechanicalSystem:
 
     def require_damping(self) -> None:
         """Raise InputError for a machine without any damping: it has no steady state."""
-        if not np.any(self.C):
+        if not self.C.any():
             raise InputError(
                 "damping",
                 0.0,
@@ -199,7 +201,8 @@ def _square(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float6
         raise InputError(name, array.shape, f"give a {size} x {size} matrix, as M is")
     if not np.all(np.isfinite(array)):
         raise InputError(name, "not finite", "give finite numbers")
-    checked_numbers(name, array, "give finite numbers")
+    if np.any(np.abs(array) > LARGEST):
+        raise InputError(name, float(np.abs(array).max()), TOO_LARGE)
     if np.any(np.abs(array - array.T) > 1e-12 * np.abs(array)):
         raise InputError(name, "not symmetric", "give a symmetric matrix")
     return array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flipflow.io.units import shown
@@ -13,7 +13,7 @@ from flipflow.paper.figure import PaperFigure
 from flipflow.paper.trends import FamilyPair
 from flipflow.periodic.options import HarmonicBalance
 from flipflow.plotting.family import family_figure
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.report.blocks import Column, Table, cells
 from flipflow.report.numbers import NOTHING, quantity
 from flipflow.studies.response_family import ResponseFamily, response_family
@@ -81,14 +81,13 @@ def family_paper_figure(
     title: str,
     plan: FamilyPlan,
     claims: Sequence[Claim[FamilyPair]],
-    draw: Callable[[FamilyPair], Figure] | None = None,
 ) -> PaperFigure[FamilyPair]:
     """A figure of amplitudes over frequency for several values of one field."""
 
     def drawn(pair: FamilyPair) -> Figure:
         return draw_family(pair, title, plan.note)
 
-    return PaperFigure(name, title, plan.compute, draw or drawn, tuple(claims), family_tables)
+    return PaperFigure(name, title, plan.compute, drawn, tuple(claims), family_tables)
 
 
 def draw_family(pair: FamilyPair, title: str, note: str = "") -> Figure:

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim
 from flipflow.plotting.drawing import Drawing
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.report.blocks import Table
 
 Data = TypeVar("Data")

@@ -12,7 +12,8 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.family import speed_axis_in_radians
-from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.parts import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS
 from flipflow.plotting.scales import MM
 

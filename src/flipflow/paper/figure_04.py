@@ -11,8 +11,9 @@ from flipflow.dynamics.linear_response import LinearResponse, linear_response
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Figure, Panel, Trace
+from flipflow.plotting.parts import Axis, Panel, Trace
 from flipflow.plotting.response import LABELS
 from flipflow.plotting.scales import MM
 

@@ -13,7 +13,8 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.smooth import SHARPNESS
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide
 from flipflow.paper.figure import PaperFigure
-from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.parts import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import KN, MM
 from flipflow.studies.smooth_law import LawComparison, compare_laws
 

@@ -12,8 +12,8 @@ from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decid
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.trends import SECOND, SECOND_PEAK, UP, Trend
 from flipflow.periodic.options import HarmonicBalance
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.loading import loading_figure
-from flipflow.plotting.parts import Figure
 from flipflow.plotting.scales import MM
 from flipflow.report.blocks import Cell, Column, Table, cells
 from flipflow.report.numbers import number

@@ -24,7 +24,8 @@ from flipflow.paper.rig import (
     rig,
 )
 from flipflow.plotting.family import branch_traces, speed_axis_in_radians
-from flipflow.plotting.parts import Axis, Figure, Line, Note, Panel, Trace
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.parts import Axis, Line, Note, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.transient.sweep import Sweep, sweep
 

@@ -16,8 +16,9 @@ from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decid
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.figure_10 import HIGH, LOW
 from flipflow.paper.rig import AT_A, POINT_A, POINT_B, rig
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.history import envelope
-from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.parts import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.transient.history import History
 from flipflow.transient.simulate import simulate

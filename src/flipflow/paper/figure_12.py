@@ -27,7 +27,7 @@ from flipflow.paper.trends import (
 )
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.family import leaning_panel
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.scales import MM
 from flipflow.report.blocks import Column, Table, cells
 from flipflow.studies.lost_symmetry import leaning_motions

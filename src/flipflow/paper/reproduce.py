@@ -19,7 +19,7 @@ from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.registry import FIGURES, chosen
 from flipflow.plotting.drawing import Drawing
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 from flipflow.report.blocks import Table
 from flipflow.results.codec import Form
 from flipflow.studies.documents import CODEC, machine_document

@@ -11,8 +11,8 @@ limit that lies at the gap, integration by parts turns the force k p + c p' into
 
     Lambda_h = (k + i c omega h) p_h + boundary,
 
-where the boundary is left only by a clipped spring that lets go beyond its gap. In the same form
-the derivative needs no term for the moving limits: what they add to dLambda_h / dA_l cancels
+where only a clipped spring, which lets go beyond its gap, has a boundary term. In the same form the
+derivative needs no term for the moving limits: what they add to dLambda_h / dA_l cancels
 against (k + i c omega l) - (k + i c omega h).
 """
 

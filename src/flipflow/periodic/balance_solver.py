@@ -8,7 +8,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.motion import Motion
+from flipflow.dynamics.motion import Motion, motion_of_series
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import describe_balance, describe_sampled, observe_series
 from flipflow.periodic.sampled import Sampled, SampledWork, new_sampled, new_sampled_work
@@ -19,7 +19,7 @@ from flipflow.periodic.solver import Solver
 class BalanceSolver(Solver):
     """Unknowns: the Fourier coefficients of the motion at the gaps.
 
-    ``confirmed``: special points that no exact motion shows are notes, not special points.
+    With ``confirmed`` a special point of the series that no exact motion shows becomes a note.
     """
 
     reads_jacobian = False
@@ -74,16 +74,16 @@ class BalanceSolver(Solver):
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:  # noqa: ARG002
         """Maps of the exact flow beside the series.
 
-        A truncated series blurs the instants of contact, to which the multipliers of a stiff
-        stop are far more sensitive than its amplitudes are.
+        A truncated series blurs the instants of contact. With a stiff stop the multipliers depend
+        on these instants far more than the amplitudes do.
         """
         return self.corrected_maps(u, omega)[0]
 
     def corrected_maps(self, u: Real, omega: Real) -> tuple[Real, Real]:
         """Maps (P, 2 N, 2 N) of the exact flow beside the series, and its distance (P,) in m.
 
-        The distance is infinite where no exact motion is near. The last answer is kept: those
-        that make up the multipliers of a branch also tell which of its folds are the machine's.
+        The distance is infinite where no exact motion is near. The last answer is kept, because
+        the multipliers of a branch and the check of its folds need the same maps.
         """
         kept_u, kept_omega, maps = self._last_maps
         if not (np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega)):
@@ -123,7 +123,7 @@ class BalanceSolver(Solver):
 
     def motion(self, u: Real, omega: float) -> Motion:
         series = self._read_off(u[None], np.array([omega]), whole_turn=True)
-        return Motion.of_series(self.system, self.flow, omega, self.harmonics, series[0])
+        return motion_of_series(self.system, self.flow, omega, self.harmonics, series[0])
 
     def unknowns_from(self, motion: Motion) -> Real:
         count = 16 * (self.order + 1)
@@ -143,8 +143,8 @@ class SampledSolver(BalanceSolver):
     """The same unknowns, with the smooth contact law sampled at fixed times.
 
     What is read off a motion besides its displacements is exact: the contacts of its series, and
-    the return maps of the exact flow beside it. Its false special points stay: to show them is
-    what it is kept for.
+    the return maps of the exact flow beside it. False special points are kept: to show them is
+    what this solver is for.
     """
 
     confirmed = False

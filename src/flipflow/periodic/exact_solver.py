@@ -10,13 +10,13 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.motion import Motion
+from flipflow.dynamics.motion import Motion, motion_of_flow
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.observe import observe_flow
 from flipflow.periodic.shooting import shooting_step
 from flipflow.periodic.solver import Solver
-from flipflow.periodic.turns import strobe
+from flipflow.periodic.turns import settle_lanes
 
 
 class ExactSolver(Solver):
@@ -90,10 +90,16 @@ class ExactSolver(Solver):
         IncompleteError
             When the flow over a turn does not end.
         """
-        record = np.empty((turns, z.size))
-        if strobe(self.whole, self.scratch, np.array(z), omega, record) != status.OK:
+        record, states = np.empty((1, turns, z.size)), np.array(z)[None]
+        nothing = np.zeros((0, z.size)), np.zeros((0, z.size, z.size)), np.zeros(0, np.int64)
+        label, run, code = (np.zeros(1, np.int64) for _ in range(3))
+        settle_lanes(
+            self.whole, self.scratch, states, np.zeros(1), omega, *nothing, turns, record, label,
+            run, code,
+        )  # fmt: skip
+        if code[0] != status.OK:
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
-        return record
+        return np.asarray(record[0])
 
     def motion(self, u: Real, omega: float) -> Motion:
         states = np.array(u)[None]
@@ -102,7 +108,7 @@ class ExactSolver(Solver):
         if np.isnan(low).any():
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
         period = 2.0 * np.pi / omega * self.whole.fraction
-        return Motion.of_flow(self.system, self.flow, omega, period)
+        return motion_of_flow(self.system, self.flow, omega, period)
 
     def _observe(
         self,

@@ -1,4 +1,4 @@
-"""What is read off periodic motions, point by point along a branch: the only loops over points."""
+"""Extremes, harmonics and return maps of periodic motions, point by point along a branch."""
 
 from __future__ import annotations
 
@@ -8,9 +8,14 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
-from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
+from flipflow.dynamics.contact_search import (
+    GapMotion,
+    exponential,
+    extremes,
+    first_harmonic,
+    prepare_search,
+)
 from flipflow.dynamics.flow import run_flow, segment_motion, segment_state
-from flipflow.dynamics.motion import first_harmonic
 from flipflow.periodic.balance import contact_forces, prepare_receptance
 from flipflow.periodic.sampled import Sampled, SampledWork, sampled_forces
 from flipflow.periodic.series import (
@@ -22,7 +27,7 @@ from flipflow.periodic.series import (
 )
 from flipflow.periodic.shooting import Shooting, ShootingWork, shoot
 
-ROUNDING = 1e-9
+ROUNDING = 1e-9  # a Newton step below this share of the motion is rounding of the flow
 
 
 @kernel(entry=True)
@@ -164,7 +169,7 @@ def corrected(
     error: Real,
     code: Int,
 ) -> None:
-    """Return map and distance in m of motions from the exact ones, by a Newton step of the flow.
+    """Return maps of motions, and their distances in m from the exact ones, by a Newton step.
 
     delta = (I - M)^-1 (flow(z) - z) corrects the state (P, 2 N) in place. The map (P, 2 N, 2 N),
     with the problem's sign, is the one at the corrected state. The distance is the largest
@@ -186,7 +191,7 @@ def _correct_state(
     problem: Shooting, work: ShootingWork, z: Real, omega: float, A: Real, pivot: Int, delta: Real,
     out: Real,
 ) -> tuple[int, float, float]:  # fmt: skip
-    """A Newton step of z in place unless it is rounding; its length and the next's, or infinity."""
+    """Correct z by a Newton step longer than rounding: status, its length, the next step's."""
     size = delta.shape[0]
     n = size // 2
     for k in range(size):

@@ -8,9 +8,9 @@ from typing import cast
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_kind, checked_positive
 
-MOST_HARMONICS = 200
-MOST_POINTS = 5000
-MOST_SAMPLES = 2**17
+MOST_HARMONICS = 200  # highest harmonic that may be asked for
+MOST_POINTS = 5000  # steps of full length into which an interval may be divided
+MOST_SAMPLES = 2**17  # samples of the contact force in a turn
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class SampledHarmonicBalance:
     """Fourier series with a smooth contact law sampled at fixed times: to reproduce others only.
 
     The paper's Eq. (3) replaces the switch at the gap by tanh(sharpness (x2 - e)), and the usual
-    alternating frequency-time scheme samples it. Between two samples the motion passes the layer
-    in which the law switches, of a few 1 / sharpness, unseen, and the force jumps when a sample
-    enters it. The branch then shows turning points that the machine does not have, or stalls,
-    which its ``status`` says. Every use gives a
+    alternating frequency-time scheme samples it. Between two samples the motion crosses, unseen,
+    the layer in which the law switches, a few 1 / sharpness thick; the force jumps when a sample
+    enters the layer. The branch then shows turning points that the machine does not have, or
+    stalls, which its ``status`` says. Every use gives a
     :class:`~flipflow.errors.SampledContactWarning`; take :class:`HarmonicBalance` for an answer.
 
     Parameters

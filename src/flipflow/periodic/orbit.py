@@ -25,8 +25,8 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
 
-GAUSS_POINTS = 24
-POINTS_PER_TURN = 720
+GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
+POINTS_PER_TURN = 720  # default times in each forcing period
 QUANTITY = "give a function of (t, x, v, a) that returns one number for each time"
 
 
@@ -126,7 +126,7 @@ class Orbit:
 
     @cached_property
     def error(self) -> float:
-        """Estimated distance in m from the exact motion; infinite where nothing is promised."""
+        """Estimated distance in m from the exact motion; infinite where there is no estimate."""
         return float(
             self.point.formulation.solver().errors(self.unknowns[None], np.array([self.omega]))[0]
         )

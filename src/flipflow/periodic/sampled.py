@@ -9,9 +9,9 @@ sampled at theta_n = 2 pi n / N, so that its harmonics are sums,
 
     Lambda_h = share_h sum_n G_n exp(-i h theta_n),    share_0 = 1 / N, else 2 / N.
 
-Kept to reproduce what others do. Where a step of the samples is longer than the layer of about
-1 / s in which the law switches on, Lambda jumps by 2 c v / N whenever a sample crosses a gap; the
-derivative, though exact, does not see that jump.
+This method is kept to reproduce what others do. Where the motion between two samples is longer than
+the layer of about 1 / s in which the law switches on, Lambda jumps by 2 c v / N whenever a sample
+crosses a gap; the derivative, though exact, does not see that jump.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _add_sample(problem: Sampled, work: SampledWork, omega: float, j: int, n: in
 
 @kernel(inline=True)
 def _sum(sums: Complex, j: int, q: int) -> complex:
-    """The sum of any sign of q."""
+    """The sum for q of either sign."""
     return sums[j, q] if q >= 0 else sums[j, -q].conjugate()
 
 

@@ -1,4 +1,4 @@
-"""A truncated series at the gaps: when it is in contact within a turn, and what that leaves.
+"""A truncated series at the gaps: its contacts within a turn, and the integrals over them.
 
 The limits of contact are found by the certified search, as for a flow, and the integrals over the
 contacts are closed forms.
@@ -35,7 +35,7 @@ from flipflow.dynamics.law import (
 )
 from flipflow.dynamics.machine import MachineArrays
 
-NO_SPRING = -1
+NO_SPRING = -1  # no change of contact began the segment
 
 
 class Balance(NamedTuple):
@@ -184,10 +184,11 @@ def next_change_from(
 
 @kernel(inline=True)
 def contact_integrals(problem: Balance, work: BalanceWork, omega: float) -> None:
-    """int exp(i k theta) over the contacts, and what clipped limits leave.
+    """int exp(i k theta) over the contacts, and the boundary terms of clipped limits.
 
-    The mirrored contact half a turn later has the same integral times (-1)^k and the opposite gap.
-    Odd harmonics ask for even k, and for odd k where a gap or depth is a factor: all double.
+    Half a turn of a mirror-symmetric series is enough. The mirrored contact half a turn later has
+    the same integral times (-1)^k, and the gap and depth of opposite sign. Odd harmonics use the
+    integrals of even k, and those of odd k only times a gap or depth: each of them doubles.
     """
     flow = work.flow
     m, most = work.integral.shape

@@ -1,4 +1,4 @@
-"""Periodic motion as a zero of the flow: z = sign * flow(z) over a fraction of the forcing period.
+"""Periodic motion by shooting: z = sign * flow(z) over a number of forcing periods.
 
 ``fraction`` 1 and ``sign`` +1 is one forcing period, ``fraction`` n is n of them; a motion that is
 its own mirror image after n / 2 of them, n odd, has ``fraction`` n / 2 and ``sign`` -1.
@@ -67,7 +67,7 @@ def new_shooting_work(machine: MachineArrays) -> ShootingWork:
 
 @kernel(inline=True)
 def shoot(problem: Shooting, work: ShootingWork, z: Real, omega: float, U: Real) -> int:
-    """Carry z and its tangent over the problem's part of a turn: flow.z, and U as it takes columns.
+    """Carry z into flow.z and its tangent into U, over the problem's part of a turn.
 
     U is (2 N, 2 N), or (2 N, 2 N + 1) with the derivative in omega at fixed time.
     """
@@ -117,7 +117,7 @@ def shooting_step(
 
 @kernel
 def crossings(work: ShootingWork) -> int:
-    """A number that changes when the contacts met in a turn change: crossings, spring by spring."""
+    """A number that changes with the contacts of a turn: crossings, spring by spring."""
     return contact_number(work.flow)
 
 

@@ -1,4 +1,4 @@
-"""What the two solvers of periodic motions share: the branch trace and what is read off points."""
+"""What the solvers of periodic motions share: the branch trace and what is read off points."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import arclength
 from flipflow.continuation.follow import FOLD, TRACE_ALL, follow
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.machine import MachineArrays, machine_arrays
-from flipflow.dynamics.modes import contact_free
+from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
@@ -25,7 +25,7 @@ from flipflow.periodic.observe import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 
 STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size
-POINTS_MOST = 20_000  # of one branch; a few hundred are usual
+POINTS_MOST = 20_000  # that one branch can record; a few hundred are usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class Traced:
         ends = (status.REACHED_UPPER, status.REACHED_LOWER, status.FOLLOWED)
         code = self.code if self.code not in ends else ahead.code
         code = status.FOLLOWED if code in ends else code
-        # What is told of a step stands at its end, which is its other point when read backwards.
+        # Counts and reasons of a step stand at its end: read backwards, at its other point.
         none = np.zeros(1, np.int64)
         rejected, reason = (
             np.concatenate([none, mine[turned], its[1:]])
@@ -137,7 +137,7 @@ class Formulation:
     options: tuple[float, ...] = ()
 
     def solver(self) -> Solver:
-        """A solver of its own for whoever asks."""
+        """A new solver, with scratch that no other caller uses."""
         return self.kind(self.system, *self.options, half_turn=self.half_turn, turns=self.turns)
 
 
@@ -246,21 +246,6 @@ class Solver(ABC):
         none = np.zeros((1, 0, 0))
         return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
 
-    def contact_free(self, omega: Real, *, stop_at_contact: bool = False) -> tuple[Complex, int]:
-        """X (n, N) in x = Re(X exp(i omega t)) with all springs open; the first index in contact.
-
-        Raises
-        ------
-        IncompleteError
-            When the open machine has no modes.
-        """
-        answer = np.zeros((omega.size, self.system.size), np.complex128)
-        modes = self.flow.modes
-        first = contact_free(self.machine, modes, omega, answer, stop_at_contact)
-        if first < 0:
-            raise IncompleteError("no modes of the machine with all stops open could be found")
-        return answer, first
-
     def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
         record = self.new_branch(POINTS_MOST)
@@ -291,13 +276,6 @@ class Solver(ABC):
         return follow(
             self.problem, self.scratch, self.corrector, record, u, omega, course, p, *shares, test
         )
-
-    def trace_through(self, u: Real, omega: float, course: arclength.Course) -> Traced:
-        """Follow the branch from (u, omega) both ways, in rising omega at the start."""
-        ahead = self.trace(u, omega, course._replace(direction=1.0))
-        if ahead.code == status.CLOSED or ahead.omega.size == 0:
-            return ahead
-        return self.trace(u, omega, course._replace(direction=-1.0)).reversed_into(ahead)
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
@@ -343,11 +321,11 @@ class Solver(ABC):
         return found
 
     def _open_rates(self) -> Complex:
-        """Eigenvalues of the open machine in 1/s, (2 N,)."""
-        self.contact_free(np.ones(1))
-        modes = self.flow.modes
-        rate = modes.rate[0, : modes.mode_count[0]]
-        return np.concatenate([rate, rate[rate.imag > 0.0].conj()])
+        """Eigenvalues of the machine with all springs open in 1/s, (2 N,)."""
+        n = self.system.size
+        motion = np.concatenate([np.zeros((n, n)), np.eye(n)], axis=1)
+        forces = np.concatenate([-self.machine.stiffness, -self.machine.damping], axis=1)
+        return eigenvalues(np.concatenate([motion, forces]))
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
@@ -364,7 +342,7 @@ class Solver(ABC):
         One Newton step of the exact flow corrects the state by delta = (I - M)^-1 (flow(z) - z);
         the largest difference of any displacement over the turn between the corrected flow and
         the motion is the estimate. Where a second step does not shrink, as close to a fold,
-        nothing is promised.
+        there is no estimate.
         """
         harmonics, series = self.series(u, omega)
         states = self.states(u, omega)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Complex, Real
 
 STABLE, UNSTABLE, UNDETERMINED = "stable", "unstable", "undetermined"
-NEAR_ONE = 1e-6
-SADDLE_NODE_BAND = 0.2
+NEAR_ONE = 1e-6  # distance of the largest modulus from 1 within which stability is undetermined
+SADDLE_NODE_BAND = 0.2  # distance from +1 within which the Jacobian overrules a real multiplier
 
 
 def full_turn(eigenvalues: Complex, *, half_turn: bool) -> Complex:
@@ -25,8 +25,8 @@ def stability_words(
     """Stability of motions with return-map eigenvalues (P, 2 N), a word each.
 
     ``saddle_side`` tells where the Jacobian of the equations has an odd number of positive
-    real eigenvalues beyond +1. Near a fold it decides, for the multipliers of a truncated series
-    cross +1 a little beside the fold of its own branch; None leaves all to the multipliers.
+    real eigenvalues beyond +1. Near a fold this decides, because the multipliers of a truncated
+    series cross +1 a little beside the fold of its own branch. With None the multipliers decide.
     """
     size = np.abs(eigenvalues)
     words = np.full(eigenvalues.shape[0], UNDETERMINED, dtype="<U12")
@@ -50,7 +50,7 @@ def stability_words(
 
 
 def saddle_side(omega_tangent: Real, eigenvalues: Complex) -> NDArray[np.bool_]:
-    """Where an odd number of real eigenvalues lies beyond +1: it flips with d omega / ds."""
+    """Where an odd number of real eigenvalues lies beyond +1, told by the sign of d omega / ds."""
     return np.asarray((omega_tangent < 0.0) ^ beyond_where_rising(omega_tangent, eigenvalues))
 
 

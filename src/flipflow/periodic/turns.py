@@ -1,4 +1,4 @@
-"""Many motions of one machine, turn after turn: the only loops over lanes."""
+"""Many motions (lanes) of one machine, run turn after turn until a known motion catches them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flipflow.compiled.compile import kernel
 from flipflow.dynamics.flow import run_flow
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
-NOT_SETTLED = -1
+NOT_SETTLED = -1  # label of a lane that nothing has caught
 
 
 @kernel
@@ -39,21 +39,6 @@ def finish_turn(problem: Shooting, work: ShootingWork, omega: float, begin: floa
 
 
 @kernel(entry=True)
-def strobe(problem: Shooting, work: ShootingWork, z: Real, omega: float, record: Real) -> int:
-    """States after 1, 2, ... turns from z into ``record`` (T, 2 N): a Poincare section."""
-    flow = work.flow
-    for k in range(z.shape[0]):
-        flow.z[k] = z[k]
-    for turn in range(record.shape[0]):
-        code = next_turn(problem, work, omega)
-        if code != status.OK:
-            return code
-        for k in range(z.shape[0]):
-            record[turn, k] = flow.z[k]
-    return status.OK
-
-
-@kernel(entry=True)
 def settle_lanes(
     problem: Shooting,
     work: ShootingWork,
@@ -64,6 +49,7 @@ def settle_lanes(
     form: Real,
     owner: Int,
     most: int,
+    record: Real,
     label: Int,
     turns: Int,
     code: Int,
@@ -73,7 +59,8 @@ def settle_lanes(
     Each state holds at its time ``begin`` (L,) within the first turn, and is first carried to the
     end of that turn. Motion a catches what lies within (z - centre_a)^T form_a (z - centre_a) <= 1
     at the end of a turn. A lane that nothing catches within ``most`` turns keeps the label
-    NOT_SETTLED. States end where they were caught.
+    NOT_SETTLED. States end where they were caught; those after 1, 2, ... turns, a Poincare section,
+    stand in ``record`` (L, T, 2 N) as far as it goes.
     """
     flow = work.flow
     for lane in range(states.shape[0]):
@@ -88,6 +75,9 @@ def settle_lanes(
             code[lane] = next_turn(problem, work, omega)
             if code[lane] != status.OK:
                 break
+            if turns[lane] < record.shape[1]:
+                for k in range(states.shape[1]):
+                    record[lane, turns[lane], k] = flow.z[k]
             turns[lane] += 1
             label[lane] = caught(flow.z, centre, form, owner)
         for k in range(states.shape[1]):

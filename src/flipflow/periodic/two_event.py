@@ -1,20 +1,21 @@
-"""The symmetric motion with one touch a side, found without a guess: a scalar problem.
+"""The symmetric motion with one touch on each side, without a guess: a scalar problem.
 
 One spring with equal gaps is touched for the share s of each half turn. Counting time from the
 moment of contact, the half turn is an engaged piece of length s pi / omega and an open one, and
-its end is minus its beginning. Given omega and s that is linear in the state z at contact and in
-the force's complex size F (in units of the machine's own force), with y = e at both ends of the
-touch: one 2 N x 2 N solve, then a 2 x 2 one. Motions of the machine are the zeros of
+the state at its end is minus the state at its beginning. Given omega and s, this condition and
+y = e at both ends of the touch are linear in the state z at contact and in the complex size F of
+the force (in units of the machine's own force): one 2 N x 2 N solve, then a 2 x 2 one. Motions of
+the machine are the zeros of
 
     f(s) = |F(s, omega)| - 1,
 
-a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting has the last word on each.
+a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting must confirm each zero.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,12 +27,14 @@ from flipflow.dynamics.contact_search import exponential
 from flipflow.dynamics.flow import Flow, new_flow, prepare_drive, run_flow
 from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, prepare
-from flipflow.model.system import MechanicalSystem
 
-OPEN_SLOT, PLUS_SLOT = 0, 1
-MOST_ROOT_STEPS = 60  # twenty are usual
+if TYPE_CHECKING:
+    from flipflow.model.system import MechanicalSystem
+
+OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
+MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
-MOST_MOTIONS = 8
+MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 
 
 class TwoEvent(NamedTuple):
@@ -217,15 +220,6 @@ def two_event_states(
     return found
 
 
-@kernel(entry=True)
-def force_excesses(
-    machine: MachineArrays, work: TwoEvent, omega: Real, shares: Real, out: Real
-) -> None:
-    """f at pairs of omega and s, (P,)."""
-    for p in range(omega.shape[0]):
-        out[p] = force_excess(machine, work, omega[p], shares[p])
-
-
 class TwoEventProblem:
     """The scalar problem f(s) = |F(s, omega)| - 1 of a machine with one symmetric stop."""
 
@@ -258,10 +252,3 @@ class TwoEventProblem:
         shares = np.empty(MOST_MOTIONS)
         found = two_event_states(self._machine, self._work, omega, SAMPLES, states, shares)
         return states[:found], shares[:found]
-
-    def excess(self, omega: Real, share: Real) -> Real:
-        """f at pairs of omega and contact share, (P,): 0 where the machine has such a motion."""
-        out = np.empty(np.shape(omega))
-        pairs = np.ascontiguousarray(omega), np.ascontiguousarray(share)
-        force_excesses(self._machine, self._work, *pairs, out)
-        return out

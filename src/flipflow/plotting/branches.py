@@ -13,8 +13,9 @@ from flipflow.continuation.field_branch import FieldBranch
 from flipflow.errors import InputError
 from flipflow.model.fields import FIELD
 from flipflow.plotting.curves import Curve
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Figure, Panel, Trace
+from flipflow.plotting.parts import Axis, Panel, Trace
 from flipflow.plotting.response import (
     KIND_SYMBOLS,
     KIND_WORDS,

@@ -14,10 +14,10 @@ from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.family import family_figure
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.history import history_figure
 from flipflow.plotting.loading import loading_figure
 from flipflow.plotting.motion import orbit_figure
-from flipflow.plotting.parts import Figure
 from flipflow.plotting.response import branch_figure, cases_figure, linear_figure
 from flipflow.plotting.section import section_figure, spectrum_figure
 from flipflow.plotting.sensitivity import sensitivity_figure
@@ -46,7 +46,7 @@ def figure(result: object) -> Figure:
     Returns
     -------
     Figure
-        A neutral description; :meth:`~flipflow.plotting.parts.Figure.write` makes ``.html``,
+        A neutral description; :meth:`~flipflow.plotting.figure.Figure.write` makes ``.html``,
         ``.svg``, ``.pdf`` or ``.png`` of it.
 
     Raises

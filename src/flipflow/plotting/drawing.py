@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flipflow.errors import MissingExtra
+from flipflow.plotting.files import write_rendered
 from flipflow.plotting.palette import INK
-from flipflow.plotting.parts import write_rendered
 
 FORMATS = (".html", ".svg", ".pdf")
 PAGE = """<!DOCTYPE html>

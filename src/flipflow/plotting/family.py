@@ -10,8 +10,9 @@ from flipflow.continuation.branch import Branch
 from flipflow.model.fields import FIELD
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.curves import Curve
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Figure, Line, Panel, Trace
+from flipflow.plotting.parts import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, curve_traces
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
@@ -83,9 +84,7 @@ def speed_axis_in_radians(low: float, high: float) -> Axis:
     return Axis(SPEED, "rad/s", (low, high))
 
 
-def leaning_panel(
-    branch: Branch, windows: Sequence[Sequence[Orbit]], title: str, share: float = 0.6
-) -> Panel:
+def leaning_panel(branch: Branch, windows: Sequence[Sequence[Orbit]], title: str) -> Panel:
     """Greatest excursion to either side where the motion loses its symmetry, over rad/s.
 
     Parameters
@@ -96,12 +95,10 @@ def leaning_panel(
         What :func:`~flipflow.studies.lost_symmetry.leaning_motions` returns.
     title
         Names the machine.
-    share
-        How far the panel reaches on both sides, as a share of the window.
     """
     ends = [orbit.omega for window in windows for orbit in window]
     low, high = min(ends), max(ends)
-    reach = share * (high - low)
+    reach = 0.6 * (high - low)  # shown on both sides of the windows
     curve = Curve.of(branch, "relative")
     near = (curve.omega > low - reach) & (curve.omega < high + reach)
     traces = list(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from flipflow.plotting.parts import Figure, Line, Panel
+from flipflow.plotting.parts import Line, Panel, PanelGrid
 
 WIDTH = 690  # the width of an A4 page within its margins, 96 pixels an inch
 FONT = 11
@@ -48,17 +48,14 @@ class Geometry:
         For each panel, where the label of each vertical line stands above it.
     titles
         For each panel, the height of its title's foot above the axes.
-    legend_top
-        Top of the legend.
     """
 
     rects: tuple[Rect, ...]
     labels: tuple[dict[int, Label], ...]
     titles: tuple[float, ...]
-    legend_top: float
 
 
-def arrange(figure: Figure) -> Geometry:
+def arrange(figure: PanelGrid) -> Geometry:
     """Lay out a figure of :data:`WIDTH` pixels."""
     columns = figure.columns
     rows = [figure.panels[k : k + columns] for k in range(0, len(figure.panels), columns)]
@@ -76,22 +73,22 @@ def arrange(figure: Figure) -> Geometry:
             labels.append(place_labels(panel, width))
             titles.append(head - 6.0 - TITLE_ROW)
         top += height + ROW_GAP
-    return Geometry(tuple(rects), tuple(labels), tuple(titles), 0.0)
+    return Geometry(tuple(rects), tuple(labels), tuple(titles))
 
 
-def legend_names(figure: Figure) -> list[str]:
+def legend_names(figure: PanelGrid) -> list[str]:
     """Entries of the legend, each once, in the order of their first appearance."""
     names = [t.name for p in figure.panels for t in p.traces if t.legend]
     names += [b.name for p in figure.panels for b in p.bars if b.legend]
     return list(dict.fromkeys(names))
 
 
-def legend_columns(figure: Figure) -> int:
+def legend_columns(figure: PanelGrid) -> int:
     """Entries of the legend in a row."""
     return _entries_in_a_row(legend_names(figure))
 
 
-def legend_rows(figure: Figure) -> int:
+def legend_rows(figure: PanelGrid) -> int:
     """Rows the legend needs; none where there is one entry only."""
     return legend_lines(legend_names(figure))
 

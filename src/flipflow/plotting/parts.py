@@ -1,30 +1,22 @@
-"""The neutral figure: what is drawn, in the units of its axes, without a word on how.
+"""The parts of a neutral figure: what is drawn, in the units of its axes, without a word on how.
 
-Builders make it from results; :mod:`flipflow.plotting.plotly` and :mod:`flipflow.plotting.print`
-draw it. Colours are named by what they mean; :mod:`flipflow.plotting.palette` says what they are.
+Builders make them from results; :mod:`flipflow.plotting.plotly` and :mod:`flipflow.plotting.print`
+draw them. Colours are named by what they mean; :mod:`flipflow.plotting.palette` says what they are.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-
-from flipflow.errors import InputError
-from flipflow.model.arguments import checked_path
-from flipflow.results.store import write_file
 
 Real = NDArray[np.float64]
 Role = Literal[
     "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"
 ]
 BandRole = Literal["allowed", "contact", "contact minus"]
-FORMATS = (".html", ".svg", ".pdf", ".png")
 
 
 @dataclass(frozen=True)
@@ -189,7 +181,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Figure:
+class PanelGrid:
     """One or more panels, row by row, with a title and a sentence that says what is seen.
 
     Parameters
@@ -212,57 +204,3 @@ class Figure:
     columns: int = 1
     height: int = 360
     shares: tuple[float, ...] = ()
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the figure to a file, in the format its ending names.
-
-        Parameters
-        ----------
-        path
-            ``.html`` is one interactive page that opens offline; ``.svg``, ``.pdf`` and ``.png``
-            are for print.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        InputError
-            For another ending.
-        StoreError
-            When the file cannot be written.
-        MissingExtra
-            When matplotlib is needed and not installed.
-        """
-        return write_rendered(path, FORMATS, self._rendered)
-
-    def _rendered(self, ending: str) -> bytes:
-        if ending == ".html":
-            from flipflow.plotting.plotly import page  # noqa: PLC0415  loads plotly
-
-            return page(self).encode()
-        from flipflow.plotting.print import printed  # noqa: PLC0415  loads matplotlib
-
-        return printed(self, ending.removeprefix("."))
-
-
-def write_rendered(
-    path: str | os.PathLike[str], formats: Sequence[str], rendered: Callable[[str], bytes]
-) -> Path:
-    """Write what ``rendered`` makes for the path's ending, one of ``formats``; the file.
-
-    Raises
-    ------
-    InputError
-        For another ending.
-    StoreError
-        When the file cannot be written.
-    """
-    target = checked_path("path", path)
-    ending = target.suffix.lower()
-    if ending not in formats:
-        raise InputError("path", str(path), f"give a name that ends in {', '.join(formats)}")
-    write_file(target, rendered(ending))
-    return target

@@ -28,7 +28,7 @@ from flipflow.plotting.layout import (
     legend_names,
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, STABILITY_WORDS, TINTS
-from flipflow.plotting.parts import Axis, Bar, Cells, Figure, Line, Panel, Trace
+from flipflow.plotting.parts import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
 
 Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
@@ -53,7 +53,7 @@ h1 {{ font-size: 1.3em; }}</style></head>
 """
 
 
-def page(figure: Figure) -> str:
+def page(figure: PanelGrid) -> str:
     """One HTML page with the figure, plotly.js embedded."""
     return PAGE.format(
         title=html.escape(figure.title), caption=html.escape(figure.caption), family=FAMILY,
@@ -61,7 +61,7 @@ def page(figure: Figure) -> str:
     )  # fmt: skip
 
 
-def element(figure: Figure) -> str:
+def element(figure: PanelGrid) -> str:
     """The place of a figure in a page, its data inside; :data:`START` draws it."""
     # "<" inside the data could end the script element early.
     data = json.dumps(described(figure), separators=(",", ":")).replace("<", "\\u003c")
@@ -77,7 +77,7 @@ def library() -> str:
     return file.read_text(encoding="utf-8")
 
 
-def described(figure: Figure) -> Json:
+def described(figure: PanelGrid) -> Json:
     """The figure as plotly.js takes it: data, layout and config."""
     geometry = arrange(figure)
     data: list[Json] = []
@@ -99,7 +99,7 @@ def described(figure: Figure) -> Json:
     return {"data": data, "layout": layout, "config": CONFIG}
 
 
-def _frame(figure: Figure) -> Json:
+def _frame(figure: PanelGrid) -> Json:
     """Paper without margins: every panel is placed by its own domain."""
     return {
         "width": WIDTH, "height": figure.height, "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
@@ -113,7 +113,7 @@ def _frame(figure: Figure) -> Json:
     }  # fmt: skip
 
 
-def _axis(axis: Axis, rect: Rect, figure: Figure, key: str, *, across: bool) -> Json:
+def _axis(axis: Axis, rect: Rect, figure: PanelGrid, key: str, *, across: bool) -> Json:
     start = rect.left if across else figure.height - rect.top - rect.height
     length, whole = (rect.width, WIDTH) if across else (rect.height, figure.height)
     made: Json = {

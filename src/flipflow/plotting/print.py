@@ -18,7 +18,7 @@ from flipflow.plotting.layout import (
     legend_names,
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, TINTS
-from flipflow.plotting.parts import Axis, Bar, Cells, Figure, Line, Panel, Trace
+from flipflow.plotting.parts import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ STYLE = {
 }
 
 
-def printed(figure: Figure, form: str) -> bytes:
+def printed(figure: PanelGrid, form: str) -> bytes:
     """The figure as a file of the format ``form``: "svg", "pdf" or "png".
 
     Raises
@@ -83,7 +83,7 @@ def _families() -> list[str]:
     return [name for name in FAMILIES if name in known]
 
 
-def _draw(sheet: Sheet, figure: Figure, geometry: Geometry) -> None:
+def _draw(sheet: Sheet, figure: PanelGrid, geometry: Geometry) -> None:
     handles: dict[str, Any] = {}
     for k, (panel, rect) in enumerate(zip(figure.panels, geometry.rects, strict=True)):
         foot = figure.height - rect.top - rect.height

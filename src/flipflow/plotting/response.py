@@ -13,9 +13,10 @@ from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.plotting.curves import Curve, Jump
+from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_ROW, legend_rows
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
-from flipflow.plotting.parts import Arrow, Axis, Band, Figure, Line, Panel, Trace
+from flipflow.plotting.parts import Arrow, Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, MM, RPM, SPEEDS
 from flipflow.studies.assessment import Assessment
 

@@ -96,8 +96,8 @@ def _spring(left: float, right: float, y: float, height: float = 9.0, turns: int
     return f'<path d="{path}L{right - lead:.1f} {y}H{right}"/>'
 
 
-def _damper(left: float, right: float, y: float, height: float = 9.0) -> str:
-    middle = (left + right) / 2.0
+def _damper(left: float, right: float, y: float) -> str:
+    middle, height = (left + right) / 2.0, 9.0
     cup = f"M{left} {y}H{middle - 12}M{middle + 12} {y - height}H{middle - 12}V{y + height}h24"
     return (
         f'<path d="{cup}M{middle + 2} {y - height + 3}v{2 * height - 6}M{middle + 2} {y}H{right}"/>'

@@ -36,7 +36,7 @@ def branches(assessment: Assessment) -> Iterator[Block]:
         Column("How it ended"),
     )
     caption = (
-        "The motions that hang together with the one at low speed, followed over speed. Error: "
+        "The motions connected with the one at low speed, followed over speed. Error: "
         "estimated distance from the exact motion. Motions detached from the branch are not seen."
     )
     rows = tuple(_branch_row(case.name, case.branch) for case in assessment.cases)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flipflow.plotting.drawing import Drawing
-from flipflow.plotting.parts import Figure
+from flipflow.plotting.figure import Figure
 
 
 @dataclass(frozen=True)

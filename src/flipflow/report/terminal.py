@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
@@ -28,7 +27,7 @@ STYLES = {
 }
 
 
-def summary(result: object, console: Console, files: Mapping[str, str] | None = None) -> None:
+def summary(result: object, console: Console) -> None:
     """Print the brief blocks of a result: of an assessment verdict, limits, cases, allowed speeds.
 
     Parameters
@@ -37,14 +36,9 @@ def summary(result: object, console: Console, files: Mapping[str, str] | None = 
         An assessment, or another result with sections of its own.
     console
         Where to print.
-    files
-        Paths that were written, by what they are.
     """
     for block in blocks_of(result, brief=True):
         _show(block, console)
-    if files:
-        console.print()
-        _show(Values(tuple(files.items())), console)
 
 
 def say(console: Console, text: str, style: str = "") -> None:

@@ -29,9 +29,9 @@ from flipflow.studies.quantities import Working
 from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
 from flipflow.studies.start_and_blows import Transients, transients
 
-TORNADO_SHARE = 0.05
+TORNADO_SHARE = 0.05  # change of each field, down and up, relative to its value
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
-CLOSE = 0.05
+CLOSE = 0.05  # margin to a limit, relative, below which it asks for attention
 NO_LIMIT = (-math.inf, math.inf)
 
 

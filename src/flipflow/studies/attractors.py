@@ -19,8 +19,8 @@ from flipflow.studies.capture import capture_of
 from flipflow.studies.periodic_orbits import MOST_PERIODS, attracting_orbits
 from flipflow.transient.settle import Settling, is_stable
 
-TRIED_STATES = 16
-FIRST_SHARE = 64
+TRIED_STATES = 16  # unsettled lanes, or twice as many, from which a motion is solved for
+FIRST_SHARE = 64  # lanes, or twice as many, that go first
 
 
 class Attractors:

@@ -16,7 +16,7 @@ from flipflow.batch.lanes import Run
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_count, checked_monitor, checked_numbers, checked_word
+from flipflow.model.arguments import checked_count, checked_monitor, checked_reals, checked_word
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
@@ -24,7 +24,7 @@ from flipflow.periodic.turns import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
 Int = NDArray[np.int64]
-NORMAL_95 = 1.959963984540054
+NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +129,9 @@ class Basins:
 
 Window = Mapping[Coordinate, ArrayLike]
 Kind = Literal["displacement", "velocity"]
-MOST_CELLS = 4_000_000
-MOST_TURNS = 1_000_000
-INDEPENDENT = 1e-9
+MOST_CELLS = 4_000_000  # cells of a grid
+MOST_TURNS = 1_000_000  # forcing periods that a cell may be asked to run
+INDEPENDENT = 1e-9  # singular value above which unit rows count as independent
 UNITS = {"displacement": "m", "velocity": "m/s"}
 
 
@@ -218,9 +218,12 @@ def _axes(system: MechanicalSystem, kind: Kind, window: Window | None) -> list[G
         system.coordinate(which)
         field = f"{kind}[{which!r}]"
         remedy = f"give finite numbers in {UNITS[kind]}"
-        values = np.atleast_1d(checked_numbers(field, given, remedy)).copy()
+        # However large: states that grow beyond all bounds are cells that did not settle.
+        values = np.atleast_1d(checked_reals(field, given, remedy)).copy()
         if values.ndim != 1 or values.size == 0:
             raise InputError(field, f"shape {values.shape}", "give a row of at least one value")
+        if not np.isfinite(values).all():
+            raise InputError(field, given, remedy)
         made.append(GridAxis(kind, which, values))
     return made
 

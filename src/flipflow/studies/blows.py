@@ -24,16 +24,18 @@ from flipflow.studies.attractors import Attractors
 Int = NDArray[np.int64]
 Kind = Literal["+", "-", "lump"]
 KINDS: tuple[Kind, ...] = ("+", "-", "lump")
-LINEAR_STEP = 1.0 / 60.0
+LINEAR_STEP = 1.0 / 60.0  # of the largest blow, between two rungs from a tenth of it on
+# Shares of the largest blow that are tried: a step of a fifth each up to a tenth of it.
 LADDER = np.concatenate(
     [np.geomspace(1e-4, 0.1, 38, endpoint=False), np.arange(0.1, 1.0 + LINEAR_STEP, LINEAR_STEP)]
 )
-FINE_LADDER = np.geomspace(0.6, 1.05, 24)
-BISECTIONS = 12
-NEARBY, NARROWINGS = 9, 2
-MOMENTUM_TIMES = 4.0
-MOST_TURNS = 2000
-SPEED_POINTS = 720
+FINE_LADDER = np.geomspace(0.6, 1.05, 24)  # shares of a blow known to throw, tried at a near phase
+BISECTIONS = 12  # halvings between the last rung that does not throw and the first that does
+NEARBY = 9  # phases tried around the best one, each time it is narrowed down
+NARROWINGS = 2  # times that this is done
+MOMENTUM_TIMES = 4.0  # largest blow over what the frame, at its fastest, holds of momentum
+MOST_TURNS = 2000  # forcing periods waited for a motion to settle after a blow
+SPEED_POINTS = 720  # times in a period at which the fastest velocity of a frame is looked for
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,13 @@ from flipflow.batch.lanes import Capture, Lanes
 from flipflow.compiled.arrays import Real
 from flipflow.periodic.solver import Point
 
-SAMPLES = 384
-GROWTH, MOST_GROWTH, MOST_HALVINGS = 1.25, 40, 30
-FIRST_RADIUS = 0.1
-FALL, MOST_PASSES = 0.9, 16
+SAMPLES = 384  # states from which V must fall: half on the boundary, half within
+GROWTH = 1.25  # factor on the radius as long as V still falls
+MOST_GROWTH = 40  # times that the radius grows
+MOST_HALVINGS = 30  # times that the radius is halved until V falls
+FIRST_RADIUS = 0.1  # first radius tried: sqrt V, with states in units of the motion
+FALL = 0.9  # factor by which the slowest part must fall over the periods watched
+MOST_PASSES = 16  # periods watched
 
 
 def capture_of(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flipflow.batch.lanes import Lanes
+from flipflow.compiled.eigen import eigenvalues
 from flipflow.compiled.workers import compile_parts, work
 from flipflow.continuation import arclength
 from flipflow.model.drive import SpeedProfile
@@ -32,6 +32,7 @@ def _trace_part() -> None:
     solver = _small_solver()
     course = arclength.Course(0.5, 0.6, 0.01, STEP_SHARE, 1.0, arclength.QUICK)
     solver.trace(np.zeros(2), 0.5, course)
+    eigenvalues(np.zeros((1, 1, 1)))
 
 
 def _observe_part() -> None:
@@ -39,14 +40,10 @@ def _observe_part() -> None:
     state, omega = np.zeros((1, 2)), np.ones(1)
     solver.extremes(state, omega, np.eye(1))
     solver.errors(state, omega)
+    solver.motion(state[0], 1.0).extremes(np.eye(1))
 
 
-def _lanes_part() -> None:
-    states = np.zeros((1, 2))
-    Lanes(_small_solver().system, 1.0, 1).carry(states, 1)
-
-
-def _strobe_part() -> None:
+def _section_part() -> None:
     _small_solver().section(np.zeros(2), 1.0, 1)
 
 
@@ -66,8 +63,8 @@ def _small_solver() -> ExactSolver:
 # Two parts, for two processors, that take about equally long; within a part what several kernels
 # call is compiled once.
 PARTS: dict[str, tuple[Callable[[], None], ...]] = {
-    "branches": (_trace_part,),
-    "runs": (_observe_part, _strobe_part, _lanes_part, _start_up_part),
+    "branches": (_trace_part, _section_part),
+    "runs": (_observe_part, _start_up_part),
 }
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flipflow import __version__
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.arguments import checked_monitor, checked_number, checked_speed
+from flipflow.model.arguments import checked_monitor, checked_number, checked_speed, real
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
@@ -22,9 +22,9 @@ from flipflow.studies.blows import Blows
 from flipflow.transient.settle import is_stable
 
 Real = NDArray[np.float64]
-PHASES = 60
-LONE_STRIDE = 6
-MOST_IMPULSE = 1e9
+PHASES = 60  # in each forcing period at which blows fall
+LONE_STRIDE = 6  # every so many phases serve where no other motion is known
+MOST_IMPULSE = 1e9  # kg m/s, largest impulse that may be asked for
 NO_OTHER = "No other motion found: it cannot jump."
 
 
@@ -183,7 +183,9 @@ def jump_risk(
     largest_impulse = _checked_impulse(largest_impulse)
     say = checked_monitor(monitor)
     if not isinstance(motion, Orbit):
-        motion = checked_speed(motion, "motion")
+        if real(motion) is None:
+            raise InputError("motion", motion, "give a frequency omega in rad/s, or a stable Orbit")
+        motion = checked_speed(motion)
     say("motions", 0.0)
     omega = motion.omega if isinstance(motion, Orbit) else motion
     attractors = Attractors(machine, omega, rng, threads)

@@ -22,7 +22,8 @@ from flipflow.dynamics.linear_response import (
 from flipflow.errors import IncompleteError
 from flipflow.model.screen import FlipFlowScreen
 
-LOWEST_SHARE, HIGHEST_SHARE = 0.22, 1.155
+LOWEST_SHARE = 0.22  # lower end of the range over the first natural frequency
+HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all stops engaged
 
 
 def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 
 Real = NDArray[np.float64]
 Start = Literal["unloaded", "loaded"]
-SAMPLES = 121
+SAMPLES = 121  # speeds over the operating region at which amplitudes are compared
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 
 Real = NDArray[np.float64]
-SPEEDS = 41
-SETTLING_TURNS = 600
-PUSH = 1e-2
-LEAN = 1e-6
+SPEEDS = 41  # at which leaning motions are solved for, denser towards both ends
+SETTLING_TURNS = 600  # forcing periods waited for the motion that is pushed aside
+PUSH = 1e-2  # displacement by which it is pushed, over the characteristic length
+LEAN = 1e-6  # sum of both extremes, over that length, beyond which a motion leans
 
 
 def leaning_motions(branch: Branch) -> tuple[tuple[Orbit, ...], ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
 from flipflow.continuation.frequency_response import first_unknowns
+from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.errors import IncompleteError
 from flipflow.model.arguments import (
     checked_count,
@@ -26,11 +27,13 @@ from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.two_event import TwoEventProblem
 from flipflow.transient.settle import Settling
 
-STARTS = 64
-SETTLING_TURNS = 60
-MOST_PERIODS = 6
-SWEEP_RATIO, SWEEP_STEPS = 1.3, 12
-BRANCH_RATIOS, BRANCH_STEPS = (1.15, 2.5), 60
+STARTS = 64  # random states from which the machine is run
+SETTLING_TURNS = 60  # forcing periods that each start is run before a motion is solved for
+MOST_PERIODS = 6  # longest period that may be looked for, in forcing periods
+SWEEP_RATIO = 1.3  # speed at which a stepped start begins, over the one asked for or under it
+SWEEP_STEPS = 12  # speeds on the way
+BRANCH_RATIOS = (1.15, 2.5)  # ends of the branch from below over the speed asked for, and under it
+BRANCH_STEPS = 60  # longest step on it: the interval divided by this
 
 logger = logging.getLogger("flipflow")
 
@@ -118,7 +121,7 @@ class _Search:
         """Rest, the branch from below, a cloud of states, and stepped speeds."""
         solver = self.settling.solver
         n = solver.system.size
-        X = np.abs(solver.contact_free(np.array([self.omega]))[0][0])
+        X = np.abs(complex_amplitudes(solver.system, np.array([self.omega]))[0])
         gaps = [g for s in solver.springs for g in s.gaps if math.isfinite(g)]
         size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
         box = np.concatenate([size, self.omega * size])

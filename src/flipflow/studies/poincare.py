@@ -74,9 +74,9 @@ class Spectrum:
         return f"Spectrum({self.which!r}, {self.frequencies.size} lines up to {highest})"
 
 
-MOST_TURNS = 10_000_000
-SAMPLES_A_TURN = 512
-UNEVEN = 1e-9
+MOST_TURNS = 10_000_000  # forcing periods that may be asked for
+SAMPLES_A_TURN = 512  # times in each forcing period of an orbit whose spectrum is taken
+UNEVEN = 1e-9  # difference of two steps in time, over the whole time, that is rounding
 
 
 def poincare_section(

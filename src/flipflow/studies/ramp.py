@@ -25,10 +25,10 @@ from flipflow.transient.speed_run import Start, normal_direction, run_history, s
 from flipflow.transient.startup import MOST_SECONDS
 
 Real = NDArray[np.float64]
-BEYOND = 1e-4
-WIDER = 0.15
-SHORTEST = 1e-6  # s, far less than any machine's turn
-LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)
+BEYOND = 1e-4  # relative distance past a fold at which the motion after the jump is looked for
+WIDER = 0.15  # share by which the branch reaches beyond the speeds of the ramp
+SHORTEST = 1e-6  # s, shortest ramp, far less than any machine's turn
+LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)  # starts of the branch over the lowest speed, in turn
 
 
 @dataclass(frozen=True)

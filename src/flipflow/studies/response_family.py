@@ -21,7 +21,7 @@ from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.studies.loading import relative_from_below
 
 Real = NDArray[np.float64]
-FREQUENCIES = 9
+FREQUENCIES = 9  # equally spaced speeds of the common region at which members are compared
 
 
 @dataclass(frozen=True, eq=False)

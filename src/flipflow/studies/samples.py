@@ -28,7 +28,7 @@ from flipflow.studies.quantities import MOTION_VALUES, ContactFree, Working
 Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
 STOP_FIELDS = {"stop_stiffness", "stop_damping", "clearance", "clearance_minus", "stop_law"}
-CHUNK_ROWS = 16
+CHUNK_ROWS = 16  # samples that one task of a thread evaluates
 # Complex numbers in a chunk of the closed form: its temporaries stay in the cache.
 CHUNK_VALUES = 12_000
 

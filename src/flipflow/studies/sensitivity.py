@@ -142,7 +142,7 @@ class OneAtATime:
         return tuple(distribution.ends for distribution in self.distributions)
 
 
-N_MOST = 2**20
+N_MOST = 2**20  # groups of samples that may be asked for
 # Values held at once: all samples at as many frequencies as fit.
 BLOCK_VALUES = 2_000_000
 
@@ -236,20 +236,13 @@ def sensitivity(
     return _result(question, varied, groups, found, failed, nominal, ends, omega)
 
 
-def one_at_a_time(
-    machine: FlipFlowScreen,
-    vary: Vary,
-    quantity: str,
-    omega: float,
-    *,
-    branch: BranchWord = "from-below",
-) -> OneAtATime:
+def one_at_a_time(machine: FlipFlowScreen, vary: Vary, quantity: str, omega: float) -> OneAtATime:
     """Move each field alone to the ends of its range: what a tornado chart shows.
 
     Parameters
     ----------
-    machine, vary, quantity, branch
-        As for :func:`sensitivity`.
+    machine, vary, quantity
+        As for :func:`sensitivity`; the motion is the one reached from below.
     omega
         One frequency in rad/s.
 
@@ -258,7 +251,7 @@ def one_at_a_time(
     InputError
         As for :func:`sensitivity`.
     """
-    question = _question(machine, quantity, omega, branch)
+    question = _question(machine, quantity, omega, "from-below")
     varied = variations(vary, machine)
     nominal = _nominal(question)
     rows = _ends(machine, varied)

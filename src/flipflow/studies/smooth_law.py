@@ -13,8 +13,8 @@ from flipflow.model.elements import ClearanceSpring
 from flipflow.model.smooth import SHARPNESS, smooth_force
 
 Real = NDArray[np.float64]
-UNSWITCHED = 1e-3
-POINTS = 20_001
+UNSWITCHED = 1e-3  # share of the force that the smooth law has not switched at its layer's edge
+POINTS = 20_001  # positions over the stroke, besides those in the layers
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class LawComparison:
 
 
 def compare_laws(
-    spring: ClearanceSpring, amplitude: float, omega: float, sharpness: float = SHARPNESS
+    spring: ClearanceSpring, amplitude: float, omega: float
 ) -> tuple[LawComparison, LawComparison, LawComparison]:
     """Lay the smooth law over the piecewise one in three conditions.
 
@@ -83,8 +83,6 @@ def compare_laws(
         Largest y in m, beyond a gap.
     omega
         Frequency of the motion in rad/s.
-    sharpness
-        epsilon of the smooth law in 1/m.
 
     Returns
     -------
@@ -101,7 +99,7 @@ def compare_laws(
         raise InputError("amplitude", amplitude, remedy)
     if not 0.0 < omega < math.inf:
         raise InputError("omega", omega, "give a finite frequency above 0 rad/s")
-    width = math.log(1.0 / UNSWITCHED - 1.0) / sharpness
+    width = math.log(1.0 / UNSWITCHED - 1.0) / SHARPNESS
     y = _course(spring, amplitude, width)
     up = np.arcsin(y / amplitude)
     phase = np.concatenate([up, np.pi - up[::-1]])
@@ -116,7 +114,7 @@ def compare_laws(
             displacement,
             velocity,
             spring.force(displacement, velocity),
-            smooth_force(spring, displacement, velocity, sharpness),
+            smooth_force(spring, displacement, velocity),
             width,
             _outside(spring, displacement, width),
         )

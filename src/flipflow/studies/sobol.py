@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from flipflow.errors import MissingExtra
 
 Real = NDArray[np.float64]
-RESAMPLES = 100
-NORMAL_95 = 1.959963984540054
+RESAMPLES = 100  # of the bootstrap that gives the confidence intervals
+NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %
 # Spread below this share of the largest value is rounding, not variance.
 CONSTANT = 1e-12
-LEAST_GROUPS = 2
+LEAST_GROUPS = 2  # groups of samples without which no variance can be estimated
 
 
 @dataclass(frozen=True, eq=False)

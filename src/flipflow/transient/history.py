@@ -51,7 +51,7 @@ class History:
         Over the whole time in J: ``"input"`` + ``"impulses"`` + ``"loads"`` = ``"dissipated"`` +
         ``"stored"`` (the change of what springs and masses hold).
     settled
-        Whether the motion is periodic at the end; None where nobody asked.
+        Whether the motion is periodic at the end; None where that was not looked at.
     distance
         How far it then is from the settled motion, in m.
     events

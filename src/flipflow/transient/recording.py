@@ -15,9 +15,9 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.transient.sampling import Budget, Changes, Table, sample_motion
 
 Real = NDArray[np.float64]
-GAUSS_NODES = 16
-TURNS_A_CALL = 32
-SHORTEST = 2.0**-12  # share of a turn
+GAUSS_NODES = 16  # in each panel over which powers are integrated
+TURNS_A_CALL = 32  # turns calculated at once, between two calls of the monitor
+SHORTEST = 2.0**-12  # share of a turn below which a stretch that does not end is given up
 
 
 class Recording:
@@ -49,7 +49,7 @@ class Recording:
         end: float,
         tell: Callable[[float], None],
     ) -> Real:
-        """State at ``end`` from z at ``begin``; ``tell`` hears the time reached.
+        """State at ``end`` from z at ``begin``; ``tell`` is called with the time reached.
 
         Raises
         ------

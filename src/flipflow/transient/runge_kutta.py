@@ -17,14 +17,17 @@ from flipflow.compiled.compile import kernel
 from flipflow.model.contact_law import MOST_EXITS
 from flipflow.transient.unsteady import Equations, set_regimes, slopes, switch, switching
 
-SAFETY, MIN_FACTOR, MAX_FACTOR = 0.9, 0.2, 5.0
-MOST_TRIALS = 60
-LOCATED = 1e-15
-BISECTIONS = 40
-MOST_AT_ONCE = 100
-SLIVER = 1e-9
+SAFETY = 0.9  # factor on the step that the error estimate allows
+MIN_FACTOR = 0.2  # least factor from one step to the next
+MAX_FACTOR = 5.0  # largest factor from one step to the next
+MOST_TRIALS = 60  # steps tried to locate one event
+LOCATED = 1e-15  # change of the step's length, relative to it, below which an event is located
+BISECTIONS = 40  # halvings of a step in the search on its cubic
+MOST_AT_ONCE = 100  # changes of contact without progress after which a stop chatters
+SLIVER = 1e-9  # share of a step below which a remainder is no step of its own
+# Places in a walk's tally.
 STEPS, EVENTS, REJECTED, TRIALS, ROWS, CHANGES, AT_ONCE = range(7)
-SMALLEST = 1e-12
+SMALLEST = 1e-12  # share of the longest step below which the run is given up
 WAYS = max(2, MOST_EXITS)  # switching functions of a spring, and of the shaft
 
 
@@ -96,9 +99,10 @@ def _hermite(h: float, g0: float, s0: float, g1: float, s1: float, share: float)
 
 @kernel(inline=True)
 def _expected(h: float, g0: float, s0: float, g1: float, s1: float) -> float:
-    """Share of the step at which a switching function is expected to turn positive; 2: it is not.
+    """Share of the step at which a switching function is expected to turn positive; 2 if it is not.
 
-    Negative: it turns back within the step, and the share's size is where it is largest.
+    The share is negative if the function turns back within the step: its size then tells where the
+    function is largest.
     """
     top = 1.0
     if g1 <= 0.0:

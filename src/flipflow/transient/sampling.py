@@ -14,7 +14,7 @@ from flipflow.dynamics.machine import MachineArrays
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
 PANEL = 2.0  # radians of the fastest mode in a Gauss panel
-SLIVER = 1e-12
+SLIVER = 1e-12  # share of a turn below which a remainder is no turn of its own
 
 
 class Table(NamedTuple):

@@ -1,8 +1,9 @@
-"""Letting a machine run until it has settled on a periodic motion, and knowing how far off it is.
+"""A machine is run until it has settled on a periodic motion; its distance from that is known.
 
-Differences between turns say little: just past a fold a motion lingers where none exists, and
-slow multipliers creep. The periodic motion that is approached is therefore solved for; its distance
-is known in metres, and its leading multiplier tells how many turns are still to go.
+Differences between turns say little: just past a fold the machine lingers where no periodic motion
+exists, and with a multiplier close to 1 it creeps. The periodic motion that is approached is
+therefore solved for. The distance from it is known in metres, and its leading multiplier tells how
+many turns are still to go.
 """
 
 from __future__ import annotations
@@ -22,13 +23,14 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import STABLE, stability_words
 
-MOST_TURNS = 4000
-TOLERANCE = 1e-9
-FIRST_CHUNK, LONGEST_CHUNK = 16, 256
-NEAR = 0.1
-SAME_PERIOD = 3.0
-RECENT = 64
-SAME = 1e-6
+MOST_TURNS = 4000  # forcing periods waited unless told otherwise
+TOLERANCE = 1e-9  # distance from the periodic motion, relative to it, within which it has settled
+FIRST_CHUNK = 16  # turns; twice as many are run before anything is looked at
+LONGEST_CHUNK = 256  # most turns run at once while no periodic motion is in sight
+NEAR = 0.1  # distance, relative to the motion, within which a periodic motion is looked for
+SAME_PERIOD = 3.0  # the first period whose step is within this factor of the least one is taken
+RECENT = 64  # turns whose states are kept
+SAME = 1e-6  # distance, relative to the motion, within which two states are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,24 +83,23 @@ class Settling:
             self._solvers[periods] = self.solver.with_turns(periods)
         return self._solvers[periods]
 
-    def settle(
-        self, z: Real, omega: float, *, most: int = MOST_TURNS, tolerance: float = TOLERANCE
-    ) -> Settled:
-        """Run from z until the distance falls below ``tolerance`` times the motion's size.
+    def settle(self, z: Real, omega: float, most: int) -> Settled:
+        """Run from z until the distance falls below TOLERANCE times the motion's size.
 
-        Not settled is, too, where the flow over a turn does not end.
+        The machine has not settled after ``most`` turns, nor where the flow over a turn does not
+        end.
         """
         turns, chunk = 0, FIRST_CHUNK
         recent = np.array(z, float)[None]
         while True:
             point = self.approached(recent, omega)
             distance = math.inf if point is None else self.distance(recent[-1], point.u, omega)
-            done = distance <= tolerance * (self.size(recent, omega) + self.solver.length)
+            done = distance <= TOLERANCE * (self.size(recent, omega) + self.solver.length)
             if done or turns >= most:
                 return Settled(recent[-1].copy(), turns, point, distance, done, recent)
             chunk = min(2 * chunk, LONGEST_CHUNK)
             if point is not None:
-                chunk = self._turns_to_go(point, distance, tolerance * self.size(recent, omega))
+                chunk = self._turns_to_go(point, distance, TOLERANCE * self.size(recent, omega))
             run = self._run(recent[-1], omega, min(chunk, most - turns))
             if run is None:
                 return Settled(recent[-1].copy(), turns, None, math.inf, False, recent)

@@ -31,11 +31,11 @@ from flipflow.transient.settle import Settling
 from flipflow.transient.sweep import MAX_PERIODS
 
 Real = NDArray[np.float64]
-SAMPLES_A_TURN = 128
-MOST_PERIODS = 1_000_000
-MOST_SAMPLES = 20_000_000
-SETTLED = 1e-6
-ROUNDING = 1e-12
+SAMPLES_A_TURN = 128  # default times in each forcing period
+MOST_PERIODS = 1_000_000  # forcing periods that may be asked for
+MOST_SAMPLES = 20_000_000  # default times that are given without being asked for
+SETTLED = 1e-6  # distance from the periodic motion, relative to it, within which it has settled
+ROUNDING = 1e-12  # relative excess of the last time over the end that is rounding
 
 
 def simulate(
@@ -181,17 +181,17 @@ class _Run:
                 self.blown[kind] += self.moving() - before
 
     def moving(self) -> float:
-        """What masses hold and springs that always act, J."""
+        """Energy in J of the masses and of the springs that always act."""
         system = self.build(self.machine).with_bonded()
         x, v = np.split(self.z, 2)
         return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x)
 
     def stored(self) -> float:
-        """What masses and all springs hold, J."""
+        """Energy in J of the masses and of all springs."""
         return self.moving() + self.held()
 
     def held(self) -> float:
-        """What the touched stops hold, J."""
+        """Energy in J of the stops that are touched."""
         system = self.build(self.machine)
         x, v = np.split(self.z, 2)
         total = 0.0

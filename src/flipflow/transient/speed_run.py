@@ -18,8 +18,11 @@ from flipflow.transient.history import ContactChange, History, stop_forces
 from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper, Stretch
 
 Real = NDArray[np.float64]
-MOST_ROWS = 400_000
-SETTLED, MOST_TURNS, TURNS_AT_ONCE, MOST_PERIODS = 1e-7, 2000, 20, 6
+MOST_ROWS = 400_000  # rows after which a run is ended
+SETTLED = 1e-7  # change of the state over a period, relative to it, within which it has settled
+MOST_TURNS = 2000  # turns waited for a motion to settle
+TURNS_AT_ONCE = 20  # turns between two looks at whether it has settled
+MOST_PERIODS = 6  # turns after which a settled motion may repeat
 
 STATUS = {
     status.OK: "The whole time was calculated.",
@@ -82,7 +85,8 @@ def run_history(
 ) -> History:
     """Run a machine with its shaft and keep every step.
 
-    ``enough`` sees all that was calculated so far and may end the run; ``monitor`` hears of it.
+    ``enough`` is called with all that was calculated so far, and ends the run by returning True;
+    ``monitor`` is called with the time reached.
     """
     system, normal = movable(machine), normal_direction(machine)
     stepper = Stepper(
@@ -110,7 +114,7 @@ def settled_start(machine: Machine, speed: float, method: RungeKutta | None = No
     """The state into which the machine settles from rest at constant speed, at angle 0.
 
     The motion may repeat after up to six turns. Where it has not settled after 2000 turns, the
-    state then, marked so.
+    state reached then is returned, marked as not settled.
     """
     movable(machine)
     state = at_rest(machine).state

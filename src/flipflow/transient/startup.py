@@ -142,14 +142,17 @@ class RunUp:
 
 
 Real = NDArray[np.float64]
-POWER_FACTOR = 4.0
-START_SECONDS, COAST_SECONDS = 60.0, 600.0
-MOST_SECONDS = 3600.0
-LAST_TURNS, STEADY = 20, 1e-5
+POWER_FACTOR = 4.0  # assumed rated power over the power that the dampers take at working speed
+START_SECONDS = 60.0  # longest start in s unless told otherwise
+COAST_SECONDS = 600.0  # longest coast-down in s unless told otherwise
+MOST_SECONDS = 3600.0  # longest run in s that may be asked for
+LAST_TURNS = 20  # turns over which the means at the end are taken
+STEADY = 1e-5  # relative change of the mean speed from these turns to the next: nothing changes
 RECENT = 8  # stretches of the record that hold twice as many turns
-AT_REST, STOPPED = 0.02, 0.02
-NEAR = (0.8, 1.1)
-PASSING = (0.8, 1.25)
+AT_REST = 0.02  # share of the working speed below which the shaft has not started
+STOPPED = 0.02  # share of its first speed at which a coast-down ends
+NEAR = (0.8, 1.1)  # final speed over the natural frequency by which a start is captured
+PASSING = (0.8, 1.25)  # speeds over w01 between which the time of passing is taken
 FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
 NOT_SETTLED = f"had not settled after {MOST_TURNS} turns from rest"
 UNSETTLED = (
@@ -236,7 +239,7 @@ def coast_down(
     speed
         Speed in rad/s at which it runs.
     drive
-        Its inertia and friction count; a :class:`~flipflow.SpeedProfile` lays the speed down;
+        Its inertia and friction are used; a :class:`~flipflow.SpeedProfile` gives the speed;
         None: the drive that :func:`start_up` assumes.
     duration
         Longest time in s; None: 600 s or the profile's. A free run ends at 2 % of ``speed``.

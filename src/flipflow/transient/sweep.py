@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -82,6 +83,12 @@ class Sweep:
         return self.formulation.system
 
     @property
+    def solver(self) -> object:
+        """A solver of the motions' equations, made anew; use ``formulation.solver()``."""
+        warnings.warn("Sweep.solver: use Sweep.formulation.solver()", DeprecationWarning, 2)
+        return self.formulation.solver()
+
+    @property
     def settled(self) -> NDArray[np.bool_]:
         """Whether the motion is periodic within the tolerance."""
         return np.array([row.settled for row in self.rows])
@@ -138,8 +145,8 @@ class Sweep:
         return {}
 
 
-MAX_PERIODS = 6
-JUMP_SHARE = 0.05
+MAX_PERIODS = 6  # longest period looked for, in forcing periods, unless told otherwise
+JUMP_SHARE = 0.05  # distance, relative to the motion, beyond which it is another one: a jump
 
 
 def sweep(
@@ -195,7 +202,7 @@ def sweep(
     rows: list[Settled] = []
     jumps: list[Jump] = []
     for k, speed in enumerate(speeds):
-        row = settling.settle(z, float(speed), most=most_turns)
+        row = settling.settle(z, float(speed), most_turns)
         if rows and _jumped(settling, rows[-1], row, float(speed)):
             jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
         rows.append(_kept(row))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.dynamics.machine import stops_of
+from flipflow.dynamics.assembly import stops_of
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_number, checked_positive, checked_word
 from flipflow.model.contact_law import stored_energy
@@ -26,9 +26,9 @@ from flipflow.transient.unsteady import SHAFT_STATES, Equations, Shaft
 Real = NDArray[np.float64]
 Formula = Literal["dopri5", "rk4"]
 TABLEAUX: dict[str, Tableau] = {"dopri5": DORMAND_PRINCE, "rk4": RK4}
-CHUNK = 2048
-STEPS_PER_TURN = 40
-CREEP = 0.1
+CHUNK = 2048  # rows of the record, after which a stretch is handed over
+STEPS_PER_TURN = 40  # of the fastest turn or vibration: the longest step is one of them
+CREEP = 0.1  # rad/s, shaft speed below which the constant friction fades
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class Stepper:
         }
 
     def run(self, until: float) -> Iterator[Stretch]:
-        """Step to time ``until`` in s, giving up the record whenever it is full."""
+        """Step to time ``until`` in s, handing over the record whenever it is full."""
         for end, acceleration in self._legs(until):
             self._acceleration[0] = acceleration
             while True:

@@ -1,7 +1,7 @@
 """Equations of motion at varying shaft speed: masses, stops, and the shaft with its torques.
 
-The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction). It
-holds its own clock, so the equations do not name the time.
+The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction).
+The shaft angle is part of it, so that the equations do not depend on time explicitly.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from flipflow.dynamics.law import (
 )
 from flipflow.model.contact_law import ENTERED, NO_EXIT, OPEN
 
-SHAFT_STATES = 5  # phi, phi', work put in, work dissipated, work of friction
+SHAFT_STATES = 5  # of the shaft: phi, phi', work put in, work dissipated, work of friction
 
 
 class Shaft(NamedTuple):

@@ -1,0 +1,60 @@
+"""From a system to the arrays that kernels take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flipflow.dynamics.law import Stops
+from flipflow.dynamics.machine import MachineArrays
+from flipflow.errors import InputError
+from flipflow.model.contact_law import NUMBER
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.system import MechanicalSystem
+
+
+def machine_arrays(system: MechanicalSystem) -> MachineArrays:
+    """Flatten a system whose springs can all open and close.
+
+    Raises
+    ------
+    InputError
+        Without any damping (no steady state is reached), and with a singular stiffness (nothing
+        holds the machine).
+    """
+    system.require_damping()
+    n, springs = system.size, system.springs
+    m, force = len(springs), system.excitation.vector
+    D = np.array([spring.direction for spring in springs]).reshape(m, n)
+    right = np.empty((n, 2 * n + m + 2))
+    right[:, :n], right[:, n : 2 * n], right[:, 2 * n : -2] = system.K, system.C, D.T
+    right[:, -2], right[:, -1] = force.real, force.imag
+    solved = np.asarray(np.linalg.solve(system.M, right), np.float64)
+    held = np.abs(np.linalg.eigvalsh(system.K))
+    if held.min() <= n * np.finfo(float).eps * held.max():
+        raise InputError(
+            "K",
+            "singular",
+            "with all stops open nothing holds the machine in place; give every free motion a "
+            "spring",
+        )
+    return MachineArrays(
+        stiffness=solved[:, :n].copy(),
+        damping=solved[:, n : 2 * n].copy(),
+        direction=D,
+        reach=np.ascontiguousarray(solved[:, 2 * n : 2 * n + m].T),
+        push=solved[:, -2] + 1j * solved[:, -1],
+        power=system.excitation.power,
+        stops=stops_of(springs),
+    )
+
+
+def stops_of(springs: Sequence[ClearanceSpring]) -> Stops:
+    """Laws and numbers of springs."""
+    return Stops(
+        law=np.array([NUMBER[spring.law] for spring in springs], np.int64),
+        stiffness=np.array([spring.stiffness for spring in springs], float),
+        damping=np.array([spring.damping for spring in springs], float),
+        gap=np.array([spring.gaps for spring in springs], float).reshape(-1, 2),
+    )

@@ -1,0 +1,51 @@
+"""The figure of a result: panels that can be written to a file."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from flipflow.plotting.files import write_rendered
+from flipflow.plotting.parts import PanelGrid
+
+FORMATS = (".html", ".svg", ".pdf", ".png")
+
+
+@dataclass(frozen=True)
+class Figure(PanelGrid):
+    """A grid of panels that can be written to a file; its fields are those of the grid."""
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the figure to a file, in the format its ending names.
+
+        Parameters
+        ----------
+        path
+            ``.html`` is one interactive page that opens offline; ``.svg``, ``.pdf`` and ``.png``
+            are for print.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            For another ending.
+        StoreError
+            When the file cannot be written.
+        MissingExtra
+            When matplotlib is needed and not installed.
+        """
+        return write_rendered(path, FORMATS, self._rendered)
+
+    def _rendered(self, ending: str) -> bytes:
+        if ending == ".html":
+            from flipflow.plotting.plotly import page  # noqa: PLC0415  loads plotly
+
+            return page(self).encode()
+        from flipflow.plotting.print import printed  # noqa: PLC0415  loads matplotlib
+
+        return printed(self, ending.removeprefix("."))
