@@ -75,7 +75,7 @@ def test_contacts_of_the_chain(chain, branch) -> None:
     orbit = branch.orbits_at(33.0)[0]
     reference = integrate.Machine.of(chain)
     path = integrate.flow(reference, orbit.state, 33.0, 0.0, orbit.period)
-    changes = orbit.motion.pieces.start[1:]
+    changes = orbit.motion.start[1:]
     close("times of the changes of contact", changes, path.ends[:-1], abs=1e-9)
     assert any("released" in states for states in path.states)
 

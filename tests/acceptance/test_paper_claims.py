@@ -23,7 +23,7 @@ import flipflow as ff
 from flipflow.cli.main import main
 from flipflow.errors import InputError
 from flipflow.paper.registry import FIGURES
-from flipflow.studies.lost_symmetry import leaning_motions
+from flipflow.studies.leaning_motions import leaning_motions
 from judge import close
 
 pytestmark = pytest.mark.numerical

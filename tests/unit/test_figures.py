@@ -22,7 +22,7 @@ from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import WIDTH, arrange, place_labels
 from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figure, portrait_figure
-from flipflow.plotting.parts import Axis, Line, Panel
+from flipflow.plotting.panels import Axis, Line, Panel
 from flipflow.plotting.plotly import described
 from flipflow.plotting.print import _draw
 from flipflow.plotting.response import cases_figure

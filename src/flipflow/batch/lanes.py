@@ -20,7 +20,7 @@ from flipflow.dynamics.assembly import machine_arrays
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import new_shooting, new_shooting_work
-from flipflow.periodic.turns import NOT_SETTLED, settle_lanes
+from flipflow.periodic.turn_by_turn import NOT_SETTLED, settle_lanes
 
 Int = NDArray[np.int64]
 CHUNK = 64  # lanes that one task of a thread runs

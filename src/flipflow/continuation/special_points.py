@@ -20,9 +20,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
-from flipflow.continuation.confirm import ExactBeside, unconfirmed_note
-from flipflow.continuation.follow import FOLD as OF_FOLD
-from flipflow.continuation.follow import SHARE_TOLERANCE
+from flipflow.continuation.exact_check import ExactBeside, unconfirmed_note
+from flipflow.continuation.tracing import FOLD as OF_FOLD
+from flipflow.continuation.tracing import SHARE_TOLERANCE
 from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.solver import Point, Solver, Traced

@@ -13,7 +13,7 @@ from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decid
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.family import speed_axis_in_radians
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS
 from flipflow.plotting.scales import MM
 

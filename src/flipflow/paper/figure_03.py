@@ -18,7 +18,7 @@ from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.family import speed_axis_in_radians
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.sensitivity import INDEX_AXIS, index_order
 from flipflow.report.blocks import Column, Table, cells
 from flipflow.report.numbers import number

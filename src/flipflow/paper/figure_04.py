@@ -13,7 +13,7 @@ from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decid
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Panel, Trace
+from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import LABELS
 from flipflow.plotting.scales import MM
 

@@ -14,7 +14,7 @@ from flipflow.model.smooth import SHARPNESS
 from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import KN, MM
 from flipflow.studies.smooth_law import LawComparison, compare_laws
 

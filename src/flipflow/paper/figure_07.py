@@ -21,7 +21,7 @@ from flipflow.periodic.options import HarmonicBalance
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.parts import Axis, Band, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.response import LABELS
 from flipflow.plotting.scales import MM
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks

@@ -25,7 +25,7 @@ from flipflow.paper.rig import (
 )
 from flipflow.plotting.family import branch_traces, speed_axis_in_radians
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.parts import Axis, Line, Note, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Note, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.transient.sweep import Sweep, sweep
 

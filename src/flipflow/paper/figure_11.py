@@ -18,7 +18,7 @@ from flipflow.paper.figure_10 import HIGH, LOW
 from flipflow.paper.rig import AT_A, POINT_A, POINT_B, rig
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.history import envelope
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.transient.history import History
 from flipflow.transient.simulate import simulate

@@ -30,7 +30,7 @@ from flipflow.plotting.family import leaning_panel
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.scales import MM
 from flipflow.report.blocks import Column, Table, cells
-from flipflow.studies.lost_symmetry import leaning_motions
+from flipflow.studies.leaning_motions import leaning_motions
 from flipflow.studies.response_family import Member
 
 TITLE = "Effect of the clearance of the stop spring"

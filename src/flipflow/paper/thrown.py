@@ -12,7 +12,7 @@ from flipflow.model.disturbance import Impulse
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import Evaluation, Number, Part, decide
 from flipflow.plotting.history import envelope
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, MM
 from flipflow.studies.basins import Basins, basins
 from flipflow.studies.jump_risk import JumpRisk, Throw, jump_risk

@@ -10,7 +10,7 @@ from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion, motion_of_series
 from flipflow.model.system import MechanicalSystem
-from flipflow.periodic.observe import describe_balance, describe_sampled, observe_series
+from flipflow.periodic.readings import describe_balance, describe_sampled, observe_series
 from flipflow.periodic.sampled import Sampled, SampledWork, new_sampled, new_sampled_work
 from flipflow.periodic.series import Balance, BalanceWork, new_balance, new_balance_work
 from flipflow.periodic.solver import Solver

@@ -13,10 +13,10 @@ from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion, motion_of_flow
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
-from flipflow.periodic.observe import observe_flow
+from flipflow.periodic.readings import observe_flow
 from flipflow.periodic.shooting import shooting_step
 from flipflow.periodic.solver import Solver
-from flipflow.periodic.turns import settle_lanes
+from flipflow.periodic.turn_by_turn import settle_lanes
 
 
 class ExactSolver(Solver):

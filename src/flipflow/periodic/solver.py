@@ -14,14 +14,14 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import arclength
-from flipflow.continuation.follow import FOLD, TRACE_ALL, follow
+from flipflow.continuation.tracing import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
-from flipflow.periodic.observe import corrected
+from flipflow.periodic.readings import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 
 STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size

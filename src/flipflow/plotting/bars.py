@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour
-from flipflow.plotting.parts import Axis, Band, Bar, Line, Note, Panel
+from flipflow.plotting.panels import Axis, Band, Bar, Line, Note, Panel
 from flipflow.plotting.scales import RPM
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.feasible import CaseWindow

@@ -11,7 +11,7 @@ from flipflow.errors import InputError
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
-from flipflow.plotting.parts import Axis, Cells, Panel, Trace
+from flipflow.plotting.panels import Axis, Cells, Panel, Trace
 from flipflow.plotting.response import label
 from flipflow.plotting.scales import MM, RPM
 from flipflow.studies.basins import Basins, GridAxis

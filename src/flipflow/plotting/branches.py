@@ -15,7 +15,7 @@ from flipflow.model.fields import FIELD
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Panel, Trace
+from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import (
     KIND_SYMBOLS,
     KIND_WORDS,

@@ -12,7 +12,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, curve_traces
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
@@ -92,7 +92,7 @@ def leaning_panel(branch: Branch, windows: Sequence[Sequence[Orbit]], title: str
     branch
         The symmetric motions.
     windows
-        What :func:`~flipflow.studies.lost_symmetry.leaning_motions` returns.
+        What :func:`~flipflow.studies.leaning_motions.leaning_motions` returns.
     title
         Names the machine.
     """

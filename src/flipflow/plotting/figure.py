@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flipflow.plotting.files import write_rendered
-from flipflow.plotting.parts import PanelGrid
+from flipflow.plotting.panels import PanelGrid
 
 FORMATS = (".html", ".svg", ".pdf", ".png")
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
-from flipflow.plotting.parts import Axis, Panel, Trace
+from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import LABELS, coordinates, label
 from flipflow.plotting.scales import KN, MM, RPM
 from flipflow.transient.history import History

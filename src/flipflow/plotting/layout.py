@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from flipflow.plotting.parts import Line, Panel, PanelGrid
+from flipflow.plotting.panels import Line, Panel, PanelGrid
 
 WIDTH = 690  # the width of an A4 page within its margins, 96 pixels an inch
 FONT = 11

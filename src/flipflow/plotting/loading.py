@@ -8,7 +8,7 @@ import numpy as np
 
 from flipflow.plotting.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.parts import Axis, Band, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.studies.loading import LoadedMachine, Loading, RegionChange
 

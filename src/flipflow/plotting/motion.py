@@ -14,7 +14,7 @@ from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Band, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.response import coordinates, label
 from flipflow.plotting.scales import MM, RPM
 from flipflow.studies.assessment import Assessment, CaseAssessment

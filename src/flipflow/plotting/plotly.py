@@ -28,7 +28,7 @@ from flipflow.plotting.layout import (
     legend_names,
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, STABILITY_WORDS, TINTS
-from flipflow.plotting.parts import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
+from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
 
 Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"

@@ -18,7 +18,7 @@ from flipflow.plotting.layout import (
     legend_names,
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, TINTS
-from flipflow.plotting.parts import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
+from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

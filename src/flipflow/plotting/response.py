@@ -16,7 +16,7 @@ from flipflow.plotting.curves import Curve, Jump
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_ROW, legend_rows
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
-from flipflow.plotting.parts import Arrow, Axis, Band, Line, Panel, Trace
+from flipflow.plotting.panels import Arrow, Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, MM, RPM, SPEEDS
 from flipflow.studies.assessment import Assessment
 

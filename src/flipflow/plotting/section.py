@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import coordinates, label
 from flipflow.plotting.scales import HZ, MM
 from flipflow.studies.poincare import Section, Spectrum

@@ -13,7 +13,7 @@ from flipflow.model.fields import FIELD
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Bar, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 

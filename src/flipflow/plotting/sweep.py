@@ -13,7 +13,7 @@ from flipflow.model.system import Coordinate
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
-from flipflow.plotting.parts import Axis, Panel, Trace
+from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import coordinates, curve_traces, label, speed_axis
 from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.transient.sweep import Sweep

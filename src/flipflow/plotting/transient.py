@@ -12,7 +12,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.parts import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, SYMBOLS, coordinates, label
 from flipflow.plotting.scales import KN, MM, RPM
 from flipflow.transient.speed_run import swings

@@ -14,10 +14,10 @@ from flipflow.model.arguments import checked_generator
 from flipflow.model.system import Machine, system_of
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point
-from flipflow.periodic.turns import NOT_SETTLED
-from flipflow.studies.capture import capture_of
+from flipflow.periodic.turn_by_turn import NOT_SETTLED
+from flipflow.studies.attraction import capture_of
 from flipflow.studies.periodic_orbits import MOST_PERIODS, attracting_orbits
-from flipflow.transient.settle import Settling, is_stable
+from flipflow.transient.settling import Settling, is_stable
 
 TRIED_STATES = 16  # unsettled lanes, or twice as many, from which a motion is solved for
 FIRST_SHARE = 64  # lanes, or twice as many, that go first

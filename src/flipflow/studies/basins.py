@@ -20,7 +20,7 @@ from flipflow.model.arguments import checked_count, checked_monitor, checked_rea
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.turns import NOT_SETTLED
+from flipflow.periodic.turn_by_turn import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
 Int = NDArray[np.int64]

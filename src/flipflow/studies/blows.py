@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Real
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.solver import Point
-from flipflow.periodic.turns import NOT_SETTLED
+from flipflow.periodic.turn_by_turn import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
 Int = NDArray[np.int64]

@@ -43,7 +43,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.results.codec import Codec, Form, array, plain
 from flipflow.studies.sensitivity import Sensitivity
-from flipflow.transient.settle import Settled
+from flipflow.transient.settling import Settled
 from flipflow.transient.sweep import Jump, Sweep
 
 Document = Mapping[str, Any]

@@ -19,7 +19,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point
 from flipflow.studies.attractors import Attractors
 from flipflow.studies.blows import Blows
-from flipflow.transient.settle import is_stable
+from flipflow.transient.settling import is_stable
 
 Real = NDArray[np.float64]
 PHASES = 60  # in each forcing period at which blows fall

@@ -25,7 +25,7 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.two_event import TwoEventProblem
-from flipflow.transient.settle import Settling
+from flipflow.transient.settling import Settling
 
 STARTS = 64  # random states from which the machine is run
 SETTLING_TURNS = 60  # forcing periods that each start is run before a motion is solved for

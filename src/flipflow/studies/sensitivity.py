@@ -24,7 +24,7 @@ from flipflow.model.quantities import BranchWord, Quantity, missing_words, quant
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Distribution, Variation, Vary, variations
 from flipflow.studies.landmarks import analysed_range
-from flipflow.studies.samples import (
+from flipflow.studies.sensitivity_samples import (
     Columns,
     Question,
     closed_form_values,

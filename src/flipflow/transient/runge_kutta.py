@@ -15,7 +15,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.model.contact_law import MOST_EXITS
-from flipflow.transient.unsteady import Equations, set_regimes, slopes, switch, switching
+from flipflow.transient.shaft_equations import Equations, set_regimes, slopes, switch, switching
 
 SAFETY = 0.9  # factor on the step that the error estimate allows
 MIN_FACTOR = 0.2  # least factor from one step to the next

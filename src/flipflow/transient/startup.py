@@ -21,6 +21,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.transient.history import History
+from flipflow.transient.shaft_equations import SHAFT_STATES
 from flipflow.transient.speed_run import (
     MOST_TURNS,
     STATUS,
@@ -34,7 +35,6 @@ from flipflow.transient.speed_run import (
     turn_means,
 )
 from flipflow.transient.time_stepping import RungeKutta, Stretch
-from flipflow.transient.unsteady import SHAFT_STATES
 
 Outcome = Literal[
     "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"

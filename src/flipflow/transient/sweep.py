@@ -16,7 +16,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.periodic.solver import Formulation
-from flipflow.transient.settle import MOST_TURNS, Settled, Settling
+from flipflow.transient.settling import MOST_TURNS, Settled, Settling
 
 Real = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from flipflow.model.elements import Unbalance
 from flipflow.model.system import MechanicalSystem
 from flipflow.transient import runge_kutta
 from flipflow.transient.runge_kutta import Walk
+from flipflow.transient.shaft_equations import SHAFT_STATES, Equations, Shaft
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4, Tableau
-from flipflow.transient.unsteady import SHAFT_STATES, Equations, Shaft
 
 Real = NDArray[np.float64]
 Formula = Literal["dopri5", "rk4"]
