@@ -8,7 +8,7 @@ from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.continuation.arclength import predict
 from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
-from flipflow.dynamics.flow import saltation
+from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.periodic.balance import balance_residual
 from flipflow.periodic.sampled import sampled_residual
 from flipflow.periodic.shooting import shooting_residual
@@ -96,3 +96,9 @@ def central_differences(evaluate, u: np.ndarray, omega: float, steps: np.ndarray
 def predicted(work, branch, p, step, course):
     """``predict``."""
     return predict(work, branch, p, step, course)
+
+
+@kernel(entry=True)
+def number_of(flow, sided):
+    """``contact_number``."""
+    return contact_number(flow, sided)

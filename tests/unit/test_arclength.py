@@ -12,8 +12,10 @@ import flipflow as ff
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
 from flipflow.continuation import arclength
 from flipflow.continuation.arclength import new_branch, new_corrector
+from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.flow import new_flow
 from flipflow.periodic.stability import determinant_minus, determinant_plus
-from kernel_calls import predicted
+from kernel_calls import number_of, predicted
 
 pytestmark = pytest.mark.numerical
 ANYWHERE = arclength.Course(1.0, 100.0, 1.0, 1.0, 1.0, arclength.QUICK)
@@ -98,3 +100,26 @@ def test_determinants_of_maps_that_are_not_known() -> None:
     maps = np.stack([np.full((4, 4), np.nan), 0.5 * np.eye(4)])
     assert determinant_plus(maps) == pytest.approx([np.nan, 1.5**4], nan_ok=True)
     assert determinant_minus(maps) == pytest.approx([np.nan, 0.5**4], nan_ok=True)
+
+
+def record_of(*touches: tuple[int, int]):
+    """The record of a flow in which springs are touched and left one after the other."""
+    springs = [ff.ClearanceSpring(np.eye(3)[k], 1.0, 0.1, 1.0) for k in range(3)]
+    system = ff.MechanicalSystem(np.eye(3), np.eye(3), np.eye(3), springs, ff.Unbalance(np.ones(3)))
+    flow = new_flow(machine_arrays(system))
+    flow.segments[0] = 2 * len(touches) + 1
+    for k, (spring, side) in enumerate(touches):
+        flow.spring[2 * k : 2 * k + 2] = spring
+        flow.regimes[2 * k + 1, spring] = side
+    return flow
+
+
+def test_the_number_of_a_record_tells_springs_and_sides():
+    """Springs 0 and 2 are not twice spring 1, and a side is told where the whole turn is flown."""
+    both, twice = record_of((0, 1), (2, 1)), record_of((1, 1), (1, 1))
+    assert number_of(both, True) != number_of(twice, True)
+    assert number_of(both, True) == number_of(record_of((2, 1), (0, 1)), True)
+    plus, minus = record_of((1, 1)), record_of((1, -1))
+    assert number_of(plus, True) != number_of(minus, True)
+    assert number_of(plus, False) == number_of(minus, False) != 0
+    assert number_of(record_of(), True) == 0

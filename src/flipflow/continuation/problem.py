@@ -50,7 +50,7 @@ def residual(problem: Any, scratch: Any, u: Real, omega: float, r: Real, J: Real
 
 def signature(problem: Any, scratch: Any) -> int:
     """A number that changes when the contacts of the last residual's motion change."""
-    return int(_SIGNATURE[type(problem)](scratch))
+    return int(_SIGNATURE[type(problem)](problem, scratch))
 
 
 def depths(problem: Any, scratch: Any, omega: float, depth: Real) -> None:
@@ -82,7 +82,7 @@ def _signature(problem: Any, scratch: Any) -> Any:
     chosen = _SIGNATURE[_kind(problem)]
 
     def run(problem: Any, scratch: Any) -> Any:
-        return chosen(scratch)
+        return chosen(problem, scratch)
 
     return run
 

@@ -268,11 +268,20 @@ def run_flow(
 
 
 @kernel(inline=True)
-def contact_number(flow: Flow) -> int:
-    """A number that changes with the contacts of the record: a count of changes by spring."""
+def contact_number(flow: Flow, sided: bool) -> int:
+    """A number that tells which springs change how often in the record, 0 where none does.
+
+    ``sided``: on which side as well. A motion that is its own mirror image after half a turn
+    touches now the one and now the other in the half that is flown.
+    """
     total = 0
     for e in range(flow.segments[0] - 1):
-        total += 1 + 1000 * flow.spring[e]
+        spring = flow.spring[e]
+        key = 2 * spring
+        if sided and flow.regimes[e, spring] + flow.regimes[e + 1, spring] < 0:
+            key += 1
+        # Sums of powers tell sets of a few small numbers apart.
+        total += 1 + key * (1_000 + key * (1_000_000 + key * 1_000_000_000))
     return total
 
 

@@ -184,7 +184,7 @@ def _jacobian(problem: Sampled, work: SampledWork, omega: float, J: Real) -> Non
 
 
 @kernel
-def passages(work: SampledWork) -> int:
+def passages(problem: Sampled, work: SampledWork) -> int:  # noqa: ARG001
     """A number that changes when the samples begin or cease to pass a gap."""
     total = 0
     for j in range(work.beyond.shape[0]):

@@ -265,9 +265,9 @@ def whole_integral(work: BalanceWork, j: int, k: int) -> complex:
 
 
 @kernel(inline=True)
-def contact_count(work: BalanceWork) -> int:
+def contact_count(problem: Balance, work: BalanceWork) -> int:
     """A number that changes when the contacts met in a turn change."""
-    return contact_number(work.flow)
+    return contact_number(work.flow, problem.walk > math.pi)
 
 
 @kernel(inline=True)

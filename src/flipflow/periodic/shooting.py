@@ -116,9 +116,9 @@ def shooting_step(
 
 
 @kernel
-def crossings(work: ShootingWork) -> int:
-    """A number that changes with the contacts of a turn: crossings, spring by spring."""
-    return contact_number(work.flow)
+def crossings(problem: Shooting, work: ShootingWork) -> int:
+    """A number that changes when the contacts met in a turn change: crossings, spring by spring."""
+    return contact_number(work.flow, problem.sign > 0.0)
 
 
 @kernel
