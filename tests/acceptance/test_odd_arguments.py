@@ -31,7 +31,7 @@ from odd_arguments import (
 )
 
 SEED, DRAWS = 9, 6
-LOOP = "flipflow.continuation.predictor_corrector"  # its steps are few where only its words count
+LOOP = "flipflow.continuation.field_loop"  # its steps are few where only its words count
 KINDS = {"functions": functions, "classes": classes, "methods": methods}
 ERRORS = (
     errors.FlipflowError("a sentence"),

@@ -16,7 +16,7 @@ from flipflow.errors import Cancelled, InputError, StoreError
 from flipflow.plotting.sensitivity import tornado_figure
 from flipflow.report import summary
 from flipflow.studies.feasible import working_motion
-from flipflow.studies.quantities import MOTION_VALUES
+from flipflow.studies.quantity_values import MOTION_VALUES
 from flipflow.studies.sensitivity import one_at_a_time
 
 pytestmark = pytest.mark.numerical

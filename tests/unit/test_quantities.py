@@ -18,7 +18,7 @@ from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.studies.assessment import NOT_CHECKED, assess_case, limit_row
 from flipflow.studies.feasible import case_window
 from flipflow.studies.landmarks import RESPONSE_VALUES
-from flipflow.studies.quantities import MOTION_VALUES, ContactFree, Working
+from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working
 
 OMEGA = 80.0
 OPTIONAL = tuple(sorted({name for one in QUANTITIES.values() for name in one.needs}))

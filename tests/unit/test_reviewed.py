@@ -13,7 +13,7 @@ import flipflow as ff
 from flipflow.errors import IncompleteError, InputError
 from flipflow.io.derived import derive
 from flipflow.studies.assessment import assess_case, energy_balance, input_hash, verdict
-from flipflow.studies.quantities import Working
+from flipflow.studies.quantity_values import Working
 
 pytestmark = pytest.mark.numerical
 

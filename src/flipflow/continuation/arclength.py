@@ -1,4 +1,4 @@
-"""Pseudo-arclength continuation of a branch in omega, compiled whole.
+"""The continuation loop: pseudo-arclength over omega, compiled whole.
 
 Unknowns w = (u, omega) are measured in steps: each unknown by its own size times ``u_step``,
 omega by ``omega_step``, so that a step of length one is the longest that is wanted in each.

@@ -124,6 +124,10 @@ class Branch:
     notes: tuple[str, ...]
     version: str
 
+    def __post_init__(self) -> None:
+        for array in (self.multipliers, self.stability):
+            array.setflags(write=False)
+
     def __repr__(self) -> str:
         ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s, " if self.omega.size else ""
         counts = Counter(point.kind for point in self.special_points)
@@ -149,7 +153,9 @@ class Branch:
     @property
     def omega(self) -> Real:
         """Frequency in rad/s along the branch, (n,); both ends exactly as asked for."""
-        return self.traced.omega
+        omega = self.traced.omega.view()
+        omega.setflags(write=False)
+        return omega
 
     @property
     def stable(self) -> NDArray[np.bool_]:
@@ -169,7 +175,7 @@ class Branch:
     @cached_property
     def error(self) -> Real:
         """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
-        return self.formulation.solver().errors(self.traced.u, self.omega)
+        return self.formulation.solver().errors(self.traced.u, self.traced.omega)
 
     @property
     def shortened_steps(self) -> tuple[ShortenedStep, ...]:
@@ -343,7 +349,7 @@ class Branch:
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
             solver = self.formulation.solver()
-            low, high, first = solver.extremes(self.traced.u, self.omega, np.array([key]))
+            low, high, first = solver.extremes(self.traced.u, self.traced.omega, np.array([key]))
             self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
         return self._seen[key]
 

@@ -12,6 +12,7 @@ from flipflow import __version__
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
+from flipflow.continuation.field_loop import Path, follow_both_ways
 from flipflow.continuation.field_path import (
     FieldEquations,
     FieldFollower,
@@ -20,7 +21,6 @@ from flipflow.continuation.field_path import (
     SystemAt,
     meeting_over_field,
 )
-from flipflow.continuation.predictor_corrector import Path, follow_both_ways
 from flipflow.continuation.special_points import (
     CONTACT_BEGIN,
     DOUBLING,

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from flipflow.compiled.arrays import Real
-from flipflow.continuation.predictor_corrector import Equations, Path, Solved
+from flipflow.continuation.field_loop import Equations, Path, Solved
 from flipflow.continuation.switching import distance_to, image, parent_of
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem

@@ -16,7 +16,7 @@ from scipy.optimize import root_scalar
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import arclength
-from flipflow.continuation.predictor_corrector import CLOSE, NEAR, SAME
+from flipflow.continuation.field_loop import CLOSE, NEAR, SAME
 from flipflow.errors import IncompleteError
 from flipflow.model.monitor import Monitor, silent
 from flipflow.periodic.exact_solver import ExactSolver

@@ -113,8 +113,8 @@ def _content(path: Path) -> bytes:
 def _missing(path: Path) -> str:
     names = bundled_names()
     near = difflib.get_close_matches(path.stem.lower(), names, n=1, cutoff=0.6)
-    hint = f"did you mean {near[0]!r}, or" if near else "give"
-    return f"there is no such file, {hint} a path or a bundled name ({', '.join(names)})"
+    hint = f"; did you mean {near[0]!r}? Give" if near else ", give"
+    return f"there is no such file{hint} a path or a bundled name ({', '.join(names)})"
 
 
 def _decoded(path: Path, content: bytes) -> str:

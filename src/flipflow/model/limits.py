@@ -1,4 +1,8 @@
-"""What a machine may do: limits on amplitude, acceleration, speed, forces and power."""
+"""What a machine may do: limits on amplitude, acceleration, speed, forces and power.
+
+Unit and direction of each stand in :mod:`flipflow.model.quantities`, its evaluation in
+:mod:`flipflow.studies.quantity_values`.
+"""
 
 from __future__ import annotations
 

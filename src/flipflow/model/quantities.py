@@ -1,7 +1,7 @@
 """One table of quantities: what each is, what it needs, and which limit a file may set on it.
 
 It feeds limits, sensitivities, reports and ``flipflow check``. Here a quantity is declared;
-:mod:`flipflow.studies.quantities` evaluates those of a motion,
+:mod:`flipflow.studies.quantity_values` evaluates those of a motion,
 :mod:`flipflow.studies.landmarks` those of a whole response. They meet by name.
 """
 

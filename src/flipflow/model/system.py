@@ -1,4 +1,4 @@
-"""A linear machine whose masses meet over clearances."""
+"""The equation of motion: M x'' + C x' + K x + forces of the stops = exciting force."""
 
 from __future__ import annotations
 

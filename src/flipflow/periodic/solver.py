@@ -14,7 +14,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import arclength
-from flipflow.continuation.tracing import FOLD, TRACE_ALL, follow
+from flipflow.continuation.between_points import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.machine import MachineArrays

@@ -25,7 +25,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.operating_region import OperatingRegion, operating_region
-from flipflow.studies.quantities import Working
+from flipflow.studies.quantity_values import Working
 from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
 from flipflow.studies.start_and_blows import Transients, transients
 

@@ -16,7 +16,7 @@ from flipflow.model.limits import Limits, limit_bounds
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.orbit import Orbit
-from flipflow.studies.quantities import Working
+from flipflow.studies.quantity_values import Working
 
 Interval = tuple[float, float]
 Intervals = tuple[Interval, ...]

@@ -23,7 +23,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response
-from flipflow.studies.quantities import MOTION_VALUES, ContactFree, Working
+from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working
 
 Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]

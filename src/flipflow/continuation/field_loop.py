@@ -1,4 +1,4 @@
-"""Pseudo-arclength continuation of n equations in n + 1 unknowns whose last is the parameter.
+"""The continuation loop over a field: n equations in n + 1 unknowns, the field's value the last.
 
 For parameters that change the machine: every evaluation flattens a machine anew, which costs more
 than the equations do. Over omega the compiled loop of :mod:`flipflow.continuation.arclength`

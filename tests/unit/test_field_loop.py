@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flipflow.compiled import status
+from flipflow.continuation.field_loop import Equations, follow, follow_both_ways
 from flipflow.continuation.field_path import FieldEquations, FoldEquations
-from flipflow.continuation.predictor_corrector import Equations, follow, follow_both_ways
 from judge import close
 
 pytestmark = pytest.mark.numerical

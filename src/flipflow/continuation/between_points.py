@@ -1,4 +1,4 @@
-"""A branch followed from end to end; points, folds and contacts between its stored points.
+"""Points between those of a branch: folds and contacts refined there; and the entry to the loop.
 
 A fold is a zero of the tangent's share in omega, a contact begins or ends at a zero of the depth
 beyond its gap. Both are sought on corrected points, never interpolated.
