@@ -42,9 +42,9 @@ def run(request, capsys, monkeypatch, tmp_path):
     return call
 
 
-def assert_one_sentence(result, *words):
-    code, out, err = result
-    assert code == 2, err
+def assert_one_sentence(result, *words, code=2):
+    ended, out, err = result
+    assert ended == code, err
     assert out == ""
     assert "Traceback" not in err
     assert err.count("\n") == 1, err
@@ -252,7 +252,9 @@ def test_unreadable_file(run, tmp_path):
 
 
 def test_json_that_cannot_be_written(run):
-    assert_one_sentence(run("ffs0827", "--json", "no/such/folder/x.json"), "--json", "x.json")
+    """What cannot be written is the store's error, whichever file it is."""
+    ended = run("ffs0827", "--json", "no/such/folder/x.json")
+    assert_one_sentence(ended, "--json", "x.json", code=4)
 
 
 def test_usage_errors_end_with_2(run):
