@@ -136,6 +136,59 @@ def test_copies_tell_the_same(made, kind):
         assert told(twin) == told(result)
 
 
+@pytest.mark.parametrize("kind", ["exact branch", "series branch", "sweep"])
+@pytest.mark.usefixtures("restless")
+def test_a_result_is_copied_while_others_read_it(made, kind):
+    """What is worked out when asked for is not part of a copy: it may be growing."""
+    result = copy.deepcopy(made[kind])
+    vectors = ["main", "floating", "relative", 0, 1]
+    done = threading.Event()
+
+    def read() -> None:
+        while not done.is_set():
+            fresh = copy.copy(result)
+            for which in vectors:
+                fresh.amplitude(which)
+                result.amplitude(which)
+            result.__dict__.pop("_seen", None)
+
+    with ThreadPoolExecutor(2) as pool:
+        readers = [pool.submit(read) for _ in range(2)]
+        try:
+            sizes = {len(pickle.dumps(copy.deepcopy(result))) for _ in range(150)}
+        finally:
+            done.set()
+        for reader in readers:
+            reader.result()
+    assert len(sizes) == 1
+
+
+def first(_t, x, _v, _a):
+    return x[:, 0]
+
+
+def spoil(_t, x, _v, _a):
+    x.fill(1.0)
+    return x[:, 0]
+
+
+def test_what_is_handed_out_is_not_what_is_kept(made):
+    """Writing into an answer changes neither the result nor its later answers."""
+    branch, sweep = made["exact branch"], made["sweep"]
+    orbit = branch.orbit(5)
+    before = orbit.amplitude("relative"), branch.orbit(5).state.copy(), sweep.amplitude("main")
+    orbit.state[:] = 0.0
+    orbit.return_map[:] = 0.0
+    orbit.peak(spoil)
+    sweep.extremes("main")[1][:] = 1.0
+    assert orbit.amplitude("relative") == before[0]
+    assert orbit.peak(first) < 1.0
+    np.testing.assert_array_equal(branch.orbit(5).state, before[1])
+    np.testing.assert_array_equal(sweep.amplitude("main"), before[2])
+    with pytest.raises(ValueError, match="read-only"):
+        branch.omega[0] = 1.0
+
+
 def test_a_branch_keeps_its_points_and_nothing_else(made):
     """No scratch, no record of twenty thousand rows: about a kilobyte a point."""
     branch = made["exact branch"]

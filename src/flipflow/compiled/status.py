@@ -14,3 +14,4 @@ POINT_LIMIT = 9  # the record is full
 SEARCH_NOT_ENDED = 10  # the search for the next contact took too many steps
 CLOSED = 11  # the branch came back to its first point
 FOLLOWED = 12  # the branch was followed to both its ends
+NO_MODES = 13  # no basis of modes was found in one of the contact states

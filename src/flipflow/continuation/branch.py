@@ -27,6 +27,7 @@ from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Formulation, Point, Traced
 from flipflow.periodic.stability import STABLE, stability_words
+from flipflow.results.frozen import Frozen
 
 Real = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ class ShortenedStep:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Frozen):
     """Periodic motions followed over frequency, in their order along the branch.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
@@ -205,7 +206,7 @@ class Branch:
         """The motion at point i of the branch."""
         n = self.omega.size
         i = checked_index("i", i, n, f"the branch has points 0 to {n - 1}", least=-n)
-        u, omega = self.traced.u[i], float(self.omega[i])
+        u, omega = self.traced.u[i].copy(), float(self.omega[i])
         point = Point(self.formulation, u, omega, known_map=self.return_maps[i])
         return Orbit(self.machine, point, str(self.stability[i]))
 

@@ -38,6 +38,10 @@ class BranchStatus(Enum):
     NO_START = (
         "No periodic motion was found at the start of the interval. Start from another frequency."
     )
+    NO_MODES = (
+        "The modes of the machine could not be found in one of its contact states; change a "
+        "damping a little."
+    )
     NOT_FINITE = "A motion grew beyond all bounds; check damping and stiffness."
 
     @property
@@ -62,6 +66,7 @@ _OF_CODE = {
     status.NO_CONVERGENCE: BranchStatus.NO_START,
     status.SINGULAR: BranchStatus.NO_START,
     status.NOT_FINITE: BranchStatus.NOT_FINITE,
+    status.NO_MODES: BranchStatus.NO_MODES,
     status.SEARCH_NOT_ENDED: BranchStatus.TOO_MANY_CONTACTS,
 }
 

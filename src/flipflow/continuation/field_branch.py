@@ -17,6 +17,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
+from flipflow.results.frozen import Frozen
 
 Real = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ class FieldSpecialPoint(SpecialPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class FieldBranch:
+class FieldBranch(Frozen):
     """Periodic motions, or folds, followed over a field of the machine.
 
     Arrays are (n,) over its points, in their order along the branch. It is what

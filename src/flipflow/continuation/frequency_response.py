@@ -17,6 +17,7 @@ from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_
 from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
+from flipflow.model.contact_law import pushes_whole
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.balance_solver import BalanceSolver, SampledSolver
 from flipflow.periodic.exact_solver import ExactSolver
@@ -121,12 +122,15 @@ def formulation_of(
     symmetric = system.symmetric if half_turn is None else half_turn
     linear = system.with_bonded()
     if isinstance(method, HarmonicBalance) and linear.springs:
+        for spring in linear.springs:
+            if not pushes_whole(spring.law):
+                raise InputError("law", spring.law, "it has no series: give PiecewiseExact()")
         return Formulation(BalanceSolver, linear, symmetric, options=(method.harmonics,))
     if isinstance(method, SampledHarmonicBalance) and linear.springs:
-        if any(spring.law != "paper" for spring in linear.springs):
-            raise InputError(
-                "law", "compression-only", "only the paper's law has a smooth form to sample"
-            )
+        for spring in linear.springs:
+            if spring.law != "paper":
+                remedy = "only the paper's law has a smooth form to sample"
+                raise InputError("law", spring.law, remedy)
         options = method.harmonics, method.samples, method.sharpness
         return Formulation(SampledSolver, linear, symmetric, options=options)
     return Formulation(ExactSolver, linear, symmetric, turns)

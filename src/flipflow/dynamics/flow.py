@@ -246,7 +246,7 @@ def run_flow(
         slot = state_number(machine, flow.modes, flow.regime)
         flow.segments[0] = e + 1
         if slot < 0:
-            return status.SINGULAR
+            return status.NO_MODES
         prepare_drive(machine, flow, slot, omega)
         begin_segment(machine, flow, e, slot, omega, t)
         length, spring, new = next_change(

@@ -15,13 +15,14 @@ from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.model.arguments import checked_speeds
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
+from flipflow.results.frozen import Frozen
 
 Real = NDArray[np.float64]
 SCAN_POINTS = 4000  # frequencies up to twice the highest natural one, to find peaks between
 
 
 @dataclass(frozen=True, eq=False)
-class LinearResponse:
+class LinearResponse(Frozen):
     """Response of the machine as long as no stop is touched; bonded stops count as springs.
 
     Parameters

@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
@@ -29,6 +28,7 @@ from flipflow.errors import InputError
 from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 
 NEARLY_DEFECTIVE = 1e6  # condition of the basis of eigenvectors from which it has lost six digits
+USELESS = 1e10  # condition from which it serves no more
 NUDGE = 1e-10  # relative change of damping that splits a double eigenvalue
 MOST_NUDGES = 3  # such changes tried, each larger by one nudge
 MOST_STATES = 2**12  # contact states for which tables are kept
@@ -73,7 +73,8 @@ def new_modes(machine: MachineArrays) -> Modes:
     states = place.pop()
     modes = 2 * n
     if states > MOST_STATES or states * (2 * modes + 2 * m) * modes * 16 > MOST_BYTES:
-        raise InputError("springs", m, "so many springs with a gap have too many contact states")
+        remedy = "give at most 12 springs with a gap, fewer of a large machine"
+        raise InputError("springs", m, remedy)
     table = (states, modes)
     return Modes(
         place=np.array(place, np.int64),
@@ -109,26 +110,36 @@ def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
 
 
 @kernel
-def prepare(machine: MachineArrays, modes: Modes, number: int) -> int:
-    """Fill the tables of one contact state; returns a status.
+def prepare(machine: MachineArrays, modes: Modes, number: int) -> None:
+    """Fill the tables of one contact state; ``ready`` tells whether that could be done.
 
     With exactly critical damping there is no full set of eigenvectors. A change of the damping in
     its tenth digit gives one, and loses fewer digits than a defective basis would.
     """
     modes.ready[number] = -1
+    best, least = 0, math.inf
     for nudge in range(MOST_NUDGES + 1):
-        if not _state_matrix(machine, modes, number, 1.0 + nudge * NUDGE):
-            return status.SINGULAR
-        if not real_schur(modes.schur, True):
-            return status.NO_CONVERGENCE
-        condition = _vectors(modes, number)
+        condition = _basis(machine, modes, number, nudge)
+        if condition < least:
+            best, least = nudge, condition
         if condition < NEARLY_DEFECTIVE:
             break
-    if not math.isfinite(condition):
-        return status.SINGULAR
+    if not least < USELESS:
+        return
+    if nudge != best:
+        _basis(machine, modes, number, best)
     _seen_from_outside(machine, modes, number)
     modes.ready[number] = 1
-    return status.OK
+
+
+@kernel
+def _basis(machine: MachineArrays, modes: Modes, number: int, nudge: int) -> float:
+    """Modes with the damping changed by some nudges; the condition of their basis."""
+    if not _state_matrix(machine, modes, number, 1.0 + nudge * NUDGE):
+        return math.inf
+    if not real_schur(modes.schur, True):
+        return math.inf
+    return _vectors(modes, number)
 
 
 @kernel

@@ -111,6 +111,11 @@ def engaged_side(law: ContactLaw, regime: Int | int) -> Int:
     return np.where(carries_force(law, regime), np.sign(regime), 0)
 
 
+def pushes_whole(law: ContactLaw) -> bool:
+    """Whether each piece of a law carries all of k p + c p', or nothing."""
+    return {(p.stiffness, p.damping) for p in LAWS[law]} <= {(0.0, 0.0), (1.0, 1.0)}
+
+
 def signed_gap(regime: Int, gaps: tuple[float, float]) -> Real:
     """Position of the gap that a regime lies beyond: e+ or -e-; 0 where it is open."""
     return np.select([regime > OPEN, regime < OPEN], [gaps[0], -gaps[1]], 0.0)

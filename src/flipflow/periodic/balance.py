@@ -46,7 +46,7 @@ def prepare_receptance(problem: Balance, work: BalanceWork, omega: float) -> int
     if modes.ready[0] == 0:
         prepare(machine, modes, 0)
     if modes.ready[0] < 0:
-        return status.SINGULAR
+        return status.NO_MODES
     prepare_drive(machine, work.flow, 0, omega)
     for j in range(m):
         work.linear[j] = 0.0

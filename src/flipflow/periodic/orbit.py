@@ -24,6 +24,7 @@ from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
+from flipflow.results.frozen import Frozen
 
 GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 POINTS_PER_TURN = 720  # default times in each forcing period
@@ -31,7 +32,7 @@ QUANTITY = "give a function of (t, x, v, a) that returns one number for each tim
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
+class Orbit(Frozen):
     """A periodic motion of a machine under forcing at ``omega``.
 
     Time is counted from the moment the unbalance points along +x; SI units; arrays over time are
@@ -67,7 +68,7 @@ class Orbit:
     @property
     def return_map(self) -> Real:
         """Linearised return map of the state over a turn, or over half a turn with sign."""
-        return self.point.return_map
+        return self.point.return_map.copy()
 
     @property
     def system(self) -> MechanicalSystem:
@@ -97,9 +98,8 @@ class Orbit:
     @cached_property
     def state(self) -> Real:
         """State (x, x') at t = 0, shape (2 N,)."""
-        return np.asarray(
-            self.point.formulation.solver().states(self.unknowns[None], np.array([self.omega]))[0]
-        )
+        at = self.unknowns[None], np.array([self.omega])
+        return np.array(self.point.formulation.solver().states(*at)[0])
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -189,7 +189,8 @@ class Orbit:
         if not takes(quantity, 4):
             raise InputError("quantity", quantity, QUANTITY)
         t, piece, *states = self._grid
-        values = checked_reals("quantity", quantity(t, *states), QUANTITY)
+        handed = [part.copy() for part in (t, *states)]
+        values = checked_reals("quantity", quantity(*handed), QUANTITY)
         if values.shape != t.shape:
             raise InputError("quantity", values, QUANTITY)
         return _summit(np.abs(values), piece)

@@ -188,7 +188,7 @@ def passages(problem: Sampled, work: SampledWork) -> int:  # noqa: ARG001
     """A number that changes when the samples begin or cease to pass a gap."""
     total = 0
     for j in range(work.beyond.shape[0]):
-        total += work.beyond[j] + 1000 * j * work.beyond[j]
+        total += work.beyond[j] * (1 + 1_000 * j * (1 + 1_000 * j))
     return total
 
 

@@ -23,6 +23,7 @@ from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.readings import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
+from flipflow.results.frozen import Frozen
 
 STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size
 POINTS_MOST = 20_000  # that one branch can record; a few hundred are usual
@@ -142,7 +143,7 @@ class Formulation:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(Frozen):
     """A solved motion: unknowns, tangent's share in omega, and return map where it is known."""
 
     formulation: Formulation
@@ -180,7 +181,7 @@ class Solver(ABC):
     ------
     InputError
         For a machine that has no steady state: see
-        :func:`~flipflow.dynamics.machine.machine_arrays`.
+        :func:`~flipflow.dynamics.assembly.machine_arrays`.
     """
 
     unknowns: int

@@ -9,11 +9,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from flipflow import __version__
 from flipflow.continuation.branch import Branch
 from flipflow.dynamics.normal import NormalMotion
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY, RPM
+from flipflow.model.contact_law import ENTERED, stored_energy
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
 from flipflow.model.monitor import Monitor
@@ -278,12 +281,12 @@ def _let_go_power(screen: FlipFlowScreen, orbit: Orbit) -> float:
 
     The paper's law lets go at the gap, where the spring holds none.
     """
-    gaps = screen.stop().gaps
-    lost = 0.0
+    stop, lost = screen.stop(), 0.0
     for touch in orbit.contact_intervals:
-        ends = touch.side * orbit.displacement("relative", [touch.start, touch.end])
-        taken, left = (ends - gaps[0 if touch.side > 0 else 1]) ** 2
-        lost += 0.5 * screen.stop_stiffness * float(left - taken)
+        ends = orbit.displacement("relative", [touch.start, touch.end])
+        regime = np.full(2, touch.side * ENTERED)
+        taken, left = stored_energy(stop.law, stop.stiffness, stop.gaps, regime, ends)
+        lost += float(left - taken)
     return lost / orbit.period
 
 

@@ -21,6 +21,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
+from flipflow.results.frozen import Frozen
 from flipflow.studies.attractors import Attractors
 
 Int = NDArray[np.int64]
@@ -47,7 +48,7 @@ class GridAxis:
 
 
 @dataclass(frozen=True, eq=False)
-class Basins:
+class Basins(Frozen):
     """Which motion each state of a grid settles on; the unbalance points along +x at the start.
 
     Parameters

@@ -21,6 +21,7 @@ from flipflow.dynamics.linear_response import (
 )
 from flipflow.errors import IncompleteError
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.results.frozen import Frozen
 
 LOWEST_SHARE = 0.22  # lower end of the range over the first natural frequency
 HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all stops engaged
@@ -134,7 +135,7 @@ def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Frozen):
     """A screen over an interval of speed; its branch is followed when first asked for.
 
     Parameters

@@ -21,6 +21,7 @@ from flipflow.model.constants import GRAVITY
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
+from flipflow.results.frozen import Frozen
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -109,7 +110,7 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Working:
+class Working(Frozen):
     """A screen in one periodic motion, solved for.
 
     Parameters
@@ -190,7 +191,7 @@ class Working:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactFree:
+class ContactFree(Frozen):
     """S screens that touch no stop, at K frequencies, in closed form; every answer is (S, K).
 
     Parameters

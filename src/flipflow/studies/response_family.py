@@ -17,6 +17,7 @@ from flipflow.model.arguments import checked_interval, checked_reals, checked_wo
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.options import Method
+from flipflow.results.frozen import Frozen
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.studies.loading import relative_from_below
 
@@ -25,7 +26,7 @@ FREQUENCIES = 9  # equally spaced speeds of the common region at which members a
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class Member(Frozen):
     """One machine of a family.
 
     Parameters
@@ -83,7 +84,7 @@ class Member:
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseFamily:
+class ResponseFamily(Frozen):
     """Responses of machines that differ in one field; returned by ``response_family``.
 
     Parameters

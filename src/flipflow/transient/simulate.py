@@ -18,7 +18,7 @@ from flipflow.model.arguments import (
     checked_numbers,
     checked_speed,
 )
-from flipflow.model.contact_law import engaged_side
+from flipflow.model.contact_law import ENTERED, engaged_side, force_in, regime_at, stored_energy
 from flipflow.model.disturbance import Disturbance, Impulse, LoadStep, Lump
 from flipflow.model.elements import Unbalance
 from flipflow.model.monitor import Monitor
@@ -196,10 +196,10 @@ class _Run:
         x, v = np.split(self.z, 2)
         total = 0.0
         for spring in (system.springs[k] for k in self.kept):
-            y, rate = float(spring.direction @ x), float(spring.direction @ v)
-            if spring.force(y, rate) != 0.0:
-                gap = spring.gaps[0] if y > 0.0 else -spring.gaps[1]
-                total += 0.5 * spring.stiffness * (y - gap) ** 2
+            y, rate = spring.direction @ x, spring.direction @ v
+            regime = regime_at(spring.law, spring.stiffness, spring.damping, spring.gaps, y, rate)
+            held = stored_energy(spring.law, spring.stiffness, spring.gaps, regime, np.asarray(y))
+            total += float(held)
         return total
 
     def energy(self) -> dict[str, float]:
@@ -217,7 +217,8 @@ class _Run:
         for k, spring in enumerate(self.springs):
             if spring.bonded:
                 y, rate = table.x @ spring.direction, table.v @ spring.direction
-                forces[:, k] = spring.stiffness * y + spring.damping * rate
+                of = spring.law, spring.stiffness, spring.damping, spring.gaps
+                forces[:, k] = force_in(*of, np.full(y.shape, ENTERED), y, rate)
         return forces
 
     def events(self) -> tuple[ContactChange, ...]:

@@ -16,6 +16,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.periodic.solver import Formulation
+from flipflow.results.frozen import Frozen
 from flipflow.transient.settling import MOST_TURNS, Settled, Settling
 
 Real = NDArray[np.float64]
@@ -39,7 +40,7 @@ class Jump:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(Frozen):
     """What a machine settles to while its speed is changed in steps; arrays are (n,).
 
     Parameters
@@ -138,7 +139,8 @@ class Sweep:
             self._seen[key] = (
                 np.minimum.reduceat(low[:, 0], starts), np.maximum.reduceat(high[:, 0], starts),
             )  # fmt: skip
-        return self._seen[key]
+        low, high = self._seen[key]
+        return low.copy(), high.copy()
 
     @cached_property
     def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real]]:
