@@ -41,7 +41,7 @@ def stages(machine, method):
     lap()
     find_special_points(solver, traced, maps, eigenvalues)
     lap()
-    names = ("plan and scratch", "start", "trace", "stability", "special points")
+    names = ("machine and scratch", "start", "trace", "stability", "special points")
     return dict(zip(names, np.diff(clock), strict=True))
 
 

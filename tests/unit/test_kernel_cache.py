@@ -231,10 +231,11 @@ def test_one_set_of_options(package: Path, cache: Path) -> None:
     spy = (
         "import numba, numba.core.codegen as codegen\nfrom numba import config\n"
         "numba.njit(lambda x: x)(1.0)\n"
-        "levels = set(); build = codegen.CPUCodegen._pass_builder\n"
+        "builders = {'_pass_builder', '_pass_manager_builder'} & set(vars(codegen.CPUCodegen))\n"
+        "(name,) = builders; levels = set(); build = getattr(codegen.CPUCodegen, name)\n"
         "def spy(self, **options):\n"
         "    levels.add(int(options.get('opt', config.OPT))); return build(self, **options)\n"
-        "codegen.CPUCodegen._pass_builder = spy\n"
+        "setattr(codegen.CPUCodegen, name, spy)\n"
         "from tiny.outer import answer; answer(2.0)\n"
         "assert levels == {0, 1}, levels\nassert config.OPT == {}\n"
     )
@@ -343,7 +344,7 @@ def test_workers_fill_the_cache_once(package: Path, cache: Path, tmp_path: Path)
     (scratch := tmp_path / "scratch").mkdir()
     assert run(package.parent, cache, AHEAD, TMPDIR=str(scratch)) == (7.0, 2, "")
     assert not list(scratch.iterdir())
-    idle = "import subprocess; subprocess.Popen = None\n"
+    idle = "import subprocess, numpy.testing; subprocess.Popen = None\n"
     assert run(package.parent, cache, idle + AHEAD) == (7.0, 2, "")
 
 
@@ -365,7 +366,7 @@ def test_without_any_folder(package: Path, cache: Path) -> None:
     (package / "ahead.py").write_text(PARTS)
     cache.write_text("not a folder")
     nowhere = (
-        "import subprocess, tempfile; subprocess.Popen = None\n"
+        "import subprocess, tempfile, numpy.testing; subprocess.Popen = None\n"
         "def mkdtemp(**options): raise FileNotFoundError(2, 'No usable temporary directory')\n"
         "tempfile.mkdtemp = mkdtemp\n"
     )

@@ -1,4 +1,4 @@
-"""Machines with so many stops that their contact configurations are prepared as they are met."""
+"""Machines with so many stops that a motion meets few of their contact states."""
 
 import numpy as np
 import pytest
