@@ -60,7 +60,7 @@ class FieldEquations(Equations):
         self.lower, self.upper = bounds
         self.omega, self.half_turn, self.turns = omega, half_turn, turns
         self.system_at, self.own = system_at, own
-        self._segments = 0
+        self._contacts = 0
 
         @lru_cache(maxsize=SOLVERS_KEPT)
         def solver_at(value: float) -> ExactSolver:
@@ -78,7 +78,7 @@ class FieldEquations(Equations):
             return None
         solver = self.solver_at(value)
         found = solver.residual(z, omega)
-        self._segments = int(solver.flow.segments[0])
+        self._contacts = solver.contacts
         return found
 
     def size(self, value: float) -> float:
@@ -119,7 +119,7 @@ class FieldEquations(Equations):
         return np.asarray(amplitude * np.repeat([1.0, omega], n))
 
     def signature(self) -> int:
-        return self._segments
+        return self._contacts
 
     def apart(self, w: Real) -> float:
         parent = self.parent_at(float(w[-1]))

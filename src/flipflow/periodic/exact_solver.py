@@ -34,6 +34,7 @@ class ExactSolver(Solver):
         self.scratch = self.shooting_work
         self.problem = self.shooting(half_turn=half_turn)
         self.whole = self.shooting(half_turn=False)
+        self.contacts = 0  # contact number of the last residual's motion
 
     @property
     def flow(self) -> Flow:
@@ -42,7 +43,7 @@ class ExactSolver(Solver):
     def residual(self, z: Real, omega: float) -> tuple[Real, Real] | None:
         """r = sign flow(z) - z and [dr/dz, dr/d omega]; None where the flow does not end."""
         r, J = np.empty(self.unknowns), np.empty((self.unknowns, self.unknowns + 1))
-        code = shooting_step(self.problem, self.scratch, np.array(z), omega, r, J)
+        code, self.contacts = shooting_step(self.problem, self.scratch, np.array(z), omega, r, J)
         return (r, J) if code == status.OK else None
 
     def return_maps(self, u: Real, omega: Real, jacobian: Real) -> Real:

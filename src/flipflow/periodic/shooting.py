@@ -110,9 +110,10 @@ def shooting_residual(
 @kernel(entry=True)
 def shooting_step(
     problem: Shooting, work: ShootingWork, z: Real, omega: float, r: Real, J: Real
-) -> int:
-    """``shooting_residual`` for callers outside the kernels."""
-    return shooting_residual(problem, work, z, omega, r, J)
+) -> tuple[int, int]:
+    """``shooting_residual`` for callers outside the kernels, and its motion's contact number."""
+    code = shooting_residual(problem, work, z, omega, r, J)
+    return code, contact_number(work.flow, problem.sign > 0.0)
 
 
 @kernel
