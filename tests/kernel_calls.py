@@ -6,7 +6,7 @@ import numpy as np
 
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
-from flipflow.continuation.arclength import predict
+from flipflow.continuation.frequency_loop import predict
 from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
 from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.periodic.balance import balance_residual

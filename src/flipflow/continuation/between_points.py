@@ -12,11 +12,11 @@ from typing import Any
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
-from flipflow.continuation.arclength import (
+from flipflow.continuation.frequency_loop import (
     SHARP,
-    Branch,
     Corrector,
     Course,
+    Record,
     bend,
     chord_to,
     correct,
@@ -37,7 +37,7 @@ def correct_between(
     problem: Any,
     scratch: Any,
     work: Corrector,
-    branch: Branch,
+    branch: Record,
     p: int,
     share: float,
     course: Course,
@@ -79,7 +79,7 @@ def height_between(
     problem: Any,
     scratch: Any,
     work: Corrector,
-    branch: Branch,
+    branch: Record,
     p: int,
     share: float,
     test: int,
@@ -103,7 +103,7 @@ def height_between(
 
 @kernel
 def zero_between(
-    problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int, low: float, high: float,
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, low: float, high: float,
     test: int, course: Course,
 ) -> tuple[int, float]:  # fmt: skip
     """Zero of a test between two shares of step p by Chandrupatla's method: status and share.
@@ -151,7 +151,7 @@ def follow(
     problem: Any,
     scratch: Any,
     work: Corrector,
-    branch: Branch,
+    branch: Record,
     u: Real,
     omega: float,
     course: Course,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from flipflow.compiled import status
-from flipflow.continuation.arclength import (
+from flipflow.continuation.frequency_loop import (
     REASON_BOUND,
     REASON_CONTACT,
     REASON_NEWTON,

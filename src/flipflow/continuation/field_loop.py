@@ -1,7 +1,7 @@
 """The continuation loop over a field: n equations in n + 1 unknowns, the field's value the last.
 
 For parameters that change the machine: every evaluation flattens a machine anew, which costs more
-than the equations do. Over omega the compiled loop of :mod:`flipflow.continuation.arclength`
+than the equations do. Over omega the compiled loop of :mod:`flipflow.continuation.frequency_loop`
 serves; steps, constants and refusals are the same.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.continuation.arclength import (
+from flipflow.continuation.frequency_loop import (
     AWAY,
     BACK,
     CONTACT_STEP,

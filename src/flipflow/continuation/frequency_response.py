@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flipflow import __version__
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
-from flipflow.continuation import arclength
+from flipflow.continuation import frequency_loop
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
@@ -86,15 +86,17 @@ def frequency_response(
     low, high = checked_interval("omega", omega)
     method = checked_method(method)
     solver = solver_for(system_of(machine), method)
-    course = arclength.Course(
-        low, high, (high - low) / method.points, STEP_SHARE, 1.0, arclength.QUICK
+    course = frequency_loop.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, frequency_loop.QUICK
     )
     if isinstance(solver, SampledSolver):
         warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
     return followed(machine, method, solver, course)
 
 
-def followed(machine: Machine, method: Method, solver: Solver, course: arclength.Course) -> Branch:
+def followed(
+    machine: Machine, method: Method, solver: Solver, course: frequency_loop.Course
+) -> Branch:
     """The branch over ``course`` with stability and special points."""
     traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
     return described(machine, method, solver, traced)
@@ -161,7 +163,7 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     if free.any():
         start = float(starts[free.argmax()])
         step = (omega - start) / STEPS_UP
-        course = arclength.Course(start, omega, step, STEP_SHARE, 1.0, arclength.QUICK)
+        course = frequency_loop.Course(start, omega, step, STEP_SHARE, 1.0, frequency_loop.QUICK)
         traced = solver.trace(contact_free_unknowns(solver, start), start, course)
         if traced.code == status.REACHED_UPPER:
             return np.asarray(traced.u[-1])

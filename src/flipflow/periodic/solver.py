@@ -13,7 +13,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
-from flipflow.continuation import arclength
+from flipflow.continuation import frequency_loop
 from flipflow.continuation.between_points import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import Flow
@@ -36,24 +36,24 @@ class Traced:
     ``rejected`` and ``reason`` have one place more, for the step at which the branch ended.
     """
 
-    record: arclength.Branch
+    record: frequency_loop.Record
     rejected: Int
     reason: Int
     code: int
-    course: arclength.Course
+    course: frequency_loop.Course
 
     @classmethod
     def recorded(
-        cls, record: arclength.Branch, points: int, code: int, course: arclength.Course
+        cls, record: frequency_loop.Record, points: int, code: int, course: frequency_loop.Course
     ) -> Self:
         """The first ``points`` of a record, and what happened on the way to the next."""
-        kept = arclength.first_points(record, points)
+        kept = frequency_loop.first_points(record, points)
         rejected, reason = record.rejected[: points + 1], record.reason[: points + 1]
         return cls(kept, rejected.copy(), reason.copy(), code, course)
 
     def first(self, points: int) -> Self:
         """The branch up to a point, as followed to an end there."""
-        kept = arclength.first_points(self.record, points)
+        kept = frequency_loop.first_points(self.record, points)
         tried = self.rejected[: points + 1], self.reason[: points + 1]
         return type(self)(kept, *tried, status.FOLLOWED, self.course)
 
@@ -109,7 +109,7 @@ class Traced:
             name: np.concatenate([-getattr(self.record, name)[turned], getattr(ahead.record, name)])
             for name in ("tangent", "side")
         }
-        record = arclength.Branch(
+        record = frequency_loop.Record(
             **joined, **opposite, rejected=rejected[:points], reason=reason[:points]
         )
         return Traced(record, rejected, reason, code, ahead.course)
@@ -247,28 +247,30 @@ class Solver(ABC):
         none = np.zeros((1, 0, 0))
         return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
 
-    def trace(self, u: Real, omega: float, course: arclength.Course) -> Traced:
+    def trace(self, u: Real, omega: float, course: frequency_loop.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
         record = self.new_branch(POINTS_MOST)
         code, points, _ = self._follow(record, u, omega, course)
         return Traced.recorded(record, points, code, course)
 
-    def new_branch(self, points: int) -> arclength.Branch:
+    def new_branch(self, points: int) -> frequency_loop.Record:
         """An empty record for up to ``points`` points."""
         gaps = len(self.springs)
-        return arclength.new_branch(self.unknowns, gaps, points, with_jacobian=self.reads_jacobian)
+        return frequency_loop.new_branch(
+            self.unknowns, gaps, points, with_jacobian=self.reads_jacobian
+        )
 
     @cached_property
-    def corrector(self) -> arclength.Corrector:
+    def corrector(self) -> frequency_loop.Corrector:
         """Scratch of the bordered Newton solves; the last point corrected stands in it."""
-        return arclength.new_corrector(self.unknowns, len(self.springs))
+        return frequency_loop.new_corrector(self.unknowns, len(self.springs))
 
     def _follow(
         self,
-        record: arclength.Branch,
+        record: frequency_loop.Record,
         u: Real,
         omega: float,
-        course: arclength.Course,
+        course: frequency_loop.Course,
         p: int = TRACE_ALL,
         shares: tuple[float, float] = (0.0, 0.0),
         test: int = 0,
@@ -330,7 +332,9 @@ class Solver(ABC):
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
-        course = arclength.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, arclength.SHARP)
+        course = frequency_loop.Course(
+            omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, frequency_loop.SHARP
+        )
         record = self.new_branch(1)
         _, points, _ = self._follow(record, u, omega, course)
         if points == 0:

@@ -10,15 +10,15 @@ from scipy.optimize import minimize_scalar
 
 import flipflow as ff
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
-from flipflow.continuation import arclength
-from flipflow.continuation.arclength import new_branch, new_corrector
+from flipflow.continuation import frequency_loop
+from flipflow.continuation.frequency_loop import new_branch, new_corrector
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import new_flow
 from flipflow.periodic.stability import determinant_minus, determinant_plus
 from kernel_calls import number_of, predicted
 
 pytestmark = pytest.mark.numerical
-ANYWHERE = arclength.Course(1.0, 100.0, 1.0, 1.0, 1.0, arclength.QUICK)
+ANYWHERE = frequency_loop.Course(1.0, 100.0, 1.0, 1.0, 1.0, frequency_loop.QUICK)
 TURN = 1.0 / math.sqrt(2.0)
 
 

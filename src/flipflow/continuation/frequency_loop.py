@@ -42,7 +42,7 @@ SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTO
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
 
-class Branch(NamedTuple):
+class Record(NamedTuple):
     """Record of up to P points with n unknowns each."""
 
     u: Real  # (P, n)
@@ -175,7 +175,7 @@ def new_tangent(work: Corrector) -> float:
 
 
 @kernel
-def store(problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int) -> None:
+def store(problem: Any, scratch: Any, work: Corrector, branch: Record, p: int) -> None:
     """Write point p of the branch from the corrector's scratch."""
     n = work.r.shape[0]
     for i in range(n):
@@ -192,7 +192,7 @@ def store(problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int) -
 
 
 @kernel
-def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course) -> None:
+def recall(problem: Any, work: Corrector, branch: Record, p: int, course: Course) -> None:
     """Scale of point p, and its unit tangent in scaled unknowns into work.before."""
     n = work.r.shape[0]
     for k in range(n):
@@ -207,7 +207,7 @@ def recall(problem: Any, work: Corrector, branch: Branch, p: int, course: Course
 
 
 @kernel
-def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course) -> bool:
+def predict(work: Corrector, branch: Record, p: int, step: float, course: Course) -> bool:
     """Guess a step along the branch from point p; True when it ends on a bound of omega.
 
     A guess beyond the bound is drawn back along the tangent and corrected at that omega.
@@ -233,7 +233,7 @@ def predict(work: Corrector, branch: Branch, p: int, step: float, course: Course
 
 
 @kernel
-def chord_to(work: Corrector, branch: Branch, p: int) -> float:
+def chord_to(work: Corrector, branch: Record, p: int) -> float:
     """The way from point p - 1 to point p, in steps, into work.b; its length."""
     n = work.r.shape[0]
     square = 0.0
@@ -246,7 +246,7 @@ def chord_to(work: Corrector, branch: Branch, p: int) -> float:
 
 
 @kernel
-def bend(work: Corrector, branch: Branch, p: int, step: float, chord: float) -> None:
+def bend(work: Corrector, branch: Record, p: int, step: float, chord: float) -> None:
     """Turn the guess on the tangent of point p into one on the cubic through p - 1 and p.
 
     With h the chord, which ``chord_to`` left in work.b, d its direction, t and t' the tangents at
@@ -277,7 +277,7 @@ def astray(work: Corrector) -> float:
 
 @kernel
 def judge(
-    problem: Any, scratch: Any, work: Corrector, branch: Branch, p: int, step: float, code: int,
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, step: float, code: int,
     iterations: int,
     course: Course,
 ) -> int:  # fmt: skip
@@ -310,7 +310,7 @@ def judge(
 
 
 @kernel
-def from_start(work: Corrector, branch: Branch) -> float:
+def from_start(work: Corrector, branch: Record) -> float:
     """Distance of the corrected point from the first one, in steps."""
     n = work.r.shape[0]
     square = ((work.w[n] - branch.omega[0]) / work.scale[n]) ** 2
@@ -320,7 +320,7 @@ def from_start(work: Corrector, branch: Branch) -> float:
 
 
 @kernel
-def arrival(branch: Branch, course: Course, p: int, ends: bool, back: bool) -> int:
+def arrival(branch: Record, course: Course, p: int, ends: bool, back: bool) -> int:
     """How the branch ends with point p; OK when it goes on."""
     if back:
         return status.CLOSED
@@ -331,7 +331,7 @@ def arrival(branch: Branch, course: Course, p: int, ends: bool, back: bool) -> i
 
 @kernel
 def trace(
-    problem: Any, scratch: Any, work: Corrector, branch: Branch, u: Real, omega: float,
+    problem: Any, scratch: Any, work: Corrector, branch: Record, u: Real, omega: float,
     course: Course,
 ) -> tuple[int, int]:  # fmt: skip
     """Follow the branch from (u, omega) until omega leaves its bounds; status and points.
@@ -411,10 +411,10 @@ def new_corrector(unknowns: int, gaps: int) -> Corrector:
     )
 
 
-def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = True) -> Branch:
+def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = True) -> Record:
     """Record of a branch of up to ``points`` points."""
     n = unknowns
-    return Branch(
+    return Record(
         u=np.empty((points, n)),
         omega=np.empty(points),
         tangent=np.empty((points, n + 1)),
@@ -428,7 +428,7 @@ def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = T
     )
 
 
-def first_points(branch: Branch, points: int) -> Branch:
+def first_points(branch: Record, points: int) -> Record:
     """A copy of the first points of a record."""
     rows = {name: array[:points].copy() for name, array in branch._asdict().items()}
-    return Branch(**rows)
+    return Record(**rows)
