@@ -197,12 +197,50 @@ def test_processes_fill_one_cache_together(package: Path, cache: Path) -> None:
     assert run(package.parent, cache) == (7.0, 1, "")
 
 
-def test_a_kernel_for_kernels_is_not_run_from_python(package: Path, cache: Path) -> None:
+SHARED = (
+    "from __future__ import annotations\nfrom tiny.compile import kernel\n\n"
+    "@kernel(shared=True)\ndef factor(x: float) -> {returned}:\n    return x * {factor}\n"
+)
+
+
+def test_a_shared_kernel_is_compiled_once(package: Path, cache: Path) -> None:
+    """Two entries call the one code, which is fetched with them, and anew once it is changed."""
+    (package / "inner.py").write_text(SHARED.format(returned="float", factor="3.0"))
+    (package / "other.py").write_text(OUTER.replace("1.0", "2.0"))
+    other = (
+        "from tiny.other import answer; print(answer(2.0), sum(answer.stats.cache_hits.values()))"
+    )
+    assert run(package.parent, cache) == (7.0, 0, "")
+    (kept,) = cache.rglob("tiny.inner.factor-*")
+    written = kept.stat().st_mtime_ns
+    assert python(package.parent, other, cache).stdout.split() == ["8.0", "0"]
+    assert python(package.parent, other, cache).stdout.split() == ["8.0", "1"]
+    assert kept.stat().st_mtime_ns == written
+    kept.write_bytes(b"damaged")
+    assert run(package.parent, cache)[:2] == (7.0, 1)
+    (package / "inner.py").write_text(SHARED.format(returned="float", factor="5.0"))
+    assert run(package.parent, cache) == (11.0, 0, "")
+    assert run(package.parent, cache) == (11.0, 1, "")
+
+
+def test_a_shared_kernel_returns_what_its_annotation_says(package: Path, cache: Path) -> None:
+    (package / "inner.py").write_text(SHARED.format(returned="complex", factor="3.0"))
+    done = python(package.parent, "import tiny.inner", cache)
+    assert "TypeError: factor" in done.stderr
+    (package / "inner.py").write_text(SHARED.format(returned="int", factor="3"))
+    assert run(package.parent, cache) == (7.0, 0, "")
+
+
+@pytest.mark.parametrize("source", [INNER, SHARED.replace("{returned}", "float")])
+def test_a_kernel_for_kernels_is_not_run_from_python(
+    package: Path, cache: Path, source: str
+) -> None:
     """There is no machine code of it to run; the interpreter has to survive the attempt."""
+    (package / "inner.py").write_text(source.format(factor="3.0"))
     call = "from tiny.outer import answer; from tiny.inner import factor; answer(2.0); factor(2.0)"
     done = python(package.parent, call, cache)
     assert done.returncode == 1
-    assert "KeyError" in done.stderr
+    assert "KeyError" in done.stderr or "TypeError: factor is called by kernels only" in done.stderr
 
 
 def test_the_cache_stays_in_its_folder(package: Path, cache: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from numba.core.caching import _Cache
@@ -51,9 +52,11 @@ class KernelCache(_Cache):
         content = FOLDERS.read(digest, self._file(key))
         if content is None:
             return None
-        stored_key, reduced = pickle.loads(content)  # noqa: S301  the checksum says that we wrote it
+        stored_key, shared, reduced = pickle.loads(content)  # noqa: S301  the checksum says that we wrote it
         if stored_key != key:
             return None
+        for module, name, called in shared:
+            getattr(import_module(module), name).compile(called)
         return CompileResult._rebuild(target_context, *reduced)  # noqa: SLF001  as numba's own cache
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -62,7 +65,8 @@ class KernelCache(_Cache):
         if digest is None or data.library.has_dynamic_globals:
             return
         key = self._key(sig, data.codegen)
-        FOLDERS.write(digest, self._file(key), dumps((key, data._reduce())))  # noqa: SLF001  the same
+        shared = [(each.__module__, each.__name__, called) for each, called in data.library.shared]
+        FOLDERS.write(digest, self._file(key), dumps((key, shared, data._reduce())))  # noqa: SLF001  the same
 
     def enable(self) -> None:
         """Read and write."""

@@ -42,35 +42,48 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]: ...
 
 @overload
 def kernel(
-    *, entry: bool = False, inline: bool = False
+    *, entry: bool = False, shared: bool = False, inline: bool = False
 ) -> Callable[[Callable[P, R]], Callable[P, R]]: ...
 
 
 def kernel(
-    function: Callable[P, R] | None = None, *, entry: bool = False, inline: bool = False
+    function: Callable[P, R] | None = None,
+    *,
+    entry: bool = False,
+    shared: bool = False,
+    inline: bool = False,
 ) -> Callable[P, R] | Callable[[Callable[P, R]], Callable[P, R]]:
     """Compile a scalar function: cached on disk, without the interpreter lock, IEEE arithmetic.
 
     Floating-point contraction is allowed; reassociation and the NaN-dropping parts of fastmath
     are not, because kernels test for NaN. Only an ``entry`` can be called from Python: the
-    wrappers that unpack its arguments cost more time to compile than most kernels do. ``inline``
-    is for what runs at every step of a search: its scratch, dozens of arrays, is then not passed.
-    Kernels allocate nothing, and so they count no references either: that took half of the time.
+    wrappers that unpack its arguments cost more time to compile than most kernels do. A ``shared``
+    kernel is compiled once for all entries that call it; its annotation says what it returns.
+    ``inline`` is for what runs at every step of a search: its scratch, dozens of arrays, is then
+    not passed. Kernels allocate nothing, and so they count no references either: that took half
+    of the time.
     """
     if function is None:
-        return functools.partial(_compile, entry=entry, inline=inline)
-    return _compile(function, entry=entry, inline=inline)
+        return functools.partial(_compile, entry=entry, shared=shared, inline=inline)
+    return _compile(function, entry=entry, shared=shared, inline=inline)
 
 
 _LANGUAGE: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
-_ENTRY = _PART = _LANGUAGE
+_ENTRY = _SHARED = _PART = _LANGUAGE
 _COMPILED_BY = "numba alone"
 if OWN_CACHE:
     from flipflow.compiled.cache import KernelCache
-    from flipflow.compiled.parts import OPTIMISATION, EntryCompiler, PartCompiler, without_literals
+    from flipflow.compiled.entries import (
+        OPTIMISATION,
+        EntryCompiler,
+        SharedCompiler,
+        called_by_name,
+    )
+    from flipflow.compiled.parts import PartCompiler, without_literals
 
     _ENTRY = _LANGUAGE | {"no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": EntryCompiler}
-    _PART = _ENTRY | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler}
+    _SHARED = _ENTRY | {"no_cpython_wrapper": True, "pipeline_class": SharedCompiler}
+    _PART = _SHARED | {"pipeline_class": PartCompiler}
     _COMPILED_BY = f"optimised {OPTIMISATION}"
 else:
     logger.debug("numba %s has not been tried: kernels compile slower", numba.__version__)
@@ -83,16 +96,19 @@ _SETTINGS = (
 )  # fmt: skip
 
 
-def _compile(function: Callable[P, R], *, entry: bool, inline: bool) -> Callable[P, R]:
+def _compile(
+    function: Callable[P, R], *, entry: bool, shared: bool, inline: bool
+) -> Callable[P, R]:
     if not OWN_CACHE:
         plain = _by_numba_alone(function) if entry else numba.njit(**_PART)(function)
         return cast("Callable[P, R]", plain)
-    compiled = numba.njit(forceinline=inline, **(_ENTRY if entry else _PART))(function)
+    options = _ENTRY if entry else _SHARED if shared else _PART
+    compiled = numba.njit(forceinline=inline, **options)(function)
     if config.DISABLE_JIT:
         return function
-    if entry:
+    if entry or shared:
         compiled._cache = KernelCache(function, compiled_by())  # noqa: SLF001  numba offers no other way
-    compiled = without_literals(compiled)
+    compiled = called_by_name(compiled) if shared else without_literals(compiled)
     return cast("Callable[P, R]", compiled)
 
 

@@ -143,7 +143,7 @@ def _reflect_row(T: Real, v: Real, i: int, first: int, end: int, square: float) 
         T[i, j] -= total * v[j]
 
 
-@kernel
+@kernel(shared=True)
 def real_schur(work: Schur, whole: bool) -> bool:
     """Schur form of work.T and its eigenvalues; False when the iteration does not end.
 

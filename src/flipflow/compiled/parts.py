@@ -1,4 +1,4 @@
-"""How entries are compiled, and the kernels that only kernels call: to code that callers take in.
+"""How kernels that only kernels call are compiled: to code that callers take in.
 
 numba by itself optimises every function with all that it calls, and makes machine code of it, so
 that what lies deep is done again at each level above. Only entries are run by themselves; the rest
@@ -9,30 +9,15 @@ This is built on numba's inside; ``compile.py`` says with which versions it is u
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from numba.core import config, types
+from numba.core import types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
-# Kernels run as fast with light optimisation, and are compiled in four fifths of the time.
-OPTIMISATION = 1
-
-
-class EntryCompiler(Compiler):
-    """numba's own passes, all that is compiled within them lightly optimised."""
-
-    def compile_extra(self, func: Callable[..., Any]) -> Any:
-        """Compile a function; numba holds its lock meanwhile, and so no other is."""
-        before = config.OPT
-        config.OPT = type(before)(OPTIMISATION)
-        try:
-            return super().compile_extra(func)
-        finally:
-            config.OPT = before
+from flipflow.compiled.entries import with_lowering
 
 
 class PartLibrary(JITCodeLibrary):
@@ -70,12 +55,7 @@ class PartCompiler(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         """The one pipeline."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [
-            (PartLowering if each is NativeLowering else each, why) for each, why in passes.passes
-        ]
-        passes.finalize()
-        return [passes]
+        return [with_lowering(self.state, PartLowering)]
 
 
 def without_literals(dispatcher: Any) -> Any:

@@ -254,7 +254,7 @@ def _approach(
     return safe_step(h, slope, curvature, second, third), NOTHING
 
 
-@kernel
+@kernel(shared=True)
 def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[float, float]:
     """Smallest and largest y_j over [0, duration], of both ends and of every zero of y' found.
 

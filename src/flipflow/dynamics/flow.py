@@ -233,7 +233,7 @@ def segment_motion(flow: Flow, e: int, omega: float, coordinate: Real, motion: G
             motion.amplitude[g, i] = modes.weight[slot, i] * shape * flow.q[e, i]
 
 
-@kernel
+@kernel(shared=True)
 def run_flow(
     machine: MachineArrays, flow: Flow, omega: float, t: float, duration: float, rate: Real
 ) -> int:
@@ -285,7 +285,7 @@ def contact_number(flow: Flow, sided: bool) -> int:
     return total
 
 
-@kernel
+@kernel(shared=True)
 def carry_tangent(machine: MachineArrays, flow: Flow, omega: float, U: Real, work: Complex) -> None:
     """Carry columns of U, (2 N, 2 N) or (2 N, 2 N + 1), over the recorded flow.
 

@@ -109,7 +109,7 @@ def state_number(machine: MachineArrays, modes: Modes, regime: Int) -> int:
     return number if modes.ready[number] == 1 else -1
 
 
-@kernel
+@kernel(shared=True)
 def prepare(machine: MachineArrays, modes: Modes, number: int) -> None:
     """Fill the tables of one contact state; ``ready`` tells whether that could be done.
 
