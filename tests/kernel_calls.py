@@ -93,9 +93,9 @@ def central_differences(evaluate, u: np.ndarray, omega: float, steps: np.ndarray
 
 
 @kernel(entry=True)
-def predicted(work, branch, p, step, course):
+def predicted(work, step, course, bends):
     """``predict``."""
-    return predict(work, branch, p, step, course)
+    return predict(work, step, course, bends)
 
 
 @kernel(entry=True)

@@ -31,14 +31,12 @@ def helix_tangent(s: float) -> np.ndarray:
     return TURN * np.array([-math.sin(s * TURN), math.cos(s * TURN), 1.0])
 
 
-def distance_from_helix(step: float, signatures: tuple[int, int]) -> float:
+def distance_from_helix(step: float, bends: bool) -> float:
     """How far the guess lies from the curve, a step beyond two points a step apart."""
-    branch, work = new_branch(2, 0, 2), new_corrector(2, 0)
-    for p, s in enumerate((-step, 0.0)):
-        branch.u[p], branch.omega[p] = helix(s)[:2], helix(s)[2]
-        branch.tangent[p], branch.signature[p] = helix_tangent(s), signatures[p]
-    work.before[:] = helix_tangent(0.0)
-    assert not predicted(work, branch, 1, step, ANYWHERE)
+    work = new_corrector(2, 0)
+    work.behind[:], work.behind_tangent[:] = helix(-step), helix_tangent(-step)
+    work.here[:], work.before[:] = helix(0.0), helix_tangent(0.0)
+    assert not predicted(work, step, ANYWHERE, bends)
     near = minimize_scalar(
         lambda s: float(np.linalg.norm(helix(s) - work.guess)),
         bounds=(0.5 * step, 1.5 * step), method="bounded", options={"xatol": 1e-12},
@@ -46,11 +44,11 @@ def distance_from_helix(step: float, signatures: tuple[int, int]) -> float:
     return float(near.fun)
 
 
-@pytest.mark.parametrize(("signatures", "order"), [((2, 2), 4.0), ((0, 2), 2.0)])
-def test_order_of_the_predictor(signatures: tuple[int, int], order: float) -> None:
+@pytest.mark.parametrize(("bends", "order"), [(True, 4.0), (False, 2.0)])
+def test_order_of_the_predictor(bends: bool, order: float) -> None:
     """Four along the cubic; two along the tangent, where the contacts have changed."""
     steps = np.array([0.4, 0.2, 0.1])
-    off = [distance_from_helix(float(step), signatures) for step in steps]
+    off = [distance_from_helix(float(step), bends) for step in steps]
     slopes = np.diff(np.log(off)) / np.diff(np.log(steps))
     assert slopes == pytest.approx([order, order], abs=0.1)
 

@@ -18,13 +18,15 @@ from flipflow.continuation.frequency_loop import (
     Course,
     Record,
     bend,
-    chord_to,
+    bring_home,
+    chord_behind,
     correct,
+    load,
     new_tangent,
     recall,
     trace,
 )
-from flipflow.continuation.problem import depths, residual
+from flipflow.continuation.problem import depths, residual, set_section
 
 TRACE_ALL = -1  # in place of a step: follow the whole branch
 FOLD = -1  # number of the test for a fold; those from 0 on are depths beyond gaps
@@ -34,35 +36,27 @@ MOST_ROOT_STEPS = 100  # steps of the search for one zero
 
 @kernel
 def correct_between(
-    problem: Any,
-    scratch: Any,
-    work: Corrector,
-    branch: Record,
-    p: int,
-    share: float,
-    course: Course,
+    problem: Any, scratch: Any, work: Corrector, share: float, course: Course
 ) -> int:
-    """Find a point of the branch between points p and p + 1, near ``share`` of the cubic on them.
+    """Find a point between the two that are loaded, near ``share`` of the cubic on them.
 
     The plane to solve in is normal to their chord. The point is left in work.w, its Jacobian in
     work.J, and its tangent, in the branch's direction, in work.tangent (scaled by work.scale).
     """
-    n = work.r.shape[0]
-    recall(problem, work, branch, p + 1, course)
-    chord = chord_to(work, branch, p + 1)
+    recall(problem, work, course)
+    chord = chord_behind(work)
     step = (share - 1.0) * chord
-    for k in range(n + 1):
-        end = branch.u[p + 1, k] if k < n else branch.omega[p + 1]
-        work.guess[k] = end + step * work.before[k] * work.scale[k]
+    for k in range(work.w.shape[0]):
+        work.guess[k] = work.here[k] + step * work.before[k] * work.scale[k]
         work.border[k] = work.b[k] / chord
-    bend(work, branch, p + 1, step, chord)
-    for k in range(n + 1):
+    bend(work, step, chord)
+    for k in range(work.w.shape[0]):
         work.before[k] = work.border[k]
     code, _ = correct(problem, scratch, work, SHARP)
     if code != status.OK:
         return code
     new_tangent(work)
-    return residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
+    return residual(problem, scratch, work.w, float(work.w[work.r.shape[0]]), work.r, work.J)
 
 
 @kernel
@@ -95,7 +89,7 @@ def height_between(
         if test == FOLD:
             return status.OK, float(branch.tangent[end, work.r.shape[0]]) / course.omega_step
         return status.OK, float(branch.depth[end, test // 2, test % 2])
-    code = correct_between(problem, scratch, work, branch, p, share, course)
+    code = correct_between(problem, scratch, work, share, course)
     if code != status.OK:
         return code, math.nan
     return code, height_of(problem, scratch, work, test)
@@ -168,8 +162,14 @@ def follow(
     """
     if p == TRACE_ALL:
         code, points = trace(problem, scratch, work, branch, u, omega, course)
+        set_section(problem, scratch, 0.0)
         return code, points, 0.0
-    if low == high:
-        return correct_between(problem, scratch, work, branch, p, low, course), p, low
-    code, share = zero_between(problem, scratch, work, branch, p, low, high, test, course)
+    code, share = load(problem, scratch, work, branch, p + 1, course), low
+    if code == status.OK and low == high:
+        code = correct_between(problem, scratch, work, low, course)
+    elif code == status.OK:
+        code, share = zero_between(problem, scratch, work, branch, p, low, high, test, course)
+    if code == status.OK:
+        code = bring_home(problem, scratch, work)
+    set_section(problem, scratch, 0.0)
     return code, p, share

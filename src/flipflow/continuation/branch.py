@@ -95,7 +95,8 @@ class Branch(Frozen):
     formulation, traced
         What was solved, and the points.
     return_maps
-        Linearised return maps over a turn, or over half a turn with sign, (n, 2 N, 2 N).
+        Linearised return maps over a turn, or over half a turn with sign, (n, 2 N, 2 N), each from
+        the phase of the force at which the point was solved for.
     saddle_side_at_start
         Whether an odd number of real multipliers lies beyond +1 where the branch rises.
     multipliers
@@ -207,7 +208,9 @@ class Branch(Frozen):
         n = self.omega.size
         i = checked_index("i", i, n, f"the branch has points 0 to {n - 1}", least=-n)
         u, omega = self.traced.u[i].copy(), float(self.omega[i])
-        point = Point(self.formulation, u, omega, known_map=self.return_maps[i])
+        at_home = self.traced.record.phase[i] == 0.0
+        known = self.return_maps[i] if at_home else None
+        point = Point(self.formulation, u, omega, known_map=known)
         return Orbit(self.machine, point, str(self.stability[i]))
 
     def orbits_at(self, omega: float) -> tuple[Orbit, ...]:

@@ -15,7 +15,15 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
-from flipflow.continuation.problem import depths, residual, signature, unknown_scale
+from flipflow.continuation.problem import (
+    better_section,
+    carried,
+    depths,
+    residual,
+    set_section,
+    signature,
+    unknown_scale,
+)
 
 # Lengths are measured in steps, as the unknowns are.
 NEWTON_MOST = 8  # iterations after which a correction has failed
@@ -45,10 +53,11 @@ REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_ST
 class Record(NamedTuple):
     """Record of up to P points with n unknowns each."""
 
-    u: Real  # (P, n)
+    u: Real  # (P, n) at section 0
     omega: Real  # (P,)
-    tangent: Real  # (P, n + 1) unit in scaled unknowns, stored unscaled
-    jacobian: Real  # (P, n, n) dr/du, or (P, 0, 0) where nothing is read off it
+    tangent: Real  # (P, n + 1) there; a unit in the unknowns scaled at the point's own section
+    phase: Real  # (P,) section at which the point was solved for
+    jacobian: Real  # (P, n, n) dr/du there, or (P, 0, 0) where nothing is read off it
     side: Real  # (P,) sign of det [J; tangent]
     signature: Int  # (P,)
     depth: Real  # (P, m, 2) greatest depth in m beyond each gap, plus and minus side
@@ -69,8 +78,15 @@ class Course(NamedTuple):
 
 
 class Corrector(NamedTuple):
-    """Scratch of the bordered Newton solves."""
+    """Scratch of the bordered Newton solves, and the last two points, all at one section."""
 
+    here: Real  # (n + 1,) the last point, w = (u, omega)
+    here_tangent: Real  # (n + 1,) not scaled
+    behind: Real  # (n + 1,) the point before
+    behind_tangent: Real  # (n + 1,)
+    home: Real  # (n + 1,) a point at section 0
+    home_tangent: Real  # (n + 1,)
+    phase: Real  # (1,) the section
     w: Real  # (n + 1,)
     guess: Real  # (n + 1,)
     border: Real  # (n + 1,) normal of the plane to solve in
@@ -175,92 +191,140 @@ def new_tangent(work: Corrector) -> float:
 
 
 @kernel
-def store(problem: Any, scratch: Any, work: Corrector, branch: Record, p: int) -> None:
+def store(problem: Any, scratch: Any, work: Corrector, branch: Record, p: int) -> int:
     """Write point p of the branch from the corrector's scratch."""
     n = work.r.shape[0]
-    for i in range(n):
-        branch.u[p, i] = work.w[i]
-    for i in range(branch.jacobian.shape[1]):
-        for j in range(n):
-            branch.jacobian[p, i, j] = work.J[i, j]
-    branch.omega[p] = work.w[n]
-    for k in range(n + 1):
-        branch.tangent[p, k] = work.tangent[k] * work.scale[k]
     branch.signature[p] = signature(problem, scratch)
     branch.side[p] = work.side[0]
     depths(problem, scratch, float(work.w[n]), branch.depth[p])
+    branch.phase[p] = work.phase[0]
+    for i in range(branch.jacobian.shape[1]):
+        for j in range(n):
+            branch.jacobian[p, i, j] = work.J[i, j]
+    code = bring_home(problem, scratch, work)
+    for i in range(n):
+        branch.u[p, i] = work.home[i]
+    branch.omega[p] = work.w[n]
+    for k in range(n + 1):
+        branch.tangent[p, k] = work.home_tangent[k]
+    return code
 
 
 @kernel
-def recall(problem: Any, work: Corrector, branch: Record, p: int, course: Course) -> None:
-    """Scale of point p, and its unit tangent in scaled unknowns into work.before."""
+def bring_home(problem: Any, scratch: Any, work: Corrector) -> int:
+    """The point in work and its tangent as they are at section 0."""
+    for k in range(work.w.shape[0]):
+        work.home[k] = work.w[k]
+        work.home_tangent[k] = work.tangent[k] * work.scale[k]
+    return carried(problem, scratch, work.home, work.home_tangent, 0.0)
+
+
+@kernel
+def move_section(problem: Any, scratch: Any, work: Corrector, phase: float) -> int:
+    """Carry the last two points to another section."""
+    code = carried(problem, scratch, work.here, work.here_tangent, phase)
+    if code == status.OK:
+        code = carried(problem, scratch, work.behind, work.behind_tangent, phase)
+    set_section(problem, scratch, phase)
+    work.phase[0] = phase
+    return code
+
+
+@kernel
+def load(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, course: Course
+) -> int:
+    """Take points p and p - 1 of a record, at a section that is good for the former."""
     n = work.r.shape[0]
     for k in range(n):
-        work.guess[k] = branch.u[p, k]
-    set_scale(problem, work, work.guess, branch.omega[p], course)
+        work.here[k], work.behind[k] = branch.u[p, k], branch.u[p - 1, k]
+    work.here[n], work.behind[n] = branch.omega[p], branch.omega[p - 1]
+    for k in range(n + 1):
+        work.here_tangent[k] = branch.tangent[p, k]
+        work.behind_tangent[k] = branch.tangent[p - 1, k]
+    code = choose_section(problem, scratch, work)
+    recall(problem, work, course)
+    return code
+
+
+@kernel
+def choose_section(problem: Any, scratch: Any, work: Corrector) -> int:
+    """Take the two points in work, which stand at section 0, to a section that is good there."""
+    work.phase[0] = 0.0
+    set_section(problem, scratch, 0.0)
+    omega = float(work.here[work.r.shape[0]])
+    code = residual(problem, scratch, work.here, omega, work.r, work.J)
+    if code != status.OK:
+        return code
+    return move_section(problem, scratch, work, better_section(problem, scratch, omega, True))
+
+
+@kernel
+def recall(problem: Any, work: Corrector, course: Course) -> None:
+    """Scale of the last point, and its unit tangent in scaled unknowns into work.before."""
+    n = work.r.shape[0]
+    set_scale(problem, work, work.here, float(work.here[n]), course)
     norm = 0.0
     for k in range(n + 1):
-        work.before[k] = branch.tangent[p, k] / work.scale[k]
+        work.before[k] = work.here_tangent[k] / work.scale[k]
         norm += work.before[k] ** 2
     for k in range(n + 1):
         work.before[k] /= math.sqrt(norm)
 
 
 @kernel
-def predict(work: Corrector, branch: Record, p: int, step: float, course: Course) -> bool:
-    """Guess a step along the branch from point p; True when it ends on a bound of omega.
+def predict(work: Corrector, step: float, course: Course, bends: bool) -> bool:
+    """Guess a step along the branch from the last point; True when it ends on a bound of omega.
 
-    A guess beyond the bound is drawn back along the tangent and corrected at that omega.
+    A guess beyond the bound is drawn back along the tangent and corrected at that omega. Where
+    ``bends`` the guess lies on the cubic through the last two points, if these are not too near.
     """
     n = work.r.shape[0]
-    omega = branch.omega[p] + step * work.before[n] * work.scale[n]
+    omega = work.here[n] + step * work.before[n] * work.scale[n]
     share = 1.0
     ends = omega > course.upper or omega < course.lower
     if ends:
         bound = course.upper if omega > course.upper else course.lower
-        share = (bound - branch.omega[p]) / (omega - branch.omega[p])
+        share = (bound - work.here[n]) / (omega - work.here[n])
         omega = bound
     for k in range(n):
-        work.guess[k] = branch.u[p, k] + share * step * work.before[k] * work.scale[k]
+        work.guess[k] = work.here[k] + share * step * work.before[k] * work.scale[k]
         work.border[k] = 0.0 if ends else work.before[k]
     work.guess[n] = omega
     work.border[n] = 1.0 if ends else work.before[n]
-    if not ends and p > 0 and branch.signature[p] == branch.signature[p - 1]:
-        chord = chord_to(work, branch, p)
+    if not ends and bends:
+        chord = chord_behind(work)
         if step < FAR * chord:
-            bend(work, branch, p, step, chord)
-    return ends
+            bend(work, step, chord)
+    return bool(ends)
 
 
 @kernel
-def chord_to(work: Corrector, branch: Record, p: int) -> float:
-    """The way from point p - 1 to point p, in steps, into work.b; its length."""
-    n = work.r.shape[0]
+def chord_behind(work: Corrector) -> float:
+    """The way between the last two points, in steps, into work.b; its length."""
     square = 0.0
-    for k in range(n + 1):
-        here = branch.u[p, k] if k < n else branch.omega[p]
-        before = branch.u[p - 1, k] if k < n else branch.omega[p - 1]
-        work.b[k] = (here - before) / work.scale[k]
+    for k in range(work.b.shape[0]):
+        work.b[k] = (work.here[k] - work.behind[k]) / work.scale[k]
         square += work.b[k] ** 2
     return math.sqrt(square)
 
 
 @kernel
-def bend(work: Corrector, branch: Record, p: int, step: float, chord: float) -> None:
-    """Turn the guess on the tangent of point p into one on the cubic through p - 1 and p.
+def bend(work: Corrector, step: float, chord: float) -> None:
+    """Turn the guess on the tangent of the last point into one on the cubic through the last two.
 
-    With h the chord, which ``chord_to`` left in work.b, d its direction, t and t' the tangents at
-    p and p - 1, and r = step / h, the guess moves by
+    With h the chord, which ``chord_behind`` left in work.b, d its direction, t and t' the tangents
+    at the last point and the one before, and r = step / h, the guess moves by
     step (r (2 t - 3 d + t') + r^2 (t - 2 d + t')).
     """
     norm = 0.0
     for k in range(work.b.shape[0]):
-        norm += (branch.tangent[p - 1, k] / work.scale[k]) ** 2
+        norm += (work.behind_tangent[k] / work.scale[k]) ** 2
     norm = math.sqrt(norm)
     ratio = step / chord
     for k in range(work.b.shape[0]):
         d = work.b[k] / chord
-        behind = branch.tangent[p - 1, k] / (work.scale[k] * norm)
+        behind = work.behind_tangent[k] / (work.scale[k] * norm)
         second = 2.0 * work.before[k] - 3.0 * d + behind
         third = work.before[k] - 2.0 * d + behind
         work.guess[k] += step * work.scale[k] * ratio * (second + ratio * third)
@@ -310,12 +374,12 @@ def judge(
 
 
 @kernel
-def from_start(work: Corrector, branch: Record) -> float:
-    """Distance of the corrected point from the first one, in steps."""
+def from_start(work: Corrector, branch: Record, p: int) -> float:
+    """Distance of point p from the first one, in steps."""
     n = work.r.shape[0]
-    square = ((work.w[n] - branch.omega[0]) / work.scale[n]) ** 2
+    square = ((branch.omega[p] - branch.omega[0]) / work.scale[n]) ** 2
     for k in range(n):
-        square += ((work.w[k] - branch.u[0, k]) / work.scale[k]) ** 2
+        square += ((branch.u[p, k] - branch.u[0, k]) / work.scale[k]) ** 2
     return math.sqrt(square)
 
 
@@ -327,6 +391,47 @@ def arrival(branch: Record, course: Course, p: int, ends: bool, back: bool) -> i
     if not ends:
         return status.OK
     return status.REACHED_UPPER if branch.omega[p] == course.upper else status.REACHED_LOWER
+
+
+@kernel
+def begin(
+    problem: Any, scratch: Any, work: Corrector, u: Real, omega: float, course: Course
+) -> int:
+    """Correct the first point from (u, omega) at fixed omega."""
+    n = work.r.shape[0]
+    for k in range(n):
+        work.here[k] = work.behind[k] = u[k]
+    work.here[n] = work.behind[n] = omega
+    for k in range(n + 1):
+        work.here_tangent[k] = work.behind_tangent[k] = 0.0
+    code = choose_section(problem, scratch, work)
+    if code != status.OK:
+        return code
+    for k in range(n + 1):
+        work.guess[k] = work.here[k]
+        work.border[k] = work.before[k] = 0.0
+    work.border[n] = 1.0
+    work.before[n] = course.direction
+    set_scale(problem, work, work.guess, omega, course)
+    code, _ = correct(problem, scratch, work, course.tolerance)
+    return code
+
+
+@kernel
+def advance(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, course: Course
+) -> int:
+    """Accept the corrected point as point p; the section moves where contacts change near it."""
+    omega = float(work.w[work.r.shape[0]])
+    phase = better_section(problem, scratch, omega, False)
+    code = store(problem, scratch, work, branch, p)
+    for k in range(work.w.shape[0]):
+        work.behind[k], work.behind_tangent[k] = work.here[k], work.here_tangent[k]
+        work.here[k], work.here_tangent[k] = work.w[k], work.tangent[k] * work.scale[k]
+    if code == status.OK and phase != work.phase[0]:
+        code = move_section(problem, scratch, work, phase)
+    recall(problem, work, course)
+    return code
 
 
 @kernel
@@ -343,25 +448,20 @@ def trace(
     there.
     """
     n = work.r.shape[0]
-    for k in range(n):
-        work.guess[k] = u[k]
-        work.border[k] = 0.0
-        work.before[k] = 0.0
-    work.guess[n] = omega
-    work.border[n] = 1.0
-    work.before[n] = course.direction
-    set_scale(problem, work, work.guess, omega, course)
-    p, step, length, travelled = 0, 0.0, 0.1, 0.0
+    p, step, length, travelled, iterations = 0, 0.0, 0.1, 0.0, 0
     ends = False
     while p < branch.omega.shape[0]:
-        if p > 0:
+        if p == 0:
+            code = begin(problem, scratch, work, u, omega, course)
+            if code != status.OK:
+                return code, p
+        else:
             step = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
-            ends = predict(work, branch, p - 1, step, course)
-        # A correction as long as the step itself would not tell one strand from the next.
-        tolerance = course.tolerance if p == 0 else min(course.tolerance, TOLERATED * step)
-        code, iterations = correct(problem, scratch, work, tolerance)
-        if p == 0 and code != status.OK:
-            return code, p
+            same = p > 1 and branch.signature[p - 1] == branch.signature[p - 2]
+            ends = predict(work, step, course, same)
+            # A correction as long as the step itself would not tell one strand from the next.
+            tolerance = min(course.tolerance, TOLERATED * step)
+            code, iterations = correct(problem, scratch, work, tolerance)
         reason = judge(
             problem, scratch, work, branch, max(p - 1, 0), step, code, iterations, course
         )
@@ -372,9 +472,11 @@ def trace(
             if length < SHORTEST:
                 return status.STEP_TOO_SMALL, p
             continue
-        store(problem, scratch, work, branch, p)
         branch.iterations[p] = iterations
-        distance = from_start(work, branch)
+        code = advance(problem, scratch, work, branch, p, course)
+        if code != status.OK:
+            return code, p
+        distance = from_start(work, branch, p)
         travelled = max(travelled, distance)
         # Beside a fold the other strand also passes the first point, but with omega the other way.
         same_way = branch.tangent[p, n] * branch.tangent[0, n] > 0.0
@@ -386,7 +488,6 @@ def trace(
             length = min(step * GROW, LONGEST)
         elif p > 0 and iterations >= NEWTON_MANY:
             length = step * SHRINK
-        recall(problem, work, branch, p, course)
         p += 1
     return status.POINT_LIMIT, p
 
@@ -395,6 +496,13 @@ def new_corrector(unknowns: int, gaps: int) -> Corrector:
     """Scratch of the bordered Newton solves."""
     n = unknowns
     return Corrector(
+        here=np.zeros(n + 1),
+        here_tangent=np.zeros(n + 1),
+        behind=np.zeros(n + 1),
+        behind_tangent=np.zeros(n + 1),
+        home=np.zeros(n + 1),
+        home_tangent=np.zeros(n + 1),
+        phase=np.zeros(1),
         w=np.zeros(n + 1),
         guess=np.zeros(n + 1),
         border=np.zeros(n + 1),
@@ -418,6 +526,7 @@ def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = T
         u=np.empty((points, n)),
         omega=np.empty(points),
         tangent=np.empty((points, n + 1)),
+        phase=np.zeros(points),
         jacobian=np.empty((points, n, n) if with_jacobian else (points, 0, 0)),
         side=np.empty(points),
         signature=np.empty(points, np.int64),

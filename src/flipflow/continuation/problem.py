@@ -10,8 +10,10 @@ from typing import Any
 
 from numba.core.types import NamedTuple as NamedTupleType
 
+from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
-from flipflow.compiled.compile import chosen_by_type
+from flipflow.compiled.compile import chosen_by_type, kernel
+from flipflow.periodic import section
 from flipflow.periodic.balance import balance_residual, series_scale
 from flipflow.periodic.sampled import (
     Sampled,
@@ -43,6 +45,34 @@ _DEPTHS: dict[type, Any] = {
 _SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale, Sampled: sampled_scale}
 
 
+@kernel
+def _no_better(problem: Any, scratch: Any, omega: float, anew: bool) -> float:
+    return 0.0
+
+
+@kernel
+def _stays(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> int:
+    return status.OK
+
+
+@kernel
+def _no_section(problem: Any, scratch: Any, phase: float) -> None:
+    """A series has none."""
+
+
+_BETTER: dict[type, Any] = {
+    Shooting: section.better_section,
+    Balance: _no_better,
+    Sampled: _no_better,
+}
+_CARRIED: dict[type, Any] = {Shooting: section.carried, Balance: _stays, Sampled: _stays}
+_SET: dict[type, Any] = {
+    Shooting: section.set_section,
+    Balance: _no_section,
+    Sampled: _no_section,
+}
+
+
 def residual(problem: Any, scratch: Any, u: Real, omega: float, r: Real, J: Real) -> int:
     """Write the residual r(u, omega) and J = [dr/du, dr/d omega]; return a status."""
     return int(_RESIDUAL[type(problem)](problem, scratch, u, omega, r, J))
@@ -61,6 +91,21 @@ def depths(problem: Any, scratch: Any, omega: float, depth: Real) -> None:
 def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
     """Write the size of each unknown."""
     _SCALE[type(problem)](problem, u, omega, scale)
+
+
+def better_section(problem: Any, scratch: Any, omega: float, anew: bool) -> float:
+    """Phase to which the section had better move for the motion of the last residual."""
+    return float(_BETTER[type(problem)](problem, scratch, omega, anew))
+
+
+def carried(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> int:
+    """Carry unknowns w = (u, omega) and a tangent dw from the section to another; a status."""
+    return int(_CARRIED[type(problem)](problem, scratch, w, tangent, end))
+
+
+def set_section(problem: Any, scratch: Any, phase: float) -> None:
+    """Let the unknowns stand at a phase of the force."""
+    _SET[type(problem)](problem, scratch, phase)
 
 
 def _kind(problem: Any) -> Any:
@@ -103,5 +148,35 @@ def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
 
     def run(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
         return chosen(problem, u, omega, scale)
+
+    return run
+
+
+@chosen_by_type(better_section)
+def _better_section(problem: Any, scratch: Any, omega: Any, anew: Any) -> Any:
+    chosen = _BETTER[_kind(problem)]
+
+    def run(problem: Any, scratch: Any, omega: Any, anew: Any) -> Any:
+        return chosen(problem, scratch, omega, anew)
+
+    return run
+
+
+@chosen_by_type(carried)
+def _carried(problem: Any, scratch: Any, w: Any, tangent: Any, end: Any) -> Any:
+    chosen = _CARRIED[_kind(problem)]
+
+    def run(problem: Any, scratch: Any, w: Any, tangent: Any, end: Any) -> Any:
+        return chosen(problem, scratch, w, tangent, end)
+
+    return run
+
+
+@chosen_by_type(set_section)
+def _set_section(problem: Any, scratch: Any, phase: Any) -> Any:
+    chosen = _SET[_kind(problem)]
+
+    def run(problem: Any, scratch: Any, phase: Any) -> Any:
+        return chosen(problem, scratch, phase)
 
     return run

@@ -286,34 +286,35 @@ def contact_number(flow: Flow, sided: bool) -> int:
 
 
 @kernel(shared=True)
-def carry_tangent(machine: MachineArrays, flow: Flow, omega: float, U: Real, work: Complex) -> None:
-    """Carry columns of U, (2 N, 2 N) or (2 N, 2 N + 1), over the recorded flow.
+def carry_tangent(
+    machine: MachineArrays, flow: Flow, omega: float, U: Real, slope: float, work: Complex
+) -> None:
+    """Carry columns of U, (2 N, columns), over the recorded flow, as tangents of the state.
 
-    The first 2 N columns are the tangent of the state. One more is dz/d omega at fixed time: it
-    follows the same linear equation around the derivative of the driven motion,
-    Re((drive' + i t drive) exp(i omega t)). ``work`` is (R, columns).
+    The last column moves with omega as well, d omega = ``slope``, at fixed time: it follows the
+    same linear equation around the derivative of the driven motion,
+    slope Re((drive' + i t drive) exp(i omega t)). ``work`` is (R, columns).
     """
     size = U.shape[0]
-    driven = U.shape[1] > size
     for e in range(flow.segments[0]):
         slot = flow.slot[e]
         length = flow.length[e]
-        if driven:
-            _add_driven_slope(flow, slot, omega, flow.start[e], -1.0, U)
+        if slope != 0.0:
+            _add_driven_slope(flow, slot, omega, flow.start[e], -slope, U)
         _carry_free(flow, slot, length, U, work)
-        if driven:
-            _add_driven_slope(flow, slot, omega, flow.start[e] + length, 1.0, U)
+        if slope != 0.0:
+            _add_driven_slope(flow, slot, omega, flow.start[e] + length, slope, U)
         if flow.kick[e] != 0.0:
             saltation(machine, flow.spring[e], flow.kick[e], U, size)
 
 
 @kernel(inline=True)
-def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, sign: float, U: Real) -> None:
+def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, share: float, U: Real) -> None:
     turn = exponential(1j * (omega * t))
     last = U.shape[1] - 1
     for k in range(U.shape[0]):
         slope = (flow.drive_slope[slot, k] + 1j * t * flow.drive[slot, k]) * turn
-        U[k, last] += sign * slope.real
+        U[k, last] += share * slope.real
 
 
 @kernel(inline=True)

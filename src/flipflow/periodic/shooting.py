@@ -2,6 +2,11 @@
 
 ``fraction`` 1 and ``sign`` +1 is one forcing period, ``fraction`` n is n of them; a motion that is
 its own mirror image after n / 2 of them, n odd, has ``fraction`` n / 2 and ``sign`` -1.
+
+The unknown is the state at one phase of the force, the section. Where the force of a stop jumps,
+the state at a fixed phase has a kink along a branch when the jump passes that phase. While a branch
+is followed the section therefore moves to where the state is farthest from any change of contact;
+everywhere else it is phase 0.
 """
 
 from __future__ import annotations
@@ -22,6 +27,7 @@ from flipflow.dynamics.flow import (
     new_flow,
     run_flow,
     segment_motion,
+    segment_state,
 )
 from flipflow.dynamics.machine import MachineArrays
 
@@ -42,7 +48,11 @@ class ShootingWork(NamedTuple):
     tangent: Real  # (2 N, 2 N + 1) with the derivative in omega
     map: Real  # (2 N, 2 N) without it
     columns: Complex  # (R, 2 N + 1)
-    rate: Real  # (2 N,)
+    rate: Real  # (2 N,) at the end of the flow
+    start: Real  # (2 N,) state at its start
+    first_rate: Real  # (2 N,) and its rate
+    column: Real  # (2 N, 1) one tangent
+    section: Real  # (2,) phase in rad at which the unknown stands; its margin when it was chosen
 
 
 def new_shooting(
@@ -62,6 +72,10 @@ def new_shooting_work(machine: MachineArrays) -> ShootingWork:
         map=np.zeros((size, size)),
         columns=np.zeros((size, size + 1), np.complex128),
         rate=np.zeros(size),
+        start=np.zeros(size),
+        first_rate=np.zeros(size),
+        column=np.zeros((size, 1)),
+        section=np.array([0.0, math.inf]),
     )
 
 
@@ -76,10 +90,11 @@ def shoot(problem: Shooting, work: ShootingWork, z: Real, omega: float, U: Real)
         flow.z[k] = z[k]
         for c in range(U.shape[1]):
             U[k, c] = 1.0 if k == c else 0.0
-    duration = problem.fraction * 2.0 * math.pi / omega
-    code = run_flow(problem.machine, flow, omega, 0.0, duration, work.rate)
+    begin, duration = work.section[0] / omega, problem.fraction * 2.0 * math.pi / omega
+    code = run_flow(problem.machine, flow, omega, begin, duration, work.rate)
     if code == status.OK:
-        carry_tangent(problem.machine, flow, omega, U, work.columns)
+        slope = 1.0 if U.shape[1] > U.shape[0] else 0.0
+        carry_tangent(problem.machine, flow, omega, U, slope, work.columns)
         for k in range(U.shape[0]):
             if not math.isfinite(flow.z[k]):
                 return status.NOT_FINITE
@@ -96,14 +111,21 @@ def shooting_residual(
     code = shoot(problem, work, z, omega, U)
     if code != status.OK:
         return code
+    # The last column is taken at fixed times; both ends of the flow move with omega as well.
+    begin = work.section[0] / omega
+    end = begin + problem.fraction * 2.0 * math.pi / omega
+    if begin != 0.0:
+        segment_state(work.flow, 0, omega, 0.0, work.start, work.first_rate)
     for k in range(size):
+        slope = U[k, size] - work.rate[k] * end / omega
+        if begin != 0.0:
+            for c in range(size):
+                slope += U[k, c] * work.first_rate[c] * begin / omega
         r[k] = problem.sign * work.flow.z[k] - z[k]
         for c in range(size):
             J[k, c] = problem.sign * U[k, c]
         J[k, k] -= 1.0
-        # The last column is taken at fixed time; the end of the flow moves with omega as well.
-        end = problem.fraction * 2.0 * math.pi / omega
-        J[k, size] = problem.sign * (U[k, size] - work.rate[k] * end / omega)
+        J[k, size] = problem.sign * slope
     return status.OK
 
 

@@ -103,7 +103,7 @@ class Traced:
         )
         joined = {
             name: np.concatenate([getattr(self.record, name)[turned], getattr(ahead.record, name)])
-            for name in ("u", "omega", "jacobian", "signature", "depth", "iterations")
+            for name in ("u", "omega", "phase", "jacobian", "signature", "depth", "iterations")
         }
         opposite = {
             name: np.concatenate([-getattr(self.record, name)[turned], getattr(ahead.record, name)])
@@ -301,13 +301,15 @@ class Solver(ABC):
             raise IncompleteError(
                 f"no point found between two of the branch near {omega:.6g} rad/s"
             )
-        w, tangent = self.corrector.w, float(self.corrector.tangent[-1])
-        return share, self._point(w[:-1].copy(), float(w[-1]), tangent, self.corrector.J[:, :-1])
+        w, tangent = self.corrector.home, float(self.corrector.tangent[-1])
+        at_home = self.corrector.phase[0] == 0.0
+        J = self.corrector.J[:, :-1] if at_home else None
+        return share, self._point(w[:-1].copy(), float(w[-1]), tangent, J)
 
-    def _point(self, u: Real, omega: float, omega_tangent: float, jacobian: Real) -> Point:
+    def _point(self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None) -> Point:
         """A corrected point; where a Jacobian tells the return map, with it."""
         known = None
-        if self.reads_jacobian:
+        if self.reads_jacobian and jacobian is not None:
             known = self.return_maps(u[None], np.array([omega]), jacobian[None])[0]
         return Point(self.formulation, u, omega, omega_tangent, known)
 
@@ -339,7 +341,8 @@ class Solver(ABC):
         _, points, _ = self._follow(record, u, omega, course)
         if points == 0:
             return None
-        return self._point(record.u[0], omega, float(record.tangent[0, -1]), record.jacobian[0])
+        J = record.jacobian[0] if record.phase[0] == 0.0 else None
+        return self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
 
     def errors(self, u: Real, omega: Real) -> Real:
         """Distance in m of each motion from the exact one; infinite where it is not bounded.

@@ -1,0 +1,129 @@
+"""The section of shooting: the phase of the force at which a motion's state is the unknown.
+
+A section is as good as the state there is far from every surface at which a stop changes its
+regime: from an edge of contact, from the gap that a motion is about to graze, from the release of
+a law that lets go before the gap.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.flow import Flow, carry_tangent, run_flow, segment_state
+from flipflow.dynamics.law import exit_of, signed_gap
+from flipflow.dynamics.machine import MachineArrays
+from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
+from flipflow.periodic.shooting import Shooting, ShootingWork
+
+CANDIDATES = 60  # phases a turn that are tried
+NEAR = 0.15  # margin below which a better section is looked for, as a share of the motion
+WORN = 0.6  # share of the margin at the last choice below which it is looked for again
+BETTER = 1.5  # a section this many times better is moved to
+
+
+@kernel
+def margin(machine: MachineArrays, flow: Flow, e: int, z: Real, omega: float) -> float:
+    """Least distance of a state from a change of contact, as a share of the motion's size."""
+    n = machine.direction.shape[1]
+    size = 0.0
+    for k in range(n):
+        size = max(size, math.hypot(z[k], z[n + k] / omega))
+    least = math.inf
+    for j in range(machine.direction.shape[0]):
+        y, v, reach = 0.0, 0.0, 0.0
+        for k in range(n):
+            y += machine.direction[j, k] * z[k]
+            v += machine.direction[j, k] * z[n + k]
+            reach += abs(machine.direction[j, k])
+        away = _distance(machine, j, flow.regimes[e, j], y, v)
+        least = min(least, away / (reach * size))
+    return least
+
+
+@kernel
+def _distance(machine: MachineArrays, j: int, regime: int, y: float, v: float) -> float:
+    """Distance in m of spring j from its next change, had all of it to be covered by the gap."""
+    stops = machine.stops
+    if regime == OPEN:
+        return min(abs(stops.gap[j, 0] - y), abs(stops.gap[j, 1] + y))
+    side = 1.0 if regime > OPEN else -1.0
+    depth, rate = side * (y - signed_gap(stops, j, regime)), side * v
+    least = abs(depth)
+    for e in range(MOST_EXITS):
+        alpha, beta, target = exit_of(stops, j, regime, e)
+        if target != NO_EXIT and alpha != 0.0:
+            least = min(least, abs(depth + beta / alpha * rate))
+    return least
+
+
+@kernel
+def better_section(problem: Shooting, work: ShootingWork, omega: float, anew: bool) -> float:
+    """Where the section had better stand for the motion last flown: mostly where it stands.
+
+    ``anew``: look for it even where the state is not near a change of contact.
+    """
+    flow, machine, stands = work.flow, problem.machine, float(work.section[0])
+    if machine.direction.shape[0] == 0:
+        return stands
+    segment_state(flow, 0, omega, 0.0, work.start, work.first_rate)
+    here = margin(machine, flow, 0, work.start, omega)
+    if here > min(NEAR, WORN * work.section[1]) and not anew:
+        return stands
+    angle = problem.fraction * 2.0 * math.pi
+    count = int(CANDIDATES * max(problem.fraction, 1.0))
+    best, chosen, e = here, 0.0, 0
+    for i in range(1, count):
+        t = flow.start[0] + i * angle / (count * omega)
+        while e < flow.segments[0] - 1 and flow.start[e + 1] < t:
+            e += 1
+        segment_state(flow, e, omega, t - flow.start[e], work.start, work.first_rate)
+        there = margin(machine, flow, e, work.start, omega)
+        if there > best:
+            best, chosen = there, i * angle / count
+    work.section[1] = best
+    if best < BETTER * here:
+        return stands
+    moved = stands + chosen
+    return moved - angle if moved >= angle else moved
+
+
+@kernel
+def carried(problem: Shooting, work: ShootingWork, w: Real, tangent: Real, end: float) -> int:
+    """Carry the unknowns w = (z, omega) of a motion and a tangent dw to another section.
+
+    It lies ahead in the same turn, or in the next, where the motion repeats with the problem's
+    sign.
+    """
+    size, sign, angle = work.rate.shape[0], 1.0, end - work.section[0]
+    if angle == 0.0:
+        return status.OK
+    if angle < 0.0:
+        sign, angle = problem.sign, angle + problem.fraction * 2.0 * math.pi
+    omega, slope, column, flow = float(w[size]), float(tangent[size]), work.column, work.flow
+    begin = work.section[0] / omega
+    for k in range(size):
+        flow.z[k] = w[k]
+    code = run_flow(problem.machine, flow, omega, begin, angle / omega, work.rate)
+    if code != status.OK:
+        return code
+    # The column is carried at fixed times; both ends of the flow move with omega as well.
+    segment_state(flow, 0, omega, 0.0, work.start, work.first_rate)
+    for k in range(size):
+        column[k, 0] = tangent[k] + work.first_rate[k] * slope * begin / omega
+    carry_tangent(problem.machine, flow, omega, column, slope, work.columns)
+    end = begin + angle / omega
+    for k in range(size):
+        w[k] = sign * flow.z[k]
+        tangent[k] = sign * (column[k, 0] - work.rate[k] * slope * end / omega)
+    return status.OK
+
+
+@kernel
+def set_section(problem: Shooting, work: ShootingWork, phase: float) -> None:  # noqa: ARG001
+    """Let the unknown be the state at a phase of the force."""
+    work.section[0] = phase
+    if phase == 0.0:
+        work.section[1] = math.inf
