@@ -46,6 +46,8 @@ BACK = 0.9  # share of a step within which it has then come back to that point
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
 STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
+CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
+ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of it at which it is sought
 # Why a step was refused, as a branch records it.
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
@@ -435,6 +437,70 @@ def advance(
 
 
 @kernel
+def turn_corner(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, step: float, course: Course
+) -> float:
+    """Go on from point p - 1 round a corner that a contact makes; the step, 0 where there is none.
+
+    Where a law pushes at once but lets go gently, the tangent jumps at grazing, and the branch may
+    turn back there. A little beyond, the other contacts tell the Jacobian of the other side; its
+    tangent is followed to where those contacts are. The point is left corrected in work.
+    """
+    before = branch.signature[p - 1]
+    contacts = look_ahead(problem, scratch, work, step, True)
+    if contacts < 0 or contacts == before or not bordered(work):
+        return 0.0
+    new_tangent(work)
+    for multiple in ROUND:
+        length = multiple * step
+        there = look_ahead(problem, scratch, work, length, False) == contacts
+        behind = look_ahead(problem, scratch, work, -length, False) == contacts
+        if there != behind:
+            return (
+                length
+                if step_round(
+                    problem, scratch, work, contacts, length if there else -length, course
+                )
+                else 0.0
+            )
+    return 0.0
+
+
+@kernel
+def look_ahead(problem: Any, scratch: Any, work: Corrector, step: float, along: bool) -> int:
+    """Contacts a step from the last point, along its tangent or along work.tangent; -1: none known.
+
+    The Jacobian there is left in work.J.
+    """
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        direction = work.before[k] if along else work.tangent[k]
+        work.guess[k] = work.here[k] + step * direction * work.scale[k]
+        work.border[k] = direction
+    code = residual(problem, scratch, work.guess, float(work.guess[n]), work.r, work.J)
+    return signature(problem, scratch) if code == status.OK else -1
+
+
+@kernel
+def step_round(
+    problem: Any, scratch: Any, work: Corrector, contacts: int, step: float, course: Course
+) -> bool:
+    """Correct a step along work.tangent; whether it has the contacts of the other side."""
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        work.guess[k] = work.here[k] + step * work.tangent[k] * work.scale[k]
+        work.border[k] = work.before[k] = math.copysign(1.0, step) * work.tangent[k]
+    code, _ = correct(problem, scratch, work, TOLERATED * abs(step))
+    if code != status.OK or signature(problem, scratch) != contacts:
+        return False
+    if not course.lower <= work.w[n] <= course.upper or astray(work) > abs(step):
+        return False
+    cosine = new_tangent(work)
+    work.side[0] = lu_sign(work.A, work.pivot)
+    return cosine > TURN_MOST
+
+
+@kernel
 def trace(
     problem: Any, scratch: Any, work: Corrector, branch: Record, u: Real, omega: float,
     course: Course,
@@ -468,10 +534,17 @@ def trace(
         if reason != REASON_NONE and p > 0:
             branch.reason[p] = reason
             branch.rejected[p] += 1
-            length = step * HALVE
-            if length < SHORTEST:
-                return status.STEP_TOO_SMALL, p
-            continue
+            rounded = 0.0
+            if step < CORNER_STEP:
+                recall(problem, work, course)
+                rounded = turn_corner(problem, scratch, work, branch, p, step, course)
+            if rounded == 0.0:
+                recall(problem, work, course)
+                length = step * HALVE
+                if length < SHORTEST:
+                    return status.STEP_TOO_SMALL, p
+                continue
+            step, ends, iterations = rounded, False, NEWTON_FEW
         branch.iterations[p] = iterations
         code = advance(problem, scratch, work, branch, p, course)
         if code != status.OK:
