@@ -48,6 +48,8 @@ STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of it at which it is sought
+EVEN = 1e-6  # difference of the depths on both sides that is none, in steps
+LEANING = 1e-2  # the same as a share of the step: from here on a motion leans
 # Why a step was refused, as a branch records it.
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
@@ -370,9 +372,63 @@ def judge(
         return REASON_TURN
     if work.side[0] != branch.side[p] and step > STRAND_STEP:
         return REASON_STRAND
-    if signature(problem, scratch) != branch.signature[p] and step > CONTACT_STEP:
+    contacts = signature(problem, scratch)
+    if contacts != branch.signature[p] and step > CONTACT_STEP:
         return REASON_CONTACT
+    depths(problem, scratch, float(work.w[n]), work.depth)
+    if step > 0.0 and begins_to_lean(work, branch, p, step):
+        return REASON_STRAND
+    if contacts != branch.signature[p] and step > 0.0:
+        orient(problem, scratch, work, contacts, step)
     return REASON_NONE
+
+
+@kernel
+def orient(problem: Any, scratch: Any, work: Corrector, contacts: int, step: float) -> None:
+    """Let the tangent of a point with new contacts lead to where these stay: not back to the corner.
+
+    At a corner where the branch turns back, both its sides may lie along one line.
+    """
+    n = work.r.shape[0]
+    for multiple in ROUND:
+        ahead = contacts_beside(problem, scratch, work, multiple * step) == contacts
+        behind = contacts_beside(problem, scratch, work, -multiple * step) == contacts
+        if ahead != behind:
+            if behind:
+                work.side[0] = -work.side[0]
+                for k in range(n + 1):
+                    work.tangent[k] = -work.tangent[k]
+            break
+    residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
+
+
+@kernel
+def contacts_beside(problem: Any, scratch: Any, work: Corrector, step: float) -> int:
+    """Contacts a step along work.tangent from the corrected point; -1: none known."""
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        work.b[k] = work.w[k] + step * work.tangent[k] * work.scale[k]
+    code = residual(problem, scratch, work.b, float(work.b[n]), work.r, work.J)
+    return signature(problem, scratch) if code == status.OK else -1
+
+
+@kernel
+def begins_to_lean(work: Corrector, branch: Record, p: int, step: float) -> bool:
+    """Whether a motion that met its stops evenly on both sides now leans on one, for no reason.
+
+    Where both sides begin to graze at once leaning motions branch off; the even one goes on. Once
+    a stop is met on one side only, or not evenly, there is a reason.
+    """
+    leans = False
+    for j in range(work.depth.shape[0]):
+        evenly = abs(branch.depth[p, j, 0] - branch.depth[p, j, 1])
+        size = work.depth[j, 0] - work.depth[j, 1]
+        largest = max(work.depth[j, 0], work.depth[j, 1])
+        if evenly < EVEN * work.scale[0]:
+            leans = leans or (largest > 0.0 and abs(size) > LEANING * step * work.scale[0])
+        elif largest > 0.0:
+            return False
+    return leans
 
 
 @kernel
@@ -451,16 +507,18 @@ def turn_corner(
     if contacts < 0 or contacts == before or not bordered(work):
         return 0.0
     new_tangent(work)
+    came_from_there = p > 1 and branch.signature[p - 2] == contacts
     for multiple in ROUND:
         length = multiple * step
-        there = look_ahead(problem, scratch, work, length, False) == contacts
+        ahead = look_ahead(problem, scratch, work, length, False) == contacts
         behind = look_ahead(problem, scratch, work, -length, False) == contacts
-        if there != behind:
+        if ahead != behind:
+            if behind and came_from_there:
+                return 0.0
+            way = length if ahead else -length
             return (
                 length
-                if step_round(
-                    problem, scratch, work, contacts, length if there else -length, course
-                )
+                if step_round(problem, scratch, work, branch, p, contacts, way, course)
                 else 0.0
             )
     return 0.0
@@ -483,7 +541,14 @@ def look_ahead(problem: Any, scratch: Any, work: Corrector, step: float, along: 
 
 @kernel
 def step_round(
-    problem: Any, scratch: Any, work: Corrector, contacts: int, step: float, course: Course
+    problem: Any,
+    scratch: Any,
+    work: Corrector,
+    branch: Record,
+    p: int,
+    contacts: int,
+    step: float,
+    course: Course,
 ) -> bool:
     """Correct a step along work.tangent; whether it has the contacts of the other side."""
     n = work.r.shape[0]
@@ -494,6 +559,9 @@ def step_round(
     if code != status.OK or signature(problem, scratch) != contacts:
         return False
     if not course.lower <= work.w[n] <= course.upper or astray(work) > abs(step):
+        return False
+    depths(problem, scratch, float(work.w[n]), work.depth)
+    if begins_to_lean(work, branch, p - 1, abs(step)):
         return False
     cosine = new_tangent(work)
     work.side[0] = lu_sign(work.A, work.pivot)
