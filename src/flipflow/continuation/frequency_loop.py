@@ -378,7 +378,7 @@ def judge(
     depths(problem, scratch, float(work.w[n]), work.depth)
     if step > 0.0 and begins_to_lean(work, branch, p, step):
         return REASON_STRAND
-    if contacts != branch.signature[p] and step > 0.0:
+    if contacts != branch.signature[p] and work.side[0] != branch.side[p] and step > 0.0:
         orient(problem, scratch, work, contacts, step)
     return REASON_NONE
 
