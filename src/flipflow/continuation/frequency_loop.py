@@ -19,6 +19,7 @@ from flipflow.continuation.problem import (
     better_section,
     carried,
     depths,
+    mirrored,
     residual,
     set_section,
     signature,
@@ -499,28 +500,42 @@ def turn_corner(
     """Go on from point p - 1 round a corner that a contact makes; the step, 0 where there is none.
 
     Where a law pushes at once but lets go gently, the tangent jumps at grazing, and the branch may
-    turn back there. A little beyond, the other contacts tell the Jacobian of the other side; its
-    tangent is followed to where those contacts are. The point is left corrected in work.
+    turn back there. Where both sides graze at once, neither may be met alone: the motion that goes
+    on is its own mirror image, and is sought as such. The point is left corrected in work.
     """
-    before = branch.signature[p - 1]
-    contacts = look_ahead(problem, scratch, work, step, True)
+    length = go_round(problem, problem, scratch, work, branch, p, step, course)
+    if length == 0.0:
+        recall(problem, work, course)
+        length = go_round(mirrored(problem), problem, scratch, work, branch, p, step, course)
+    return length
+
+
+@kernel
+def go_round(
+    sought: Any, problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, step: float,
+    course: Course,
+) -> float:  # fmt: skip
+    """The same for motions of the problem that solve ``sought`` as well.
+
+    A little beyond, the other contacts tell the Jacobian of the other side; its tangent is followed
+    to where those contacts are.
+    """
+    before = look_ahead(sought, scratch, work, 0.0, True)
+    contacts = look_ahead(sought, scratch, work, step, True)
     if contacts < 0 or contacts == before or not bordered(work):
         return 0.0
     new_tangent(work)
     came_from_there = p > 1 and branch.signature[p - 2] == contacts
     for multiple in ROUND:
         length = multiple * step
-        ahead = look_ahead(problem, scratch, work, length, False) == contacts
-        behind = look_ahead(problem, scratch, work, -length, False) == contacts
+        ahead = look_ahead(sought, scratch, work, length, False) == contacts
+        behind = look_ahead(sought, scratch, work, -length, False) == contacts
         if ahead != behind:
-            if behind and came_from_there:
-                return 0.0
             way = length if ahead else -length
-            return (
-                length
-                if step_round(problem, scratch, work, branch, p, contacts, way, course)
-                else 0.0
-            )
+            turned_back = behind and came_from_there
+            if turned_back or not step_round(sought, scratch, work, contacts, way, course):
+                return 0.0
+            return length if confirm(problem, scratch, work, branch, p, length) else 0.0
     return 0.0
 
 
@@ -541,27 +556,31 @@ def look_ahead(problem: Any, scratch: Any, work: Corrector, step: float, along: 
 
 @kernel
 def step_round(
-    problem: Any,
-    scratch: Any,
-    work: Corrector,
-    branch: Record,
-    p: int,
-    contacts: int,
-    step: float,
-    course: Course,
+    sought: Any, scratch: Any, work: Corrector, contacts: int, step: float, course: Course
 ) -> bool:
     """Correct a step along work.tangent; whether it has the contacts of the other side."""
     n = work.r.shape[0]
     for k in range(n + 1):
         work.guess[k] = work.here[k] + step * work.tangent[k] * work.scale[k]
         work.border[k] = work.before[k] = math.copysign(1.0, step) * work.tangent[k]
-    code, _ = correct(problem, scratch, work, TOLERATED * abs(step))
-    if code != status.OK or signature(problem, scratch) != contacts:
+    code, _ = correct(sought, scratch, work, TOLERATED * abs(step))
+    if code != status.OK or signature(sought, scratch) != contacts:
         return False
-    if not course.lower <= work.w[n] <= course.upper or astray(work) > abs(step):
+    return bool(course.lower <= work.w[n] <= course.upper and astray(work) < abs(step))
+
+
+@kernel
+def confirm(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, step: float
+) -> bool:
+    """Correct the point in work as one of the problem; whether it is one, and leads on."""
+    for k in range(work.w.shape[0]):
+        work.guess[k] = work.w[k]
+    code, _ = correct(problem, scratch, work, TOLERATED * step)
+    if code != status.OK or astray(work) > step:
         return False
-    depths(problem, scratch, float(work.w[n]), work.depth)
-    if begins_to_lean(work, branch, p - 1, abs(step)):
+    depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
+    if begins_to_lean(work, branch, p - 1, step):
         return False
     cosine = new_tangent(work)
     work.side[0] = lu_sign(work.A, work.pivot)

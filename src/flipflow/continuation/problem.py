@@ -27,6 +27,7 @@ from flipflow.periodic.shooting import (
     Shooting,
     crossings,
     flow_depths,
+    mirrored_shooting,
     shooting_residual,
     state_scale,
 )
@@ -60,6 +61,16 @@ def _no_section(problem: Any, scratch: Any, phase: float) -> None:
     """A series has none."""
 
 
+@kernel
+def _itself(problem: Any) -> Any:
+    return problem
+
+
+_MIRRORED: dict[type, Any] = {
+    Shooting: mirrored_shooting,
+    Balance: _itself,
+    Sampled: _itself,
+}
 _BETTER: dict[type, Any] = {
     Shooting: section.better_section,
     Balance: _no_better,
@@ -106,6 +117,11 @@ def carried(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> i
 def set_section(problem: Any, scratch: Any, phase: float) -> None:
     """Let the unknowns stand at a phase of the force."""
     _SET[type(problem)](problem, scratch, phase)
+
+
+def mirrored(problem: Any) -> Any:
+    """The problem of those motions that are their own mirror image after half their time."""
+    return _MIRRORED[type(problem)](problem)
 
 
 def _kind(problem: Any) -> Any:
@@ -178,5 +194,15 @@ def _set_section(problem: Any, scratch: Any, phase: Any) -> Any:
 
     def run(problem: Any, scratch: Any, phase: Any) -> Any:
         return chosen(problem, scratch, phase)
+
+    return run
+
+
+@chosen_by_type(mirrored)
+def _mirrored(problem: Any) -> Any:
+    chosen = _MIRRORED[_kind(problem)]
+
+    def run(problem: Any) -> Any:
+        return chosen(problem)
 
     return run

@@ -79,6 +79,14 @@ def new_shooting_work(machine: MachineArrays) -> ShootingWork:
     )
 
 
+@kernel
+def mirrored_shooting(problem: Shooting) -> Shooting:
+    """The problem over half the time, for motions that are then their own mirror image."""
+    if problem.sign < 0.0:
+        return problem
+    return Shooting(problem.machine, 0.5 * problem.fraction, -1.0, problem.length)
+
+
 @kernel(inline=True)
 def shoot(problem: Shooting, work: ShootingWork, z: Real, omega: float, U: Real) -> int:
     """Carry z into flow.z and its tangent into U, over the problem's part of a turn.
