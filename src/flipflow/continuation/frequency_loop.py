@@ -157,20 +157,23 @@ def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tu
     n = work.r.shape[0]
     for k in range(n + 1):
         work.w[k] = work.guess[k]
-    before = math.inf
+    before, contacts = math.inf, -1
     for iteration in range(1, NEWTON_MOST + 1):
         if not work.w[n] > 0.0:
             return status.NO_CONVERGENCE, iteration
         code = residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
         if code != status.OK:
             return code, iteration
+        same = signature(problem, scratch) == contacts
+        contacts = signature(problem, scratch)
         if not bordered(work):
             return status.SINGULAR, iteration
         length = newton_update(work)
         if not length < 1e3:
             return status.NO_CONVERGENCE, iteration
-        # A step that no longer shrinks and is tiny has met the rounding of the residual.
-        if length < tolerance or before <= length < QUICK:
+        # A step that no longer shrinks and is tiny has met the rounding of the residual, unless it
+        # goes to and fro over a grazing.
+        if length < tolerance or (same and before <= length < QUICK):
             return status.OK, iteration
         before = length
     return status.NO_CONVERGENCE, NEWTON_MOST
