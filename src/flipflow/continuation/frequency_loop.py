@@ -50,7 +50,7 @@ SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTO
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of it at which it is sought
 EVEN = 1e-6  # difference of the depths on both sides that is none, in steps
-LEANING = 1e-2  # the same as a share of the step: from here on a motion leans
+LEANING = 1e-3  # the same as a share of the step: from here on a motion leans
 # Why a step was refused, as a branch records it.
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
