@@ -13,6 +13,7 @@ from flipflow.model.system import MechanicalSystem
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+A_FEW = 64  # frequencies up to which one call of LAPACK takes less time than many of numpy
 
 
 def contact_free(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) -> Complex:
@@ -37,7 +38,7 @@ def contact_free(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) 
     size = M.shape[-1]
     if size == 1:
         return np.asarray(force / _impedance(M, C, K, omega, (0, 0))[..., None])
-    if size == 2:
+    if size == 2 and (omega.size > A_FEW or M.ndim > 2):
         return _of_two(M, C, K, force, omega)
     w = omega[..., None, None]
     Z = K - w**2 * M + 1j * (w * C)
