@@ -41,7 +41,7 @@ from flipflow.periodic.stability import (
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
 BACK = 0.96  # share of the last frequency without contact down to which its branch may turn back
-STEPS_UP = 16  # least steps from there up to the frequency asked for
+STEPS_UP = 10  # least steps from there up to the frequency asked for
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."

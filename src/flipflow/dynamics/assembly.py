@@ -29,9 +29,8 @@ def machine_arrays(system: MechanicalSystem) -> MachineArrays:
     n, springs = system.size, system.springs
     m, force = len(springs), system.excitation.vector
     D = np.array([spring.direction for spring in springs]).reshape(m, n)
-    right = np.empty((n, 2 * n + m + 2))
-    right[:, :n], right[:, n : 2 * n], right[:, 2 * n : -2] = system.K, system.C, D.T
-    right[:, -2:] = force.view(np.float64).reshape(n, 2)
+    parts = force.view(np.float64).reshape(n, 2)
+    right = np.concatenate([system.K, system.C, D.T, parts], axis=1)
     solved = np.asarray(np.linalg.solve(system.M, right), np.float64)
     held = [abs(value) for value in np.linalg.eigvalsh(system.K).tolist()]
     if min(held) <= n * EPSILON * max(held):
