@@ -173,14 +173,25 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     free = contact_free_up_to(solver.machine, solver.flow.modes, omega)
     if free == omega:
         return contact_free_unknowns(solver, omega)
-    if free > 0.0:
-        start, step = contact_free_unknowns(solver, free), (omega - free) / STEPS_UP
-        for way in WAYS:
-            course = frequency_loop.Course(BACK * free, omega, step, way.share, 1.0, way.tolerance)
-            last = solver.end_of_branch(start, free, course, way.points)
-            if last is not None:
-                return last
-    return settled_unknowns(solver, omega)
+    last = _followed_up(solver, free, omega) if free > 0.0 else None
+    return settled_unknowns(solver, omega) if last is None else last
+
+
+def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
+    """Unknowns at ``omega`` on the branch of the motion without contact at ``free``.
+
+    A machine that is its own mirror image is followed by half turns: over whole ones the loop may
+    leave the branch, or end, where motions that lean to one side begin.
+    """
+    if isinstance(solver, ExactSolver) and solver.system.symmetric and not solver.half_turn:
+        solver = ExactSolver(solver.system, half_turn=True)
+    start, step = contact_free_unknowns(solver, free), (omega - free) / STEPS_UP
+    for way in WAYS:
+        course = frequency_loop.Course(BACK * free, omega, step, way.share, 1.0, way.tolerance)
+        last = solver.end_of_branch(start, free, course, way.points)
+        if last is not None:
+            return last
+    return None
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
