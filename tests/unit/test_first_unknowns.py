@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.frequency_response import WAYS, first_unknowns
 from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.dynamics.first_contact import FINEST, contact_free_up_to
@@ -140,3 +141,13 @@ def test_short_steps_find_what_long_ones_lose(monkeypatch):
     )
     first_unknowns(solver, omega)
     assert settled
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_at_the_resonance_of_an_undamped_mode_there_is_no_motion(size):
+    first = np.eye(size)[0]
+    K = np.diag([1.0, 4.0, 9.0][:size])
+    machine = ff.MechanicalSystem(np.eye(size), np.diag(0.1 * first), K, (), ff.Unbalance(first))
+    branch = ff.frequency_response(machine, (2.0, 3.0))
+    assert branch.omega.size == 0
+    assert branch.status in (BranchStatus.NOT_FINITE, BranchStatus.NO_MODES)

@@ -14,7 +14,7 @@ from flipflow.continuation import frequency_loop
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
-from flipflow.dynamics.contact_free import complex_amplitudes
+from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.dynamics.first_contact import contact_free_up_to
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
@@ -41,7 +41,7 @@ from flipflow.periodic.stability import (
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
 BACK = 0.96  # share of the last frequency without contact down to which its branch may turn back
-STEPS_UP = 10  # least steps from there up to the frequency asked for
+STEPS_UP = 8  # least steps from there up to the frequency asked for
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -58,7 +58,7 @@ class Way(NamedTuple):
 
 # Where long steps end short of the frequency asked for, as at a corner, short ones try again.
 WAYS = (
-    Way(1.0, frequency_loop.TOLERATED, 1_000),
+    Way(2.0, frequency_loop.TOLERATED, 1_000),
     Way(STEP_SHARE, frequency_loop.QUICK, POINTS_MOST),
 )
 
@@ -196,7 +196,7 @@ def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = complex_amplitudes(solver.system, np.array([omega]))[0]
+    X = complex_amplitude(solver.system, omega)
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])

@@ -73,14 +73,14 @@ def new_flow(machine: MachineArrays) -> Flow:
         regime=np.zeros(m, np.int64),
         z=np.zeros(2 * n),
         segments=np.zeros(1, np.int64),
-        slot=np.empty(e, np.int64),
-        start=np.empty(e),
-        length=np.empty(e),
-        q=np.empty((e, rates), np.complex128),
-        rest=np.empty((e, n)),
-        spring=np.empty(e, np.int64),
-        kick=np.empty(e),
-        regimes=np.empty((e, m), np.int64),
+        slot=np.zeros(e, np.int64),
+        start=np.zeros(e),
+        length=np.zeros(e),
+        q=np.zeros((e, rates), np.complex128),
+        rest=np.zeros((e, n)),
+        spring=np.zeros(e, np.int64),
+        kick=np.zeros(e),
+        regimes=np.zeros((e, m), np.int64),
     )
 
 
@@ -149,7 +149,7 @@ def begin_segment(
     flow.slot[e] = slot
     flow.start[e] = t
     set_rest(machine, flow, e, slot)
-    for i in range(flow.q.shape[1]):
+    for i in range(count):
         flow.q[e, i] = 0.0
     for k in range(size):
         drive = flow.drive[slot, k]
