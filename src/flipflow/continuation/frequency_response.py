@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
-from flipflow.compiled import status
-from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.arrays import Real
 from flipflow.continuation import frequency_loop
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
-from flipflow.dynamics.contact_free import complex_amplitudes
+from flipflow.dynamics.contact_free import complex_amplitude
+from flipflow.dynamics.first_contact import contact_free_up_to
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.contact_law import pushes_whole
@@ -29,7 +30,7 @@ from flipflow.periodic.options import (
     checked_method,
 )
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import STEP_SHARE, Formulation, Solver, Traced
+from flipflow.periodic.solver import POINTS_MOST, STEP_SHARE, Formulation, Solver, Traced
 from flipflow.periodic.stability import (
     UNDETERMINED,
     beyond_where_rising,
@@ -39,12 +40,26 @@ from flipflow.periodic.stability import (
 )
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
-SCAN_POINTS = 2000  # equally spaced frequencies at which contact is looked for
-BACK, BACK_MOST = 0.96, 170  # steps down in search of a motion without contact, to a thousandth
-STEPS_UP = 16  # least steps from there up to the frequency asked for
+BACK = 0.96  # share of the last frequency without contact down to which its branch may turn back
+STEPS_UP = 8  # least steps from there up to the frequency asked for
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
+)
+
+
+class Way(NamedTuple):
+    """How a branch is followed of which only the last point is wanted."""
+
+    share: float  # longest step in the unknowns, as a share of their size
+    tolerance: float  # last Newton step, in steps
+    points: int  # after which it is given up
+
+
+# Where long steps end short of the frequency asked for, as at a corner, short ones try again.
+WAYS = (
+    Way(2.0, frequency_loop.TOLERATED, 1_000),
+    Way(STEP_SHARE, frequency_loop.QUICK, POINTS_MOST),
 )
 
 
@@ -152,40 +167,36 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
     Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
-    followed up from a frequency without contact; where there is none, the machine is left to settle
-    from rest.
+    followed up from the last motion without contact; where there is none, the machine is left to
+    settle from rest.
     """
-    lower = lowest_contact(solver, omega)
-    if lower is None:
+    free = contact_free_up_to(solver.machine, solver.flow.modes, omega)
+    if free == omega:
         return contact_free_unknowns(solver, omega)
-    starts = lower * BACK ** np.arange(1.0, BACK_MOST)
-    free = ~_meets_a_gap(solver, complex_amplitudes(solver.system, starts))
-    if free.any():
-        start = float(starts[free.argmax()])
-        step = (omega - start) / STEPS_UP
-        course = frequency_loop.Course(start, omega, step, STEP_SHARE, 1.0, frequency_loop.QUICK)
-        traced = solver.trace(contact_free_unknowns(solver, start), start, course)
-        if traced.code == status.REACHED_UPPER:
-            return np.asarray(traced.u[-1])
-    return settled_unknowns(solver, omega)
+    last = _followed_up(solver, free, omega) if free > 0.0 else None
+    return settled_unknowns(solver, omega) if last is None else last
 
 
-def lowest_contact(solver: Solver, omega: float) -> float | None:
-    """The lowest of a fine scan of frequencies up to ``omega`` whose linear motion meets a gap."""
-    scan = omega * np.linspace(1.0 / SCAN_POINTS, 1.0, SCAN_POINTS)
-    beyond = _meets_a_gap(solver, complex_amplitudes(solver.system, scan))
-    return float(scan[beyond.argmax()]) if beyond.any() else None
+def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
+    """Unknowns at ``omega`` on the branch of the motion without contact at ``free``.
 
-
-def _meets_a_gap(solver: Solver, X: Complex) -> NDArray[np.bool_]:
-    """Where linear motions X (n, N) reach the gap of any spring, (n,)."""
-    gaps = solver.machine.stops.gap.min(axis=1)
-    return np.asarray((np.abs(X @ solver.machine.direction.T) >= gaps).any(axis=1))
+    A machine that is its own mirror image is followed by half turns: over whole ones the loop may
+    leave the branch, or end, where motions that lean to one side begin.
+    """
+    if isinstance(solver, ExactSolver) and solver.system.symmetric and not solver.half_turn:
+        solver = ExactSolver(solver.system, half_turn=True)
+    start, step = contact_free_unknowns(solver, free), (omega - free) / STEPS_UP
+    for way in WAYS:
+        course = frequency_loop.Course(BACK * free, omega, step, way.share, 1.0, way.tolerance)
+        last = solver.end_of_branch(start, free, course, way.points)
+        if last is not None:
+            return last
+    return None
 
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = complex_amplitudes(solver.system, np.array([omega]))[0]
+    X = complex_amplitude(solver.system, omega)
     if isinstance(solver, BalanceSolver):
         u = np.zeros(solver.unknowns)
         at = int(np.flatnonzero(solver.harmonics == 1)[0])

@@ -13,6 +13,8 @@ from flipflow.model.contact_law import NUMBER
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import MechanicalSystem
 
+EPSILON = float(np.finfo(float).eps)
+
 
 def machine_arrays(system: MechanicalSystem) -> MachineArrays:
     """Flatten a system whose springs can all open and close.
@@ -27,12 +29,11 @@ def machine_arrays(system: MechanicalSystem) -> MachineArrays:
     n, springs = system.size, system.springs
     m, force = len(springs), system.excitation.vector
     D = np.array([spring.direction for spring in springs]).reshape(m, n)
-    right = np.empty((n, 2 * n + m + 2))
-    right[:, :n], right[:, n : 2 * n], right[:, 2 * n : -2] = system.K, system.C, D.T
-    right[:, -2], right[:, -1] = force.real, force.imag
+    parts = force.view(np.float64).reshape(n, 2)
+    right = np.concatenate([system.K, system.C, D.T, parts], axis=1)
     solved = np.asarray(np.linalg.solve(system.M, right), np.float64)
-    held = np.abs(np.linalg.eigvalsh(system.K))
-    if held.min() <= n * np.finfo(float).eps * held.max():
+    held = [abs(value) for value in np.linalg.eigvalsh(system.K).tolist()]
+    if min(held) <= n * EPSILON * max(held):
         raise InputError(
             "K",
             "singular",
@@ -44,7 +45,7 @@ def machine_arrays(system: MechanicalSystem) -> MachineArrays:
         damping=solved[:, n : 2 * n].copy(),
         direction=D,
         reach=np.ascontiguousarray(solved[:, 2 * n : 2 * n + m].T),
-        push=solved[:, -2] + 1j * solved[:, -1],
+        push=solved[:, -2:].copy().view(np.complex128)[:, 0],
         power=system.excitation.power,
         stops=stops_of(springs),
     )

@@ -156,7 +156,7 @@ class MechanicalSystem:
 
     def require_damping(self) -> None:
         """Raise InputError for a machine without any damping: it has no steady state."""
-        if not self.C.any():
+        if not np.count_nonzero(self.C):
             raise InputError(
                 "damping",
                 0.0,

@@ -253,6 +253,18 @@ class Solver(ABC):
         code, points, _ = self._follow(record, u, omega, course)
         return Traced.recorded(record, points, code, course)
 
+    def end_of_branch(
+        self, u: Real, omega: float, course: frequency_loop.Course, points: int
+    ) -> Real | None:
+        """Unknowns where the branch through (u, omega) meets the upper bound of ``course``.
+
+        None where it does not within that many points.
+        """
+        # Neither depths nor Jacobians are asked for.
+        record = frequency_loop.new_branch(self.unknowns, 0, points, with_jacobian=False)
+        code, points, _ = self._follow(record, u, omega, course)
+        return record.u[points - 1].copy() if code == status.REACHED_UPPER else None
+
     def new_branch(self, points: int) -> frequency_loop.Record:
         """An empty record for up to ``points`` points."""
         gaps = len(self.springs)
@@ -388,10 +400,9 @@ class Solver(ABC):
 
 def characteristic_length(system: MechanicalSystem, machine: MachineArrays) -> float:
     """The smallest gap in m that is not zero, else the stroke that the force alone would give."""
-    gaps = machine.stops.gap
-    real = gaps[(gaps > 0.0) & (gaps < np.inf)]
-    if real.size:
-        return float(real.min())
+    gaps = [gap for spring in system.springs for gap in spring.gaps if 0.0 < gap < math.inf]
+    if gaps:
+        return min(gaps)
     push = np.abs(machine.push).max()
     if machine.power == 0:
         push = np.abs(np.linalg.solve(system.K, system.excitation.vector)).max()
