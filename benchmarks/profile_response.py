@@ -11,7 +11,7 @@ from contract import INTERVAL
 from one_core import stay_on_one_core
 
 import flipflow as ff
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.continuation.special_points import find_special_points
 from flipflow.periodic.solver import STEP_SHARE
@@ -29,8 +29,8 @@ def stages(machine, method):
     solver = solver_for(machine.system(), method)
     lap()
     low, high = INTERVAL
-    course = frequency_loop.Course(
-        low, high, (high - low) / method.points, STEP_SHARE, 1.0, frequency_loop.QUICK
+    course = correction.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, correction.QUICK
     )
     start = first_unknowns(solver, low)
     lap()

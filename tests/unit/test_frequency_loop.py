@@ -10,15 +10,15 @@ from scipy.optimize import minimize_scalar
 
 import flipflow as ff
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
-from flipflow.continuation import frequency_loop
-from flipflow.continuation.frequency_loop import new_branch, new_corrector
+from flipflow.continuation import correction
+from flipflow.continuation.correction import new_corrector
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import new_flow
 from flipflow.periodic.stability import determinant_minus, determinant_plus
 from kernel_calls import number_of, predicted
 
 pytestmark = pytest.mark.numerical
-ANYWHERE = frequency_loop.Course(1.0, 100.0, 1.0, 1.0, 1.0, frequency_loop.QUICK)
+ANYWHERE = correction.Course(1.0, 100.0, 1.0, 1.0, 1.0, correction.QUICK)
 TURN = 1.0 / math.sqrt(2.0)
 
 

@@ -12,51 +12,23 @@ from typing import Any
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
-from flipflow.continuation.frequency_loop import (
-    SHARP,
+from flipflow.continuation.correction import (
     Corrector,
     Course,
-    Record,
-    bend,
     bring_home,
-    chord_behind,
-    correct,
+    correct_between,
+)
+from flipflow.continuation.frequency_loop import (
+    Record,
     load,
-    new_tangent,
-    recall,
     trace,
 )
-from flipflow.continuation.problem import depths, residual, set_section
+from flipflow.continuation.problem import depths, set_section
 
 TRACE_ALL = -1  # in place of a step: follow the whole branch
 FOLD = -1  # number of the test for a fold; those from 0 on are depths beyond gaps
 SHARE_TOLERANCE = 1e-10  # share of a step to which a zero is located
 MOST_ROOT_STEPS = 100  # steps of the search for one zero
-
-
-@kernel
-def correct_between(
-    problem: Any, scratch: Any, work: Corrector, share: float, course: Course
-) -> int:
-    """Find a point between the two that are loaded, near ``share`` of the cubic on them.
-
-    The plane to solve in is normal to their chord. The point is left in work.w, its Jacobian in
-    work.J, and its tangent, in the branch's direction, in work.tangent (scaled by work.scale).
-    """
-    recall(problem, work, course)
-    chord = chord_behind(work)
-    step = (share - 1.0) * chord
-    for k in range(work.w.shape[0]):
-        work.guess[k] = work.here[k] + step * work.before[k] * work.scale[k]
-        work.border[k] = work.b[k] / chord
-    bend(work, step, chord)
-    for k in range(work.w.shape[0]):
-        work.before[k] = work.border[k]
-    code, _ = correct(problem, scratch, work, SHARP)
-    if code != status.OK:
-        return code
-    new_tangent(work)
-    return residual(problem, scratch, work.w, float(work.w[work.r.shape[0]]), work.r, work.J)
 
 
 @kernel

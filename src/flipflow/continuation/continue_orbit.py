@@ -6,7 +6,7 @@ import dataclasses
 import warnings
 from dataclasses import replace
 
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.continue_field import field_branch
 from flipflow.continuation.field_branch import FieldBranch
@@ -188,9 +188,9 @@ def _exact_point(point: SpecialPoint) -> Point:
     return exact
 
 
-def _course(low: float, high: float, method: Method) -> frequency_loop.Course:
-    return frequency_loop.Course(
-        low, high, (high - low) / method.points, STEP_SHARE, 1.0, frequency_loop.QUICK
+def _course(low: float, high: float, method: Method) -> correction.Course:
+    return correction.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, correction.QUICK
     )
 
 

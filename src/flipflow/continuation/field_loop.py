@@ -15,6 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.continuation.corners import TURN_MOST
+from flipflow.continuation.correction import (
+    NEWTON_MOST,
+    QUICK,
+    SHARP,
+)
 from flipflow.continuation.frequency_loop import (
     AWAY,
     BACK,
@@ -23,14 +29,10 @@ from flipflow.continuation.frequency_loop import (
     HALVE,
     LONGEST,
     NEWTON_FEW,
-    NEWTON_MOST,
-    QUICK,
-    SHARP,
     SHORT_STEP,
     SHORTEST,
     SHRINK,
     STRAND_STEP,
-    TURN_MOST,
 )
 from flipflow.model.monitor import Monitor, silent
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled.arrays import Real
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
@@ -58,8 +58,8 @@ class Way(NamedTuple):
 
 # Where long steps end short of the frequency asked for, as at a corner, short ones try again.
 WAYS = (
-    Way(2.0, frequency_loop.TOLERATED, 1_000),
-    Way(STEP_SHARE, frequency_loop.QUICK, POINTS_MOST),
+    Way(2.0, correction.TOLERATED, 1_000),
+    Way(STEP_SHARE, correction.QUICK, POINTS_MOST),
 )
 
 
@@ -101,17 +101,15 @@ def frequency_response(
     low, high = checked_interval("omega", omega)
     method = checked_method(method)
     solver = solver_for(system_of(machine), method)
-    course = frequency_loop.Course(
-        low, high, (high - low) / method.points, STEP_SHARE, 1.0, frequency_loop.QUICK
+    course = correction.Course(
+        low, high, (high - low) / method.points, STEP_SHARE, 1.0, correction.QUICK
     )
     if isinstance(solver, SampledSolver):
         warnings.warn(SAMPLED, SampledContactWarning, stacklevel=2)
     return followed(machine, method, solver, course)
 
 
-def followed(
-    machine: Machine, method: Method, solver: Solver, course: frequency_loop.Course
-) -> Branch:
+def followed(machine: Machine, method: Method, solver: Solver, course: correction.Course) -> Branch:
     """The branch over ``course`` with stability and special points."""
     traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
     return described(machine, method, solver, traced)
@@ -187,7 +185,7 @@ def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
         solver = ExactSolver(solver.system, half_turn=True)
     start, step = contact_free_unknowns(solver, free), (omega - free) / STEPS_UP
     for way in WAYS:
-        course = frequency_loop.Course(BACK * free, omega, step, way.share, 1.0, way.tolerance)
+        course = correction.Course(BACK * free, omega, step, way.share, 1.0, way.tolerance)
         last = solver.end_of_branch(start, free, course, way.points)
         if last is not None:
             return last

@@ -15,7 +15,7 @@ from scipy.optimize import root_scalar
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.field_loop import CLOSE, NEAR, SAME
 from flipflow.errors import IncompleteError
 from flipflow.model.monitor import Monitor, silent
@@ -98,7 +98,7 @@ def meeting(parent: Solver, u: Real, omega: float) -> Point | None:
 
 
 def follow_until_meeting(
-    solver: Solver, u: Real, omega: float, course: frequency_loop.Course
+    solver: Solver, u: Real, omega: float, course: correction.Course
 ) -> tuple[Traced, Point | None]:
     """Follow the branch one way until it leaves the interval or meets its parent.
 
@@ -134,7 +134,7 @@ def follow_until_meeting(
 
 
 def follow_both_ways(
-    solver: Solver, u: Real, omega: float, course: frequency_loop.Course, monitor: Monitor = silent
+    solver: Solver, u: Real, omega: float, course: correction.Course, monitor: Monitor = silent
 ) -> Followed:
     """Follow the branch from (u, omega) both ways; it begins at its end of lower omega."""
     monitor(f"from {omega:.6g} rad/s", 0.0)
@@ -151,9 +151,7 @@ def follow_both_ways(
     return Followed(back.reversed_into(ahead), start, end)
 
 
-def follow_away(
-    child: Solver, first: Point, course: frequency_loop.Course, parent: Point
-) -> Followed:
+def follow_away(child: Solver, first: Point, course: correction.Course, parent: Point) -> Followed:
     """Follow a child branch from a motion beside its parent, away from it."""
     direction = math.copysign(1.0, first.omega - parent.omega)
     traced, end = follow_until_meeting(
@@ -178,7 +176,7 @@ def _distances(parent: ExactSolver, traced: Traced) -> Real:
     )
 
 
-def beside(child: Solver, parent: Point, course: frequency_loop.Course) -> Point:
+def beside(child: Solver, parent: Point, course: correction.Course) -> Point:
     """The child's motion a small way along the critical eigenvector of the parent's return map.
 
     Solved for in the plane of fixed amplitude, omega being unknown.

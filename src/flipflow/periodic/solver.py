@@ -13,7 +13,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction, frequency_loop
 from flipflow.continuation.between_points import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import Flow
@@ -40,11 +40,11 @@ class Traced:
     rejected: Int
     reason: Int
     code: int
-    course: frequency_loop.Course
+    course: correction.Course
 
     @classmethod
     def recorded(
-        cls, record: frequency_loop.Record, points: int, code: int, course: frequency_loop.Course
+        cls, record: frequency_loop.Record, points: int, code: int, course: correction.Course
     ) -> Self:
         """The first ``points`` of a record, and what happened on the way to the next."""
         kept = frequency_loop.first_points(record, points)
@@ -247,21 +247,21 @@ class Solver(ABC):
         none = np.zeros((1, 0, 0))
         return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
 
-    def trace(self, u: Real, omega: float, course: frequency_loop.Course) -> Traced:
+    def trace(self, u: Real, omega: float, course: correction.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
         record = self.new_branch(POINTS_MOST)
         code, points, _ = self._follow(record, u, omega, course)
         return Traced.recorded(record, points, code, course)
 
     def end_of_branch(
-        self, u: Real, omega: float, course: frequency_loop.Course, points: int
+        self, u: Real, omega: float, course: correction.Course, points: int
     ) -> Real | None:
         """Unknowns where the branch through (u, omega) meets the upper bound of ``course``.
 
         None where it does not within that many points.
         """
-        # Neither depths nor Jacobians are asked for.
-        record = frequency_loop.new_branch(self.unknowns, 0, points, with_jacobian=False)
+        gaps = len(self.springs)
+        record = frequency_loop.new_branch(self.unknowns, gaps, points, with_jacobian=False)
         code, points, _ = self._follow(record, u, omega, course)
         return record.u[points - 1].copy() if code == status.REACHED_UPPER else None
 
@@ -273,16 +273,16 @@ class Solver(ABC):
         )
 
     @cached_property
-    def corrector(self) -> frequency_loop.Corrector:
+    def corrector(self) -> correction.Corrector:
         """Scratch of the bordered Newton solves; the last point corrected stands in it."""
-        return frequency_loop.new_corrector(self.unknowns, len(self.springs))
+        return correction.new_corrector(self.unknowns, len(self.springs))
 
     def _follow(
         self,
         record: frequency_loop.Record,
         u: Real,
         omega: float,
-        course: frequency_loop.Course,
+        course: correction.Course,
         p: int = TRACE_ALL,
         shares: tuple[float, float] = (0.0, 0.0),
         test: int = 0,
@@ -346,9 +346,7 @@ class Solver(ABC):
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
-        course = frequency_loop.Course(
-            omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, frequency_loop.SHARP
-        )
+        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, correction.SHARP)
         record = self.new_branch(1)
         _, points, _ = self._follow(record, u, omega, course)
         if points == 0:

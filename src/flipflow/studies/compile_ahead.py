@@ -8,7 +8,7 @@ import numpy as np
 
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.compiled.workers import compile_parts, work
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.elements import ClearanceSpring, Unbalance
@@ -31,7 +31,7 @@ def compile_ahead(tell: Callable[[float], None]) -> None:
 
 def _trace_part() -> None:
     solver = _small_solver()
-    course = frequency_loop.Course(0.5, 0.6, 0.01, STEP_SHARE, 1.0, frequency_loop.QUICK)
+    course = correction.Course(0.5, 0.6, 0.01, STEP_SHARE, 1.0, correction.QUICK)
     solver.trace(first_unknowns(solver, 0.5), 0.5, course)
     eigenvalues(np.zeros((1, 1, 1)))
 

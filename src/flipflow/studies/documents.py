@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Complex, Int, Real
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
@@ -194,7 +194,7 @@ def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:
     if solver.reads_jacobian:
         record.jacobian[:points] = maps - np.eye(maps.shape[1])
     record.rejected[:tried], record.reason[:tried] = read["rejected"], read["reason"]
-    course = frequency_loop.Course(*read["course"])
+    course = correction.Course(*read["course"])
     return Traced.recorded(record, points, read["code"], course)
 
 

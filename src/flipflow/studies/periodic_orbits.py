@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Real
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.dynamics.contact_free import complex_amplitudes
 from flipflow.errors import IncompleteError
@@ -218,8 +218,8 @@ def _on_branch(system: MechanicalSystem, omega: float, ratio: float) -> list[Rea
     """
     solver = ExactSolver(system, half_turn=system.symmetric)
     low, high = omega / ratio, omega * ratio
-    course = frequency_loop.Course(
-        low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, frequency_loop.QUICK
+    course = correction.Course(
+        low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, correction.QUICK
     )
     traced = solver.trace(first_unknowns(solver, low), low, course)
     ahead = traced.omega - omega

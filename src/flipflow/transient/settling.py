@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
-from flipflow.continuation import frequency_loop
+from flipflow.continuation import correction
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
@@ -165,9 +165,9 @@ class Settling:
         if omega == point.omega:
             return point
         low, high = sorted((point.omega, omega))
-        course = frequency_loop.Course(
+        course = correction.Course(
             low, high, high - low, STEP_SHARE, math.copysign(1.0, omega - point.omega),
-            frequency_loop.QUICK,
+            correction.QUICK,
         )  # fmt: skip
         solver = self.solver_of(point.formulation.turns)
         traced = solver.trace(point.u, point.omega, course)

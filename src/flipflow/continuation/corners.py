@@ -1,0 +1,190 @@
+"""Corners of a branch, where a contact begins or ends: which way it goes on.
+
+Under a law that pushes at once but lets go gently the tangent of a branch jumps at grazing, and the
+branch may turn back there. Where both sides of a stop graze at once, the motion that goes on is its
+own mirror image; motions that lean to one side are branches of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
+from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import lu_sign
+from flipflow.continuation.correction import (
+    TOLERATED,
+    Corrector,
+    Course,
+    astray,
+    bordered,
+    correct,
+    new_tangent,
+    recall,
+)
+from flipflow.continuation.problem import depths, mirrored, residual, signature
+
+ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of it at which it is sought
+LEANING = 1e-3  # difference of both sides from which on a motion leans, as a share of the step
+TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
+
+
+@kernel
+def begins_to_lean(problem: Any, scratch: Any, work: Corrector, depth: Real, step: float) -> bool:
+    """Whether the corrected motion leans to one side, though the last point's did not.
+
+    Where both sides of a stop begin to graze at once leaning motions branch off; the one that is
+    its own mirror image goes on, until a stop is met that is not the same on both sides. The last
+    point has depths (m, 2).
+    """
+    n, leans = work.r.shape[0], False
+    for j in range(work.depth.shape[0]):
+        size = abs(work.depth[j, 0] - work.depth[j, 1])
+        met = max(work.depth[j, 0], work.depth[j, 1]) > 0.0
+        if abs(depth[j, 0] - depth[j, 1]) > LEANING * work.scale[0]:
+            if met:
+                return False
+        elif met and size > LEANING * step * work.scale[0]:
+            leans = True
+    if leans:
+        leans = is_mirror_image(problem, scratch, work)
+        residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
+    return leans
+
+
+@kernel
+def is_mirror_image(problem: Any, scratch: Any, work: Corrector) -> bool:
+    """Whether the last point's motion is its own mirror image."""
+    n, off = work.r.shape[0], 0.0
+    omega = float(work.here[n])
+    code = residual(mirrored(problem), scratch, work.here, omega, work.r, work.J)
+    for k in range(n):
+        off = max(off, abs(work.r[k]) / work.scale[k])
+    return code == status.OK and off < LEANING
+
+
+@kernel
+def orient(problem: Any, scratch: Any, work: Corrector, contacts: int, step: float) -> None:
+    """Let the tangent of a point with new contacts lead to where these stay.
+
+    At a corner where the branch turns back, both its sides may lie along one line.
+    """
+    n = work.r.shape[0]
+    for multiple in ROUND:
+        ahead = contacts_beside(problem, scratch, work, multiple * step) == contacts
+        behind = contacts_beside(problem, scratch, work, -multiple * step) == contacts
+        if ahead != behind:
+            if behind:
+                work.side[0] = -work.side[0]
+                for k in range(n + 1):
+                    work.tangent[k] = -work.tangent[k]
+            break
+    residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
+
+
+@kernel
+def contacts_beside(problem: Any, scratch: Any, work: Corrector, step: float) -> int:
+    """Contacts a step along work.tangent from the corrected point; -1: none known."""
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        work.b[k] = work.w[k] + step * work.tangent[k] * work.scale[k]
+    code = residual(problem, scratch, work.b, float(work.b[n]), work.r, work.J)
+    return signature(problem, scratch) if code == status.OK else -1
+
+
+@kernel
+def turn_corner(
+    problem: Any, scratch: Any, work: Corrector, depth: Real, came_from: int, step: float,
+    course: Course,
+) -> float:  # fmt: skip
+    """Go on from the last point round a corner that a contact makes; the step, 0 if there is none.
+
+    The last point has depths (m, 2); the one before it had the contacts ``came_from``. Where both
+    sides of a stop graze at once, neither can be met alone: then the motion that goes on is sought
+    as its own mirror image. The point is left corrected in work.
+    """
+    recall(problem, work, course)
+    length = go_round(problem, problem, scratch, work, depth, came_from, step, course)
+    if length == 0.0:
+        recall(problem, work, course)
+        half = mirrored(problem)
+        length = go_round(half, problem, scratch, work, depth, came_from, step, course)
+    if length == 0.0:
+        recall(problem, work, course)
+    return length
+
+
+@kernel
+def go_round(
+    sought: Any, problem: Any, scratch: Any, work: Corrector, depth: Real, came_from: int,
+    step: float, course: Course,
+) -> float:  # fmt: skip
+    """The same for motions of the problem that solve ``sought`` as well.
+
+    A little beyond, the other contacts tell the Jacobian of the other side; its tangent is followed
+    to where those contacts are.
+    """
+    before = look_ahead(sought, scratch, work, 0.0, True)
+    contacts = look_ahead(sought, scratch, work, step, True)
+    if contacts < 0 or contacts == before or not bordered(work):
+        return 0.0
+    new_tangent(work)
+    for multiple in ROUND:
+        length = multiple * step
+        ahead = look_ahead(sought, scratch, work, length, False) == contacts
+        behind = look_ahead(sought, scratch, work, -length, False) == contacts
+        if ahead != behind:
+            way = length if ahead else -length
+            turned_back = behind and contacts == came_from
+            if turned_back or not step_round(sought, scratch, work, contacts, way, course):
+                return 0.0
+            return length if confirm(problem, scratch, work, depth, length) else 0.0
+    return 0.0
+
+
+@kernel
+def look_ahead(problem: Any, scratch: Any, work: Corrector, step: float, along: bool) -> int:
+    """Contacts a step from the last point, along its tangent or along work.tangent; -1: none known.
+
+    The Jacobian there is left in work.J.
+    """
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        direction = work.before[k] if along else work.tangent[k]
+        work.guess[k] = work.here[k] + step * direction * work.scale[k]
+        work.border[k] = direction
+    code = residual(problem, scratch, work.guess, float(work.guess[n]), work.r, work.J)
+    return signature(problem, scratch) if code == status.OK else -1
+
+
+@kernel
+def step_round(
+    sought: Any, scratch: Any, work: Corrector, contacts: int, step: float, course: Course
+) -> bool:
+    """Correct a step along work.tangent; whether it has the contacts of the other side."""
+    n = work.r.shape[0]
+    for k in range(n + 1):
+        work.guess[k] = work.here[k] + step * work.tangent[k] * work.scale[k]
+        work.border[k] = work.before[k] = math.copysign(1.0, step) * work.tangent[k]
+    code, _ = correct(sought, scratch, work, TOLERATED * abs(step))
+    if code != status.OK or signature(sought, scratch) != contacts:
+        return False
+    return bool(course.lower <= work.w[n] <= course.upper and astray(work) < abs(step))
+
+
+@kernel
+def confirm(problem: Any, scratch: Any, work: Corrector, depth: Real, step: float) -> bool:
+    """Correct the point in work as one of the problem; whether it is one, and leads on."""
+    for k in range(work.w.shape[0]):
+        work.guess[k] = work.w[k]
+    code, _ = correct(problem, scratch, work, TOLERATED * step)
+    if code != status.OK or astray(work) > step:
+        return False
+    depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
+    if begins_to_lean(problem, scratch, work, depth, step):
+        return False
+    cosine = new_tangent(work)
+    work.side[0] = lu_sign(work.A, work.pivot)
+    return cosine > TURN_MOST
