@@ -7,11 +7,13 @@ import warnings
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
+from flipflow.continuation.between_points import SHARE_TOLERANCE
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
 from flipflow.continuation.special_points import FOLD
 from flipflow.errors import IncompleteError, InputError
@@ -25,11 +27,12 @@ from flipflow.model.arguments import (
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Formulation, Point, Traced
+from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import STABLE, stability_words
 from flipflow.results.frozen import Frozen
 
 Real = NDArray[np.float64]
+Node = tuple[float, float]  # position along the branch, and omega there
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,26 +226,52 @@ class Branch(Frozen):
         IncompleteError
             When the branch has no points.
         """
-        ends = self.omega
-        if ends.size == 0:
+        if self.omega.size == 0:
             raise IncompleteError(f"The branch has no points. {self.status.value}")
-        remedy = f"the branch runs from {ends.min():.6g} to {ends.max():.6g} rad/s"
-        if not ends.min() <= checked_number("omega", omega, remedy) <= ends.max():
+        ends = [*self.omega.tolist(), *(fold.omega for fold in self.folds)]
+        remedy = f"the branch runs from {min(ends):.6g} to {max(ends):.6g} rad/s"
+        if not min(ends) <= checked_number("omega", omega, remedy) <= max(ends):
             raise InputError("omega", omega, remedy)
         solver, omega = self.formulation.solver(), float(omega)
-        hits = np.flatnonzero((ends[:-1] - omega) * (ends[1:] - omega) <= 0.0)
         found: list[Orbit] = []
-        for p in hits:
-            span = ends[p + 1] - ends[p]
-            share = (omega - ends[p]) / span if span else 0.0
-            guess = (1.0 - share) * self.traced.u[p] + share * self.traced.u[p + 1]
-            point = solver.solve(guess, omega)
+        for begin, end in self._passages(omega):
+            point = self._between_nodes(solver, begin, end, omega)
             if point is None:
                 continue
             same = any(np.allclose(point.u, one.unknowns, rtol=1e-7, atol=1e-12) for one in found)
             if not same:
-                found.append(self._solved(point, rises=span > 0.0))
+                found.append(self._solved(point, rises=end[1] > begin[1]))
         return tuple(found)
+
+    def _passages(self, omega: float) -> list[tuple[Node, Node]]:
+        """Pairs of neighbours, points and folds, between which ``omega`` is passed."""
+        inner = [fold for fold in self.folds if 0.0 < fold.position < self.omega.size - 1]
+        turns = [(fold.position, fold.omega) for fold in inner]
+        nodes = sorted([*enumerate(map(float, self.omega)), *turns])
+        return [
+            pair
+            for pair in pairwise(nodes)
+            if pair[0][1] <= omega <= pair[1][1] or pair[1][1] <= omega <= pair[0][1]
+        ]
+
+    def _between_nodes(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
+        """The motion at ``omega`` between two neighbours; None where it is not found."""
+        p = min(int(begin[0]), self.omega.size - 2)
+        known = {node[0] - p: node[1] - omega for node in (begin, end)}
+
+        def off(share: float) -> float:
+            if share in known:
+                return known[share]
+            return solver.between(self.traced, p, share).omega - omega
+
+        low, high = known
+        try:
+            share = float(brentq(off, low, high, xtol=SHARE_TOLERANCE))
+            guess = solver.between(self.traced, p, share).u
+        except IncompleteError:  # the branch has a corner there
+            share = low + (high - low) * known[low] / (known[low] - known[high])
+            guess = (1.0 - share) * self.traced.u[p] + share * self.traced.u[p + 1]
+        return solver.solve(guess, omega)
 
     @cached_property
     def rising_path(self) -> tuple[slice, ...]:
@@ -297,7 +326,13 @@ class Branch(Frozen):
         return self._solved(point, rises=True)
 
     def _solved(self, point: Point, *, rises: bool) -> Orbit:
-        """A motion solved for on a part of the branch that rises or falls in omega."""
+        """A motion solved for on a part of the branch that rises or falls in omega.
+
+        The multipliers of an exact motion tell its stability; those of a series do so with the side
+        of the fold on which it stands.
+        """
+        if self.formulation.kind.reads_jacobian:
+            return Orbit(self.machine, point)
         side = np.array([self.saddle_side_at_start ^ (not rises)])
         word = stability_words(point.eigenvalues[None], side)[0]
         return Orbit(self.machine, point, str(word))

@@ -231,7 +231,8 @@ def _finished(
 ) -> Branch:
     if eigenvalues is None:
         eigenvalues = np.zeros((0, 2 * solver.system.size), np.complex128)
-    side = saddle_side(traced.tangent[:, -1], eigenvalues) if eigenvalues.size else None
+    told = eigenvalues.size and not solver.reads_jacobian
+    side = saddle_side(traced.tangent[:, -1], eigenvalues) if told else None
     beyond = beyond_where_rising(traced.tangent[:, -1], eigenvalues)
     special = tuple(
         SpecialPoint(

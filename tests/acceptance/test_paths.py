@@ -1,0 +1,156 @@
+"""Paths that never end early: sections, corners, leaning motions, on machines that nobody chose."""
+
+from __future__ import annotations
+
+import math
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import flipflow as ff
+from flipflow.dynamics.contact_free import complex_amplitude
+from judge import close
+
+pytestmark = pytest.mark.numerical
+SEED, MACHINES = 20261128, 200
+SHIFTS = (math.pi / 6.0, math.pi / 3.0, 2.0, 4.0)
+
+
+@cache
+def draw():
+    """The machines of ``benchmarks/chain_draw.py``."""
+    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+    try:
+        from chain_draw import draw  # noqa: PLC0415  it stands beside the benchmarks
+    finally:
+        sys.path.pop(0)
+    return draw
+
+
+def one_sided(phase: float, damping: float, law: str = "paper") -> ff.MechanicalSystem:
+    """One mass against one stop, under a force whose phase only shifts time."""
+    stop = ff.ClearanceSpring([1.0], 30.0, damping, 0.4, math.inf, law=law)
+    force = ff.HarmonicForce([0.5 * np.exp(1j * phase)])
+    return ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], (stop,), force)
+
+
+def story(branch: ff.Branch) -> tuple[np.ndarray, np.ndarray]:
+    """Where special points stand, in order, and all amplitudes at 20 speeds, sorted."""
+    speeds = np.linspace(branch.omega[0], branch.omega[-1], 22)[1:-1]
+    amplitudes = [sorted(o.amplitude(0) for o in branch.orbits_at(float(w))) for w in speeds]
+    return np.array([p.omega for p in branch.special_points]), np.concatenate(amplitudes)
+
+
+@pytest.mark.parametrize("damping", [1.0, 10.0])
+@pytest.mark.parametrize("law", ["paper", "compression-only"])
+def test_the_phase_of_the_force_only_shifts_time(damping: float, law: str) -> None:
+    """With the state at a fixed phase as unknown it decided where the branch ended."""
+    branch = ff.frequency_response(one_sided(0.0, damping, law), (0.3, 2.5))
+    assert branch.complete, branch.status
+    points, amplitudes = story(branch)
+    for phase in SHIFTS:
+        shifted = ff.frequency_response(one_sided(phase, damping, law), (0.3, 2.5))
+        assert shifted.complete, (phase, shifted.status)
+        its_points, its_amplitudes = story(shifted)
+        close(f"special points at {phase}", its_points, points, rel=1e-9)
+        close(f"amplitudes at {phase}", its_amplitudes, amplitudes, rel=1e-9)
+
+
+def test_the_public_state_stays_at_phase_zero() -> None:
+    """Wherever the section has moved to, an orbit's state is the one at t = 0."""
+    branch = ff.frequency_response(one_sided(0.0, 1.0), (0.3, 2.5))
+    assert (branch.traced.record.phase != 0.0).any()
+    for i in range(0, branch.omega.size, 40):
+        orbit = branch.orbit(i)
+        again = ff.simulate(branch.machine, orbit.omega, periods=1, initial=orbit.state)
+        close("a turn later", again.displacement(0)[-1], orbit.state[0], abs=1e-9)
+        close("trace", orbit.monodromy.trace(), branch.multipliers[i].sum().real, rel=1e-6)
+
+
+@pytest.mark.parametrize("chunk", range(8))
+def test_random_machines_to_the_end(chunk: int) -> None:
+    """Chains with stops of any damping under both laws; benchmarks/paths.py draws anew."""
+    per = MACHINES // 8
+    for number in range(chunk * per, (chunk + 1) * per):
+        machine, interval = draw()(SEED, number)
+        branch = ff.frequency_response(machine, interval)
+        assert branch.complete, (number, branch.status)
+
+
+@pytest.mark.parametrize(
+    ("machine", "interval"),
+    [
+        (ff.load("rig-lin2024").replace(stop_law="compression-only"), (5.0, 475.0)),
+        *(
+            (
+                ff.load("ffs0827").replace(stop_damping=2.0 * ratio * math.sqrt(8.1e6 * 231.6)),
+                (5.0, 250.0),
+            )
+            for ratio in (0.7, 1.0)
+        ),
+        (
+            ff.load("ffs0827").replace(
+                stop_damping=2.0 * 0.4 * math.sqrt(8.1e6 * 231.6), clearance_minus=4e-3
+            ),
+            (5.0, 250.0),
+        ),
+    ],
+    ids=["rig", "ratio-0.7", "ratio-1", "unequal-gaps"],
+)
+def test_damped_stops_of_the_bundled_machines(machine, interval) -> None:
+    branch = ff.frequency_response(machine, interval)
+    assert branch.complete, branch.status
+    assert (branch.omega[0], branch.omega[-1]) == interval
+
+
+def test_a_branch_turns_back_where_it_grazes() -> None:
+    """Past the peak the motion in contact meets the one without where that begins to graze.
+
+    Both lie on the side of higher speed: the fold stands at the grazing itself, which the linear
+    motion tells.
+    """
+    machine = one_sided(0.0, 4.0, "compression-only")
+    gap = machine.springs[0].gaps[0]
+    grazing = brentq(lambda w: abs(complex_amplitude(machine, w)[0]) - gap, 1.2, 2.5, xtol=1e-13)
+    branch = ff.frequency_response(machine, (0.3, 2.5))
+    assert branch.complete, branch.status
+    turn = min(branch.omega[np.flatnonzero(np.diff(branch.omega) < 0.0) + 1])
+    close("where it turns", turn, grazing, rel=1e-6)
+    assert branch.orbits_at(grazing + 1e-3)[0].amplitude(0) > gap
+
+
+def test_both_sides_met_at_once_go_on_evenly() -> None:
+    """A third stop, never met, keeps the machine from being its own mirror image in the file.
+
+    Where both sides of the symmetric stop graze at once, motions that lean branch off; the branch
+    is the even one, that of the machine without the third stop.
+    """
+    even = ff.load("ffs0827").replace(stop_law="compression-only")
+    system = even.system()
+    idle = ff.ClearanceSpring([1.0, 0.0], 1e6, 1e3, 0.5, math.inf)
+    both = ff.MechanicalSystem(
+        system.M, system.C, system.K, (*system.springs, idle), system.excitation
+    )
+    ours, reference = (ff.frequency_response(m, (5.0, 250.0)) for m in (both, even))
+    assert ours.complete
+    for speed in (100.0, 150.0, 203.0, 240.0):
+        mine, its = (
+            sorted(o.amplitude([1.0, -1.0]) for o in b.orbits_at(speed)) for b in (ours, reference)
+        )
+        close(f"amplitudes at {speed}", mine, its, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("omega", "stable"), [(206.4035, [26.667e-3, 6.594e-3]), (198.6502716, [39.447e-3, 8.3918e-3])]
+)
+def test_motions_beside_a_fold(omega: float, stable: list[float]) -> None:
+    """Both motions of the fold are found, and each word comes from its own multipliers."""
+    branch = ff.frequency_response(ff.load("ffs0827"), (5.0, 250.0))
+    orbits = branch.orbits_at(omega)
+    assert len(orbits) == 3
+    close("stable", [o.amplitude("relative") for o in orbits if o.stable], stable, rel=1e-4)
+    assert all(o.stable == bool(abs(o.multipliers[0]) < 1.0) for o in orbits)
