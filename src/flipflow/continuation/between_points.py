@@ -13,21 +13,31 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
 from flipflow.continuation.correction import (
+    SHARP,
     Corrector,
     Course,
     bring_home,
+    chord_behind,
+    correct,
     correct_between,
+    new_tangent,
+    recall,
 )
 from flipflow.continuation.frequency_loop import (
     Record,
     load,
     trace,
 )
-from flipflow.continuation.problem import depths, set_section
+from flipflow.continuation.problem import depths, residual, set_section
 
 TRACE_ALL = -1  # in place of a step: follow the whole branch
 FOLD = -1  # number of the test for a fold; those from 0 on are depths beyond gaps
 SHARE_TOLERANCE = 1e-10  # share of a step to which a zero is located
+MOST_SECANTS = 20  # steps of the search for a grazing along one side of a corner
+FARTHEST = 3.0  # chords from the side's end to which it is sought
+JUMP = 1e-3  # cosine of the tangent with omega above which a fold found is a jump of it
+SHORT = 0.999  # share of a secant step that is taken, not to pass the grazing
+GRAZED = 1e-6  # share of the chord; a secant step that short is far closer to the grazing
 MOST_ROOT_STEPS = 100  # steps of the search for one zero
 
 
@@ -103,6 +113,82 @@ def zero_between(
 
 
 @kernel
+def special_between(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, low: float, high: float,
+    test: int, course: Course,
+) -> tuple[int, float]:  # fmt: skip
+    """Zero of a test between two shares of step p; at a corner a fold stands where it grazes."""
+    code, share = status.NO_CONVERGENCE, low
+    if test == FOLD:
+        code, share = zero_between(problem, scratch, work, branch, p, low, high, test, course)
+        if code == status.OK and abs(height_of(problem, scratch, work, test)) < JUMP:
+            return code, share
+    if branch.signature[p] != branch.signature[p + 1]:
+        for gap in range(2 * branch.depth.shape[1]):
+            first = branch.depth[p, gap // 2, gap % 2]
+            last = branch.depth[p + 1, gap // 2, gap % 2]
+            if first * last < 0.0 and test in (FOLD, gap):
+                load(problem, scratch, work, branch, p + 1, course)
+                code, share = grazing_between(problem, scratch, work, branch, p, gap, course)
+                if code == status.OK:
+                    return code, share
+    load(problem, scratch, work, branch, p + 1, course)
+    return zero_between(problem, scratch, work, branch, p, low, high, test, course)
+
+
+@kernel
+def grazing_between(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, test: int, course: Course
+) -> tuple[int, float]:
+    """The point within step p at which the branch grazes a gap: status and share.
+
+    It is sought by secants along the side without the contact, which is smooth up to there and a
+    little beyond; at a corner the other side is not. The point is left in work.
+    """
+    n, backwards = work.r.shape[0], branch.depth[p, test // 2, test % 2] < 0.0
+    way = 1.0 if backwards else -1.0
+    if backwards:
+        for k in range(n + 1):
+            point, tangent = work.here[k], work.here_tangent[k]
+            work.here[k], work.here_tangent[k] = work.behind[k], work.behind_tangent[k]
+            work.behind[k], work.behind_tangent[k] = point, tangent
+    recall(problem, work, course)
+    chord = chord_behind(work)
+    s_before, s = -0.5 * way * chord, 0.0
+    code, f_before = height_beside(problem, scratch, work, s_before, test, course)
+    for _ in range(MOST_SECANTS):
+        if code != status.OK or not abs(s) <= FARTHEST * chord:
+            return status.NO_CONVERGENCE, 0.0
+        code, f = height_beside(problem, scratch, work, s, test, course)
+        if code == status.OK and abs(s - s_before) <= GRAZED * chord:
+            share = min(abs(s) / chord, 1.0)
+            return code, share if backwards else 1.0 - share
+        if code != status.OK or f > 0.0:
+            # Beyond the grazing a contact disturbs Newton's method.
+            code, s = status.OK, 0.5 * (s + s_before)
+            continue
+        s_before, f_before, s = s, f, s - SHORT * f * (s - s_before) / (f - f_before)
+    return status.NO_CONVERGENCE, 0.0
+
+
+@kernel
+def height_beside(
+    problem: Any, scratch: Any, work: Corrector, step: float, test: int, course: Course
+) -> tuple[int, float]:
+    """Status, and the value of a test at a step along the tangent of the last point."""
+    recall(problem, work, course)
+    for k in range(work.w.shape[0]):
+        work.guess[k] = work.here[k] + step * work.before[k] * work.scale[k]
+        work.border[k] = work.before[k]
+    code, _ = correct(problem, scratch, work, SHARP)
+    if code != status.OK:
+        return code, math.nan
+    new_tangent(work)
+    code = residual(problem, scratch, work.w, float(work.w[work.r.shape[0]]), work.r, work.J)
+    return code, height_of(problem, scratch, work, test)
+
+
+@kernel
 def _next_share(a: float, b: float, c: float, f_a: float, f_b: float, f_c: float) -> float:
     """Share of the way from a to b: inverse quadratic where that is sure to shrink, else half."""
     place, height = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
@@ -140,7 +226,7 @@ def follow(
     if code == status.OK and low == high:
         code = correct_between(problem, scratch, work, low, course)
     elif code == status.OK:
-        code, share = zero_between(problem, scratch, work, branch, p, low, high, test, course)
+        code, share = special_between(problem, scratch, work, branch, p, low, high, test, course)
     if code == status.OK:
         code = bring_home(problem, scratch, work)
     set_section(problem, scratch, 0.0)

@@ -28,6 +28,7 @@ from flipflow.continuation.problem import depths, mirrored, residual, signature
 
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of it at which it is sought
 LEANING = 1e-3  # difference of both sides from which on a motion leans, as a share of the step
+EVEN = 0.1  # the same as a share of the tangent
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 
 
@@ -56,12 +57,18 @@ def begins_to_lean(problem: Any, scratch: Any, work: Corrector, depth: Real, ste
 
 @kernel
 def is_mirror_image(problem: Any, scratch: Any, work: Corrector) -> bool:
-    """Whether the last point's motion is its own mirror image."""
+    """Whether the last point's motion is its own mirror image, and stays so along the branch.
+
+    A branch of leaning motions passes the even one, too, on the way to their mirror images.
+    """
     n, off = work.r.shape[0], 0.0
     omega = float(work.here[n])
     code = residual(mirrored(problem), scratch, work.here, omega, work.r, work.J)
-    for k in range(n):
-        off = max(off, abs(work.r[k]) / work.scale[k])
+    for i in range(n):
+        turn = 0.0
+        for k in range(n + 1):
+            turn += work.J[i, k] * work.before[k] * work.scale[k]
+        off = max(off, abs(work.r[i]) / work.scale[i], LEANING * abs(turn) / (EVEN * work.scale[i]))
     return code == status.OK and off < LEANING
 
 
