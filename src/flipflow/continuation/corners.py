@@ -67,7 +67,7 @@ def is_mirror_image(problem: Any, scratch: Any, work: Corrector) -> bool:
     for i in range(n):
         turn = 0.0
         for k in range(n + 1):
-            turn += work.J[i, k] * work.before[k] * work.scale[k]
+            turn += work.J[i, k] * work.here_tangent[k]
         off = max(off, abs(work.r[i]) / work.scale[i], LEANING * abs(turn) / (EVEN * work.scale[i]))
     return code == status.OK and off < LEANING
 
