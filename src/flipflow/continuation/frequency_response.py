@@ -15,7 +15,7 @@ from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
 from flipflow.dynamics.contact_free import complex_amplitude
-from flipflow.dynamics.first_contact import contact_free_up_to
+from flipflow.dynamics.contact_free_range import contact_free_up_to
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.contact_law import pushes_whole

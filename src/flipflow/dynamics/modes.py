@@ -22,8 +22,8 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.compiled.eigen import Schur, eigenvector, new_schur, real_schur
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import kind
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.errors import InputError
 from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 

@@ -12,9 +12,9 @@ import math
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, carry_tangent, run_flow, segment_state
 from flipflow.dynamics.law import exit_of, signed_gap
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 from flipflow.periodic.shooting import Shooting, ShootingWork
 

@@ -20,6 +20,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import extremes, prepare_search
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
     carry_tangent,
@@ -29,7 +30,6 @@ from flipflow.dynamics.flow import (
     segment_motion,
     segment_state,
 )
-from flipflow.dynamics.machine import MachineArrays
 
 
 class Shooting(NamedTuple):

@@ -14,10 +14,10 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import correction, frequency_loop
-from flipflow.continuation.between_points import FOLD, TRACE_ALL, follow
+from flipflow.continuation.refinement import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
