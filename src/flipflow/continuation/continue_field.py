@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -11,36 +11,31 @@ import numpy as np
 from flipflow import __version__
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.correction import QUICK, SHARP, Course
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
-from flipflow.continuation.field_loop import Path, follow_both_ways
-from flipflow.continuation.field_path import (
-    FieldEquations,
-    FieldFollower,
-    FieldPoint,
-    FoldEquations,
-    SystemAt,
-    meeting_over_field,
-)
+from flipflow.continuation.field_solver import FieldPoint, FieldSolver, FoldSolver, SystemAt
+from flipflow.continuation.refinement import FOLD as OF_FOLD
 from flipflow.continuation.special_points import (
-    CONTACT_BEGIN,
     DOUBLING,
     FOLD,
-    NEIMARK_SACKER,
     STABILITY_CHANGES,
     SYMMETRY,
     Test,
+    find_special_points,
     zeros_of,
 )
-from flipflow.continuation.switching import image
+from flipflow.continuation.switching import follow_both_ways
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_monitor, checked_pair, checked_word
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.solver import Formulation, Point
-from flipflow.periodic.stability import UNDETERMINED, determinant_plus, neimark_sacker
+from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Traced
+from flipflow.periodic.stability import UNDETERMINED
 
+POINTS = 200  # the longest step in the field is the interval divided by this
+SPECIAL_SHARE = 0.8  # of the work is done where the special points are sought
 CUSP = "cusp"
 
 
@@ -88,19 +83,24 @@ def continue_fold(
     screen, value = _screen_and_value(orbit, field)
     bounds = _check_bounds(screen, field, value, interval)
     own = orbit.point.formulation
-    equations = FoldEquations(
-        _system_of(screen, field), bounds, value, orbit.omega,
+    solver = FoldSolver(
+        _system_of(screen, field), bounds, value,
         half_turn=own.half_turn and _stays_symmetric(screen, field, bounds), turns=own.turns,
     )  # fmt: skip
-    path = follow_both_ways(equations, np.concatenate([orbit.state, [orbit.omega, value]]), say)
-    tangents = np.array([point.tangent[-1] for point in path.points])
-    tests = [Test(CUSP, tangents, lambda point: point.omega_tangent)]
-    found, notes = zeros_of(tests, FieldFollower(equations), path)
+    u = np.append(orbit.state, orbit.omega)
+    traced = follow_both_ways(solver, u, value, _course(bounds, SHARP), say).traced
+    say("special points", SPECIAL_SHARE)
+    zero = partial(solver.zero_between, traced, OF_FOLD)
+    test = Test(CUSP, traced.tangent[:, -1], lambda point: point.omega_tangent, zero=zero)
+    found, notes = zeros_of([test], solver, traced)
+    turns = np.diff(np.sign(traced.tangent[:, -2])) != 0.0
     special = [
-        _special(screen, field, _kind_on_fold(path, one.index), one.point, one.index + one.share)
+        _special(
+            screen, field, CUSP if turns[one.index] else FOLD, one.point, one.index + one.share
+        )
         for one in found
     ]
-    return _finished(screen, field, equations, path, special, notes, UNDETERMINED)
+    return _finished(screen, field, solver, traced, special, notes, UNDETERMINED)
 
 
 def field_branch(
@@ -110,22 +110,29 @@ def field_branch(
     screen, value = _screen_and_value(orbit, field)
     bounds = _check_bounds(screen, field, value, interval)
     half_turn = sought.half_turn and _stays_symmetric(screen, field, bounds)
-    equations = FieldEquations(
+    solver = FieldSolver(
         _system_of(screen, field), bounds, value, orbit.omega,
         half_turn=half_turn, turns=sought.turns,
     )  # fmt: skip
-    path = follow_both_ways(equations, np.append(orbit.state, value), monitor)
-    found, notes = zeros_of(_tests(equations, path), FieldFollower(equations), path)
+    followed = follow_both_ways(solver, orbit.state, value, _course(bounds, QUICK), monitor)
+    traced = followed.traced
+    monitor("special points", SPECIAL_SHARE)
+    maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
+    found, notes = find_special_points(solver, traced, maps, solver.eigenvalues(traced, maps))
     special = [
         _special(screen, field, one.kind, one.point, one.index + one.share, one.spring, one.side)
         for one in found
     ]
-    ends = ((path.crossed_start, 0, -0.5), (path.crossed_end, -1, len(path.points) - 0.5))
-    for crossed, p, at in ends:
-        if crossed:
-            special += _meeting(screen, field, equations, path, p, at)
-    special.sort(key=lambda point: point.position)
-    return _finished(screen, field, equations, path, special, notes, None)
+    kind = DOUBLING if sought.turns % 2 == 0 else SYMMETRY
+    ends = (followed.start, -0.5), (followed.end, traced.omega.size - 0.5)
+    met = [_special(screen, field, kind, point, at) for point, at in ends if point is not None]
+    special = sorted([*special, *met], key=lambda point: point.position)
+    return _finished(screen, field, solver, traced, special, notes, None)
+
+
+def _course(bounds: tuple[float, float], tolerance: float) -> Course:
+    low, high = bounds
+    return Course(low, high, (high - low) / POINTS, STEP_SHARE, 1.0, tolerance)
 
 
 def _screen_and_value(orbit: Orbit, field: str) -> tuple[FlipFlowScreen, float]:
@@ -164,62 +171,6 @@ def _system_of(screen: FlipFlowScreen, field: str) -> SystemAt:
     return lambda value: screen.replace(**{field: value}).system()
 
 
-def _tests(equations: FieldEquations, path: Path) -> list[Test]:
-    """Fold, loss of symmetry or period doubling, Neimark-Sacker, and the depth of each contact."""
-    points = [equations.point(solved) for solved in path.points]
-    evaluations: list[tuple[str, int, Callable[[Point], float]]] = [
-        (FOLD, 0, lambda point: point.omega_tangent),
-        (
-            SYMMETRY if equations.half_turn else DOUBLING,
-            0,
-            lambda point: float(determinant_plus(point.return_map)),
-        ),
-        (NEIMARK_SACKER, 0, lambda point: float(neimark_sacker(point.eigenvalues))),
-        (CONTACT_BEGIN, 1, lambda point: _depth(point, 1)),
-    ]
-    if not equations.half_turn:
-        evaluations.append((CONTACT_BEGIN, -1, lambda point: _depth(point, -1)))
-    return [
-        Test(kind, np.array([height(point) for point in points]), height, 0 if side else -1, side)
-        for kind, side, height in evaluations
-    ]
-
-
-def _depth(point: Point, side: int) -> float:
-    """Greatest depth in m beyond the gap on a side; NaN for a value without a gap there."""
-    solver = point.formulation.solver()
-    springs = solver.springs
-    gap = springs[0].gaps[0 if side > 0 else 1] if springs else math.inf
-    if math.isinf(gap):
-        return math.nan
-    least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
-    return float((most[0, 0] if side > 0 else -least[0, 0]) - gap)
-
-
-def _kind_on_fold(path: Path, p: int) -> str:
-    """A cusp where omega turns back together with the field, else a turn of the fold curve."""
-    before, after = path.points[p].tangent[-2], path.points[p + 1].tangent[-2]
-    return CUSP if before * after < 0.0 else FOLD
-
-
-def _meeting(
-    screen: FlipFlowScreen, field: str, equations: FieldEquations, path: Path, p: int, at: float
-) -> list[FieldSpecialPoint]:
-    """The motion at which an end of the branch meets the one from which it comes."""
-    even = equations.turns % 2 == 0
-    parent = FieldEquations(
-        equations.system_at, (equations.lower, equations.upper), equations.own, equations.omega,
-        half_turn=not even, turns=equations.turns // 2 if even else equations.turns,
-    )  # fmt: skip
-    w = path.points[p].w
-    value = float(w[-1])
-    z = (w[:-1] + image(parent.solver_at(value), w[:-1], equations.omega)) / 2.0
-    point = meeting_over_field(parent, z, value)
-    if point is None:
-        return []
-    return [_special(screen, field, DOUBLING if even else SYMMETRY, point, at)]
-
-
 def _special(
     screen: FlipFlowScreen, field: str, kind: str, point: Point, position: float,
     spring: int = -1, side: int = 0,
@@ -231,17 +182,18 @@ def _special(
 
 
 def _finished(
-    screen: FlipFlowScreen, field: str, equations: FieldEquations, path: Path,
+    screen: FlipFlowScreen, field: str, solver: FieldSolver, traced: Traced,
     special: list[FieldSpecialPoint], notes: list[str], word: str | None,
 ) -> FieldBranch:  # fmt: skip
-    points = [equations.point(solved) for solved in path.points]
+    points = solver.points(traced)
+    machines = [screen.replace(**{field: float(value)}) for value in traced.omega]
     return FieldBranch(
         machine=screen,
         field=field,
-        orbits=tuple(Orbit(screen.replace(**{field: p.value}), p, word) for p in points),
-        values=np.array([point.value for point in points]),
+        orbits=tuple(Orbit(m, point, word) for m, point in zip(machines, points, strict=True)),
+        values=traced.omega.copy(),
         special_points=tuple(special),
-        status=BranchStatus.from_code(path.code),
+        status=BranchStatus.from_code(traced.code),
         notes=tuple(notes),
         version=__version__,
     )

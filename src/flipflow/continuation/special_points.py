@@ -203,10 +203,7 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
             if np.isinf(gap) or (side < 0 and solver.half_turn):
                 continue
 
-            def evaluate(point: Point, j: int = j, side: int = side, gap: float = gap) -> float:
-                least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
-                return float((most[0, j] if side > 0 else -least[0, j]) - gap)
-
+            evaluate = partial(solver.depth, spring=j, side=at)
             depth = traced.depth[:, j, at]
             zero = partial(solver.zero_between, traced, 2 * j + at)
             tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side, zero=zero))

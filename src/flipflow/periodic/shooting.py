@@ -114,7 +114,9 @@ def shooting_residual(
     problem: Shooting, work: ShootingWork, z: Real, omega: float, r: Real, J: Real
 ) -> int:
     """r = sign flow(z) - z and J = [dr/dz, dr/d omega], shapes (2 N,) and (2 N, 2 N + 1)."""
-    size = r.shape[0]
+    if not omega > 0.0:
+        return status.NO_CONVERGENCE
+    size = work.rate.shape[0]
     U = work.tangent
     code = shoot(problem, work, z, omega, U)
     if code != status.OK:

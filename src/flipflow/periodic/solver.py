@@ -219,6 +219,12 @@ class Solver(ABC):
         low, high, _ = self.extremes(u, omega, self.machine.direction)
         return low, high
 
+    def depth(self, point: Point, spring: int, side: int) -> float:
+        """Greatest depth in m of a motion beyond a gap: side 0 plus, 1 minus."""
+        least, most = self.gap_extremes(point.u[None], np.array([point.omega]))
+        reach = most[0, spring] if side == 0 else -least[0, spring]
+        return float(reach - self.springs[spring].gaps[side])
+
     @abstractmethod
     def states(self, u: Real, omega: Real) -> Real:
         """State (x, x') at t = 0, shape (P, 2 N)."""
@@ -310,9 +316,7 @@ class Solver(ABC):
         code, _, share = self._follow(traced.record, traced.u[p], 0.0, course, p, (low, high), test)
         if code != status.OK:
             omega = traced.omega[p]
-            raise IncompleteError(
-                f"no point found between two of the branch near {omega:.6g} rad/s"
-            )
+            raise IncompleteError(f"no point found between two of the branch near {omega:.6g}")
         w, tangent = self.corrector.home, float(self.corrector.tangent[-1])
         at_home = self.corrector.phase[0] == 0.0
         J = self.corrector.J[:, :-1] if at_home else None

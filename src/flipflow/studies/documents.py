@@ -20,7 +20,7 @@ from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
-from flipflow.continuation.field_path import FieldPoint
+from flipflow.continuation.field_solver import FieldPoint
 from flipflow.continuation.frequency_response import formulation_of, method_of
 from flipflow.model.arguments import (
     checked_count,
