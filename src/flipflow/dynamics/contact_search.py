@@ -21,8 +21,8 @@ import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.law import Stops, exit_of, signed_gap
-from flipflow.model.contact_law import ENTERED, MOST_EXITS, NO_EXIT, OPEN
+from flipflow.dynamics.law import Stops, entered, exit_of, signed_gap
+from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 
 NOTHING = -9  # no regime: nothing has changed yet
 MAX_SEARCH = 20_000  # steps of one search; thirty are usual
@@ -212,9 +212,10 @@ def spring_change(
     if regime == OPEN:
         up = stops.gap[j, 0] - y
         down = y + stops.gap[j, 1]
+        piece = entered(stops, j)
         return _sooner(
-            _approach(up, -v, -a, second, third, scale, ENTERED),
-            _approach(down, v, a, second, third, scale, -ENTERED),
+            _approach(up, -v, -a, second, third, scale, piece),
+            _approach(down, v, a, second, third, scale, -piece),
         )
     side = 1 if regime > OPEN else -1
     gap = signed_gap(stops, j, regime)
