@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import resources
 from typing import get_args
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import flipflow as ff
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.model.contact_law import LAWS, ContactLaw, Exit
+from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from flipflow.studies.assessment import energy_balance
 from flipflow.studies.quantity_values import Working
@@ -228,6 +230,51 @@ def test_corner_at_grazing(screen, greatest) -> None:
     close("undamped-rebound", corner["undamped-rebound"], kicked, abs=1e-3 * size)
     for law in ("paper", "elasto-gap"):
         close(law, corner[law], np.zeros((4, 4)), abs=1e-3 * size)
+
+
+@pytest.mark.parametrize("law", NAMES)
+@pytest.mark.parametrize("damping", [1e-6, 1.0, 100.0, 2.605e3])
+def test_contact_begins_where_the_linear_machine_meets_the_gap(screen, law, damping) -> None:
+    """Row 10: 81.0637405 rad/s, whatever the law, refined to 1e-6."""
+    branch = ff.frequency_response(
+        screen.replace(stop_law=law, stop_damping=damping), (60.0, 100.0)
+    )
+    (begin,) = branch.points_of("contact begin")
+    close("contact begins", begin.omega, 81.0637405, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_all_laws_in_one_machine(seed: int) -> None:
+    """Four masses, a stop of another law on each: five turns from a random state, to 1e-8."""
+    shape = 2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
+    springs = [
+        ff.ClearanceSpring(np.eye(4)[k], 20.0 + k, 1.0 + k, 0.3, 0.4, law)
+        for k, law in enumerate(NAMES)
+    ]
+    system = ff.MechanicalSystem(
+        np.eye(4), 0.1 * shape, shape, springs, ff.HarmonicForce([1.0, 0.0, 0.0, 0.5j])
+    )
+    z, end = np.random.default_rng(seed).normal(size=8), 5.0 * 2.0 * np.pi
+    path = integrate.flow(integrate.Machine.of(system), z, 1.0, 0.0, end)
+    assert {state for states in path.states for state in states} == {
+        "open", "engaged", "released", "outwards", "doubled"
+    }  # fmt: skip
+    got = ExactSolver(system, half_turn=False).settled(z, 1.0, 5)
+    close("state after five turns", got, path.final, abs=SHARE)
+
+
+@pytest.mark.parametrize("law", NEW)
+def test_laws_are_written_and_read_again(screen, law, tmp_path) -> None:
+    """A branch, saved and opened, is of the same machine; a machine file names the law."""
+    branch = ff.frequency_response(screen.replace(stop_law=law), (100.0, 120.0))
+    ff.save(branch, tmp_path / "branch.json")
+    again = ff.open_result(tmp_path / "branch.json")
+    assert again.machine.stop_law == law
+    assert again.orbits_at(110.0)[0].state.tolist() == branch.orbits_at(110.0)[0].state.tolist()
+    text = resources.files("flipflow.io").joinpath("machines/ffs0827.toml").read_text()
+    file = tmp_path / "machine.toml"
+    file.write_text(text.replace('law = "paper"', f'law = "{law}"'))
+    assert ff.load(file).stop_law == law
 
 
 @pytest.mark.parametrize("law", NAMES)

@@ -191,9 +191,12 @@ def next_change(
         step = math.inf
         for j in range(regime.shape[0]):
             low, new = spring_change(motion, stops, regime[j], count, j)
-            if new != NOTHING and not (t == 0.0 and j == fired):
-                # The last step may have been the smallest one: Newton takes back what it overshot.
-                return max(t + max(min(low, least), -least), 0.0), j, new
+            if new != NOTHING:
+                if not (t == 0.0 and j == fired):
+                    # The last step may have been the smallest: Newton takes back what it overshot.
+                    return max(t + max(min(low, least), -least), 0.0), j, new
+                # Newton's step is no safe one where a function and its rate vanish together.
+                low = least
             step = min(step, max(low, least))
         t += step
         if t >= horizon:
