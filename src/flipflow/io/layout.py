@@ -157,7 +157,7 @@ def _machine_entries() -> Iterable[Entry]:
     )  # fmt: skip
     yield Entry(
         "stops", "law", "choice",
-        "Force law: the paper's, never a pull, no damping on the way out, damping no more than spring.",
+        "Force law: the paper's, no pull, no damping on the way out, damping within the spring's force.",
         "paper", choices=get_args(ContactLaw),
     )  # fmt: skip
     yield Entry(

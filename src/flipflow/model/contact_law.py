@@ -11,9 +11,9 @@ and leaves the piece when a switching function
 
 falls through zero. Between two changes the machine is therefore linear, whatever the law. A
 regime is a piece with its side: 0 open, q or -q piece q on the plus or minus side. A side is
-entered at the gap, with the piece that holds at p = 0 and p' > 0; there the force jumps by f_c c p'.
-From piece to piece it does not jump: what two pieces differ by vanishes with the h between them.
-Without damping every law is k p down to the gap, which piece 1 is.
+entered at the gap, with the piece that holds at p = 0 and p' > 0; there the force jumps by
+f_c c p'. From piece to piece it does not jump: what two pieces differ by vanishes with the h
+between them. Without damping every law is k p down to the gap, which piece 1 is.
 
 =================  ==================================  ==========================================
 law                force in contact                    source

@@ -9,8 +9,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from flipflow import __version__
 from flipflow.continuation.branch import Branch
 from flipflow.dynamics.normal import NormalMotion
