@@ -157,7 +157,7 @@ def _machine_entries() -> Iterable[Entry]:
     )  # fmt: skip
     yield Entry(
         "stops", "law", "choice",
-        "Force law: the paper's, no pull, no damping on the way out, damping within the spring's force.",
+        "Force law: the paper's, no pull, no damping outwards, damping within the spring's force.",
         "paper", choices=get_args(ContactLaw),
     )  # fmt: skip
     yield Entry(
