@@ -301,7 +301,7 @@ def test_without_damping_all_laws_are_one(screen, law) -> None:
 def test_laws_run_through_time(screen, law) -> None:
     """simulate, basins and start_up reach the motion of the branch, and start-up keeps its books.
 
-    The work of damping never falls: what elasto-gap carries beyond its spring is damping.
+    What is lost never falls: what elasto-gap carries beyond its spring is damping.
     """
     machine = screen.replace(stop_law=law, stop_damping=2e4)
     orbit = upper_orbit(ff.frequency_response(machine, (60.0, 120.0)), 120.0)
@@ -316,6 +316,9 @@ def test_laws_run_through_time(screen, law) -> None:
     assert [round(o.amplitude("relative") / orbit.amplitude("relative"), 8)
             for o in basins.orbits] == [1.0]  # fmt: skip
     run = ff.start_up(machine, ff.SpeedProfile((0.0, 5.0, 8.0), (0.0, 120.0, 120.0)))
+    e, lost = run.history.energy, run.history.works["dissipated"]
+    close("energy of the run, J", e["input"], e["dissipated"] + e["stored"], rel=1e-6)
+    assert np.diff(lost).min() >= -1e-12 * lost[-1]
     last = run.history.displacement("relative")[run.history.t > 7.9]
     close("after start-up", np.ptp(last) / 2.0, orbit.amplitude("relative"), rel=1e-3)
 
