@@ -73,7 +73,10 @@ def new_modes(machine: MachineArrays) -> Modes:
     states = place.pop()
     modes = 2 * n
     if states > MOST_STATES or states * (2 * modes + 2 * m) * modes * 16 > MOST_BYTES:
-        remedy = "give at most 12 springs with a gap, fewer of a large machine"
+        remedy = (
+            "give at most 12 springs with a gap, 7 of laws with three forces, fewer of a large "
+            "machine"
+        )
         raise InputError("springs", m, remedy)
     table = (states, modes)
     return Modes(
