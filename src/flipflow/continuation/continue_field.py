@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import cast
 
@@ -26,10 +25,10 @@ from flipflow.continuation.special_points import (
 )
 from flipflow.continuation.switching import follow_both_ways
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_monitor, checked_pair, checked_word
-from flipflow.model.fields import MOTION_FIELDS
+from flipflow.model.arguments import checked_monitor, checked_pair
 from flipflow.model.monitor import Monitor
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.parameters import Parameter, parameter_of
+from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Traced
 from flipflow.periodic.stability import UNDETERMINED
@@ -55,14 +54,15 @@ def continue_fold(
     Parameters
     ----------
     fold
-        A fold of a branch over frequency of a :class:`~flipflow.FlipFlowScreen`.
+        A fold of a branch over frequency.
     field
-        A field of the screen, such as "clearance".
+        A field of the screen, such as "clearance", or of any frozen dataclass with ``.system()``;
+        of a plain system "forcing", a factor on the excitation, or a path such as
+        "springs[0].clearance".
     interval
         (low, high) in the field's SI unit; it holds the machine's own value.
     monitor
-        Called before each step with a sentence and the share of the interval that has been passed;
-        raise from it to cancel.
+        Called before each way with a sentence and the share done; raise from it to cancel.
 
     Returns
     -------
@@ -80,54 +80,54 @@ def continue_fold(
         raise InputError("fold", fold, "give a fold of a branch, such as branch.folds[0]")
     say = checked_monitor(monitor)
     orbit = fold.orbit
-    screen, value = _screen_and_value(orbit, field)
-    bounds = _check_bounds(screen, field, value, interval)
+    parameter = parameter_of(orbit.machine, field)
+    bounds = _check_bounds(parameter, interval)
     own = orbit.point.formulation
     solver = FoldSolver(
-        _system_of(screen, field), bounds, value,
-        half_turn=own.half_turn and _stays_symmetric(screen, field, bounds), turns=own.turns,
+        _system_of(parameter), bounds, parameter.value,
+        half_turn=own.half_turn and _stays_symmetric(parameter, bounds), turns=own.turns,
     )  # fmt: skip
     u = np.append(orbit.state, orbit.omega)
-    traced = follow_both_ways(solver, u, value, _course(bounds, SHARP), say).traced
+    traced = follow_both_ways(solver, u, parameter.value, _course(bounds, SHARP), say).traced
     say("special points", SPECIAL_SHARE)
     zero = partial(solver.zero_between, traced, OF_FOLD)
     test = Test(CUSP, traced.tangent[:, -1], lambda point: point.omega_tangent, zero=zero)
     found, notes = zeros_of([test], solver, traced)
     turns = np.diff(np.sign(traced.tangent[:, -2])) != 0.0
     special = [
-        _special(
-            screen, field, CUSP if turns[one.index] else FOLD, one.point, one.index + one.share
-        )
+        _special(parameter, CUSP if turns[one.index] else FOLD, one.point, one.index + one.share)
         for one in found
     ]
-    return _finished(screen, field, solver, traced, special, notes, UNDETERMINED)
+    return _finished(orbit.machine, parameter, solver, traced, special, notes, UNDETERMINED)
 
 
 def field_branch(
     orbit: Orbit, field: str, interval: tuple[float, float], sought: Formulation, monitor: Monitor
 ) -> FieldBranch:
     """The branch of a motion over a field, sought as a formulation has it."""
-    screen, value = _screen_and_value(orbit, field)
-    bounds = _check_bounds(screen, field, value, interval)
-    half_turn = sought.half_turn and _stays_symmetric(screen, field, bounds)
+    parameter = parameter_of(orbit.machine, field)
+    bounds = _check_bounds(parameter, interval)
+    half_turn = sought.half_turn and _stays_symmetric(parameter, bounds)
     solver = FieldSolver(
-        _system_of(screen, field), bounds, value, orbit.omega,
+        _system_of(parameter), bounds, parameter.value, orbit.omega,
         half_turn=half_turn, turns=sought.turns,
     )  # fmt: skip
-    followed = follow_both_ways(solver, orbit.state, value, _course(bounds, QUICK), monitor)
+    followed = follow_both_ways(
+        solver, orbit.state, parameter.value, _course(bounds, QUICK), monitor
+    )
     traced = followed.traced
     monitor("special points", SPECIAL_SHARE)
     maps = solver.return_maps(traced.u, traced.omega, traced.jacobian)
     found, notes = find_special_points(solver, traced, maps, solver.eigenvalues(traced, maps))
     special = [
-        _special(screen, field, one.kind, one.point, one.index + one.share, one.spring, one.side)
+        _special(parameter, one.kind, one.point, one.index + one.share, one.spring, one.side)
         for one in found
     ]
     kind = DOUBLING if sought.turns % 2 == 0 else SYMMETRY
     ends = (followed.start, -0.5), (followed.end, traced.omega.size - 0.5)
-    met = [_special(screen, field, kind, point, at) for point, at in ends if point is not None]
+    met = [_special(parameter, kind, point, at) for point, at in ends if point is not None]
     special = sorted([*special, *met], key=lambda point: point.position)
-    return _finished(screen, field, solver, traced, special, notes, None)
+    return _finished(orbit.machine, parameter, solver, traced, special, notes, None)
 
 
 def _course(bounds: tuple[float, float], tolerance: float) -> Course:
@@ -135,61 +135,45 @@ def _course(bounds: tuple[float, float], tolerance: float) -> Course:
     return Course(low, high, (high - low) / POINTS, STEP_SHARE, 1.0, tolerance)
 
 
-def _screen_and_value(orbit: Orbit, field: str) -> tuple[FlipFlowScreen, float]:
-    """The orbit's screen and its value of the field."""
-    machine = orbit.machine
-    if not isinstance(machine, FlipFlowScreen):
-        remedy = "only a FlipFlowScreen has fields; a MechanicalSystem is followed over 'omega'"
-        raise InputError("field", field, remedy)
-    checked_word("field", field, ("omega", *MOTION_FIELDS))
-    value = getattr(machine, field)
-    if value is None or math.isinf(value):
-        raise InputError(field, value, "give the machine a finite value of it first")
-    return machine, float(value)
-
-
-def _check_bounds(
-    screen: FlipFlowScreen, field: str, value: float, interval: object
-) -> tuple[float, float]:
-    """The interval (low, high) of the field, or a sentence that says what is wrong with it."""
-    low, high = checked_pair("interval", interval, f"give (low, high) of {field} in SI")
+def _check_bounds(parameter: Parameter, interval: object) -> tuple[float, float]:
+    """The interval (low, high) of the parameter, or a sentence that says what is wrong with it."""
+    low, high = checked_pair("interval", interval, f"give (low, high) of {parameter.name} in SI")
     if low >= high:
         raise InputError("interval", interval, "give two finite values, the lower one first")
     for end in (low, high):
-        screen.replace(**{field: end})
-    if not low <= value <= high:
-        remedy = f"the machine's {field} is {value:.9g}; give an interval that holds it"
-        raise InputError("interval", interval, remedy)
+        parameter.at(end)
+    if not low <= parameter.value <= high:
+        own = f"the machine's {parameter.name} is {parameter.value:.9g}"
+        raise InputError("interval", interval, f"{own}; give an interval that holds it")
     return low, high
 
 
-def _stays_symmetric(screen: FlipFlowScreen, field: str, bounds: tuple[float, float]) -> bool:
-    return all(screen.replace(**{field: end}).system().symmetric for end in bounds)
+def _stays_symmetric(parameter: Parameter, bounds: tuple[float, float]) -> bool:
+    return all(parameter.at(end).system().symmetric for end in bounds)
 
 
-def _system_of(screen: FlipFlowScreen, field: str) -> SystemAt:
-    return lambda value: screen.replace(**{field: value}).system()
+def _system_of(parameter: Parameter) -> SystemAt:
+    return lambda value: parameter.at(value).system()
 
 
 def _special(
-    screen: FlipFlowScreen, field: str, kind: str, point: Point, position: float,
-    spring: int = -1, side: int = 0,
-) -> FieldSpecialPoint:  # fmt: skip
+    parameter: Parameter, kind: str, point: Point, position: float, spring: int = -1, side: int = 0
+) -> FieldSpecialPoint:
     value = cast("FieldPoint", point).value
     word = UNDETERMINED if kind in (*STABILITY_CHANGES, CUSP) else None
-    orbit = Orbit(screen.replace(**{field: value}), point, word)
+    orbit = Orbit(parameter.at(value), point, word)
     return FieldSpecialPoint(kind, orbit, position, spring, side, value)
 
 
 def _finished(
-    screen: FlipFlowScreen, field: str, solver: FieldSolver, traced: Traced,
+    machine: Machine, parameter: Parameter, solver: FieldSolver, traced: Traced,
     special: list[FieldSpecialPoint], notes: list[str], word: str | None,
 ) -> FieldBranch:  # fmt: skip
     points = solver.points(traced)
-    machines = [screen.replace(**{field: float(value)}) for value in traced.omega]
+    machines = [parameter.at(float(value)) for value in traced.omega]
     return FieldBranch(
-        machine=screen,
-        field=field,
+        machine=machine,
+        field=parameter.name,
         orbits=tuple(Orbit(m, point, word) for m, point in zip(machines, points, strict=True)),
         values=traced.omega.copy(),
         special_points=tuple(special),
