@@ -159,8 +159,8 @@ def branch_document(branch: Branch) -> dict[str, Any]:
     """A branch over frequency."""
     steps = [dataclasses.asdict(step) for step in branch.shortened_steps]
     read_off = _read_off(branch, branch.system)
-    phase = CODEC.form(Real).write(branch.traced.record.phase)
-    return {"shortened_steps": steps, **read_off, **BRANCH.write(branch), "phase": phase}
+    section = CODEC.form(Real).write(branch.traced.record.phase)
+    return {"shortened_steps": steps, **read_off, **BRANCH.write(branch), "section": section}
 
 
 def branch_from(document: Document) -> Branch:
@@ -171,8 +171,8 @@ def branch_from(document: Document) -> Branch:
     n, points = motions.states, read["omega"].size
     maps = read["return_maps"].reshape(points, n, n)
     # Files of the time when every point was solved for at phase 0 do not say so.
-    at_zero = CODEC.form(Real).write(np.zeros(points))
-    phase = CODEC.form(Real).read(document.get("phase", at_zero))
+    stored = document.get("section")
+    phase = np.zeros(points) if stored is None else CODEC.form(Real).read(stored)
     return Branch(
         formulation=solver.formulation,
         traced=_traced_from({**read, "phase": phase}, solver, maps),
