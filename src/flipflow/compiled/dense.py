@@ -59,3 +59,12 @@ def lu_sign(A: NDArray[np.float64], pivot: NDArray[np.int64]) -> float:
         if A[k, k] < 0.0:
             sign = -sign
     return sign
+
+
+@kernel
+def lu_least(A: NDArray[np.float64]) -> float:
+    """Smallest pivot of a factored matrix: small where it is nearly singular."""
+    least = abs(A[0, 0])
+    for k in range(1, A.shape[0]):
+        least = min(least, abs(A[k, k]))
+    return float(least)

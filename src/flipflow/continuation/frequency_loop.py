@@ -14,7 +14,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_sign
+from flipflow.compiled.dense import lu_least, lu_sign
 from flipflow.continuation.corners import TURN_MOST, begins_to_lean, orient, turn_corner
 from flipflow.continuation.correction import (
     TOLERATED,
@@ -56,6 +56,7 @@ BACK = 1.0  # share of a step within which it may then have come back to that po
 MET = 1e-3  # distance from that point of a branch that has
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
 STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
+SINGULAR = 1e-2  # smallest pivot of that matrix, scaled, up to which another branch may cross
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
 # Why a step was refused, as a branch records it.
@@ -171,8 +172,10 @@ def judge(
     if changed and step > CONTACT_STEP:
         return REASON_CONTACT
     other_side = work.side[0] != branch.side[p]
+    # Where another branch crosses the matrix is singular; a mere jump to another strand is not.
+    crossed = step <= STRAND_STEP and (changed or lu_least(work.A) < SINGULAR)
     depths(problem, scratch, float(work.w[n]), work.depth)
-    if (other_side and step > STRAND_STEP) or begins_to_lean(
+    if (other_side and not crossed) or begins_to_lean(
         problem, scratch, work, branch.depth[p], step
     ):
         return REASON_STRAND
