@@ -291,4 +291,4 @@ def choose_section(problem: Any, scratch: Any, work: Corrector) -> int:
     code = residual(problem, scratch, work.here, omega, work.r, work.J)
     if code != status.OK:
         return code
-    return move_section(problem, scratch, work, better_section(problem, scratch, omega, True))
+    return move_section(problem, scratch, work, better_section(problem, scratch, omega))

@@ -282,7 +282,7 @@ def advance(
 ) -> int:
     """Accept the corrected point as point p; the section moves where contacts change near it."""
     omega = float(work.w[work.r.shape[0]])
-    phase = better_section(problem, scratch, omega, False)
+    phase = better_section(problem, scratch, omega)
     code = store(problem, scratch, work, branch, p)
     for k in range(work.w.shape[0]):
         work.behind[k], work.behind_tangent[k] = work.here[k], work.here_tangent[k]

@@ -61,7 +61,7 @@ _SCALE: dict[type, Any] = {
 
 
 @kernel
-def _no_better(problem: Any, scratch: Any, omega: float, anew: bool) -> float:
+def _no_better(problem: Any, scratch: Any, omega: float) -> float:
     return 0.0
 
 
@@ -126,9 +126,9 @@ def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
     _SCALE[type(problem)](problem, u, omega, scale)
 
 
-def better_section(problem: Any, scratch: Any, omega: float, anew: bool) -> float:
+def better_section(problem: Any, scratch: Any, omega: float) -> float:
     """Phase to which the section had better move for the motion of the last residual."""
-    return float(_BETTER[type(problem)](problem, scratch, omega, anew))
+    return float(_BETTER[type(problem)](problem, scratch, omega))
 
 
 def carried(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> int:
@@ -191,11 +191,11 @@ def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
 
 
 @chosen_by_type(better_section)
-def _better_section(problem: Any, scratch: Any, omega: Any, anew: Any) -> Any:
+def _better_section(problem: Any, scratch: Any, omega: Any) -> Any:
     chosen = _BETTER[_kind(problem)]
 
-    def run(problem: Any, scratch: Any, omega: Any, anew: Any) -> Any:
-        return chosen(problem, scratch, omega, anew)
+    def run(problem: Any, scratch: Any, omega: Any) -> Any:
+        return chosen(problem, scratch, omega)
 
     return run
 

@@ -239,9 +239,9 @@ def varied_scale(problem: Varied, u: Real, value: float, scale: Real) -> None:
 
 
 @kernel
-def varied_better(problem: Varied, work: VariedWork, value: float, anew: bool) -> float:
+def varied_better(problem: Varied, work: VariedWork, value: float) -> float:
     """The shooting's better section."""
-    return section.better_section(problem.shooting, work.shooting, float(work.at[1]), anew)
+    return section.better_section(problem.shooting, work.shooting, float(work.at[1]))
 
 
 @kernel

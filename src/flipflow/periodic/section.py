@@ -67,17 +67,14 @@ def _distance(
 
 
 @kernel
-def better_section(problem: Shooting, work: ShootingWork, omega: float, anew: bool) -> float:
-    """Where the section had better stand for the motion last flown: mostly where it stands.
-
-    ``anew``: look for it even where the state is not near a change of contact.
-    """
+def better_section(problem: Shooting, work: ShootingWork, omega: float) -> float:
+    """Where the section had better stand for the motion last flown: mostly where it stands."""
     flow, machine, stands = work.flow, problem.machine, float(work.section[0])
     if machine.direction.shape[0] == 0:
         return stands
     segment_state(flow, 0, omega, 0.0, work.start, work.first_rate)
     here = margin(machine, flow, 0, work.start, omega)
-    if here > min(NEAR, WORN * work.section[1]) and not anew:
+    if here > min(NEAR, WORN * work.section[1]):
         return stands
     angle = problem.fraction * 2.0 * math.pi
     count = int(CANDIDATES * max(problem.fraction, 1.0))
@@ -130,7 +127,7 @@ def carried(problem: Shooting, work: ShootingWork, w: Real, tangent: Real, end: 
 
 @kernel
 def set_section(problem: Shooting, work: ShootingWork, phase: float) -> None:  # noqa: ARG001
-    """Let the unknown be the state at a phase of the force."""
+    """Let the unknown be the state at a phase of the force; phase 0 forgets the last choice."""
     work.section[0] = phase
     if phase == 0.0:
         work.section[1] = math.inf
