@@ -103,3 +103,34 @@ def test_what_is_no_parameter_is_refused(machine, field: str) -> None:
     orbit = upper(machine, 1.4, (0.9, 2.5))
     with pytest.raises(InputError):
         ff.continue_orbit(orbit, field, (0.1, 1.0))
+
+
+def test_folds_of_leaning_motions_are_followed() -> None:
+    """They are no motions of which others branch off."""
+    narrow = ff.load("ffs0827").replace(clearance=1e-3)
+    branch = ff.frequency_response(narrow, (50.0, 100.0))
+    (leaning, *_) = branch.points_of("symmetry breaking")
+    child = ff.switch_branch(leaning, (40.0, 110.0))
+    curve = ff.continue_fold(child.folds[0], "clearance", (0.9e-3, 1.1e-3))
+    assert np.abs(curve.multipliers - 1.0).min(axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "bounds"),
+    [
+        ({"clearance": math.inf}, "main_mass", (800.0, 1000.0)),
+        ({"clearance": 0.0}, "main_mass", (800.0, 1000.0)),
+        ({"clearance": 0.0}, "clearance", (0.0, 6e-3)),
+        ({"stop_law": "elasto-gap"}, "stop_damping", (0.0, 5000.0)),
+    ],
+)
+def test_machines_without_a_stop_and_ends_at_zero(changes, field: str, bounds) -> None:
+    machine = ff.load("ffs0827").replace(**changes)
+    orbit = ff.frequency_response(machine, (5.0, 150.0)).orbits_at(120.0)[0]
+    branch = ff.continue_orbit(orbit, field, bounds)
+    assert branch.complete, branch.status
+    assert (branch.values.min(), branch.values.max()) == bounds
+    for i in (0, -1):
+        alone = ff.frequency_response(branch.orbit(i).machine, (5.0, 150.0)).orbits_at(120.0)
+        sizes = np.array([one.amplitude("main") for one in alone])
+        assert np.abs(sizes - branch.amplitude("main")[i]).min() < 1e-9

@@ -154,3 +154,13 @@ def test_motions_beside_a_fold(omega: float, stable: list[float]) -> None:
     assert len(orbits) == 3
     close("stable", [o.amplitude("relative") for o in orbits if o.stable], stable, rel=1e-4)
     assert all(o.stable == bool(abs(o.multipliers[0]) < 1.0) for o in orbits)
+
+
+@pytest.mark.parametrize("share", [1e-9, 1e-7, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(3)], ids=repr)
+def test_gaps_that_are_nearly_equal(share: float, method) -> None:
+    """Only a stop that is exactly the same on both sides keeps a branch even."""
+    screen = ff.load("ffs0827")
+    machine = screen.replace(clearance_minus=screen.clearance * (1.0 + share))
+    branch = ff.frequency_response(machine, (60.0, 250.0), method)
+    assert branch.complete, branch.status

@@ -33,7 +33,7 @@ def helix_tangent(s: float) -> np.ndarray:
 
 def distance_from_helix(step: float, bends: bool) -> float:
     """How far the guess lies from the curve, a step beyond two points a step apart."""
-    work = new_corrector(2, 0)
+    work = new_corrector(2, np.zeros(0))
     work.behind[:], work.behind_tangent[:] = helix(-step), helix_tangent(-step)
     work.here[:], work.before[:] = helix(0.0), helix_tangent(0.0)
     assert not predicted(work, step, ANYWHERE, bends)

@@ -30,7 +30,7 @@ from flipflow.compiled.folders import FOLDERS
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# The oldest and the newest numba with which parts.py and cache.py have been tried.
+# The oldest and the newest numba with which entries.py, parts.py and cache.py work.
 TRIED = ((0, 61), (0, 68))
 OWN_CACHE = TRIED[0] <= tuple(map(int, numba.__version__.split(".")[:2])) <= TRIED[1]
 logger = logging.getLogger("flipflow")
@@ -89,7 +89,7 @@ else:
     logger.debug("numba %s has not been tried: kernels compile slower", numba.__version__)
 
 # Of numba's own settings those that change the code it makes; OPT by the making of machine code,
-# whose level numba takes when it is first used, and not from parts.py.
+# whose level numba takes when it is first used, and not from entries.py.
 _SETTINGS = (
     "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX", "DISABLE_INTEL_SVML", "DISABLE_JIT",
     "BOUNDSCHECK", "DEBUGINFO_DEFAULT",

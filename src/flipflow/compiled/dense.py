@@ -62,9 +62,9 @@ def lu_sign(A: NDArray[np.float64], pivot: NDArray[np.int64]) -> float:
 
 
 @kernel
-def lu_least(A: NDArray[np.float64]) -> float:
-    """Smallest pivot of a factored matrix: small where it is nearly singular."""
-    least = abs(A[0, 0])
+def lu_spread(A: NDArray[np.float64]) -> float:
+    """Smallest pivot of a factored matrix as a share of the largest."""
+    least, most = abs(A[0, 0]), abs(A[0, 0])
     for k in range(1, A.shape[0]):
-        least = min(least, abs(A[k, k]))
-    return float(least)
+        least, most = min(least, abs(A[k, k])), max(most, abs(A[k, k]))
+    return float(least / most)

@@ -26,7 +26,7 @@ from flipflow.continuation.correction import (
 )
 from flipflow.continuation.problem import depths, mirrored, residual, signature
 
-ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of it at which it is sought
+ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the other side is sought
 LEANING = 1e-3  # difference of both sides from which on a motion leans, as a share of the step
 EVEN = 0.1  # the same as a share of the tangent
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
@@ -44,7 +44,8 @@ def begins_to_lean(problem: Any, scratch: Any, work: Corrector, depth: Real, ste
     for j in range(work.depth.shape[0]):
         size = abs(work.depth[j, 0] - work.depth[j, 1])
         met = max(work.depth[j, 0], work.depth[j, 1]) > 0.0
-        if abs(depth[j, 0] - depth[j, 1]) > LEANING * work.scale[0]:
+        evenly = work.uneven[j] == 0.0 and abs(depth[j, 0] - depth[j, 1]) <= LEANING * work.scale[0]
+        if not evenly:
             if met:
                 return False
         elif met and size > LEANING * step * work.scale[0]:
@@ -103,21 +104,20 @@ def contacts_beside(problem: Any, scratch: Any, work: Corrector, step: float) ->
 
 @kernel
 def turn_corner(
-    problem: Any, scratch: Any, work: Corrector, depth: Real, came_from: int, step: float,
-    course: Course,
-) -> float:  # fmt: skip
+    problem: Any, scratch: Any, work: Corrector, depth: Real, step: float, course: Course
+) -> float:
     """Go on from the last point round a corner that a contact makes; the step, 0 if there is none.
 
-    The last point has depths (m, 2); the one before it had the contacts ``came_from``. Where both
-    sides of a stop graze at once, neither can be met alone: then the motion that goes on is sought
-    as its own mirror image. The point is left corrected in work.
+    The last point has depths (m, 2). Where both sides of a stop graze at once, neither can be met
+    alone: then the motion that goes on is sought as its own mirror image. The point is left
+    corrected in work.
     """
     recall(problem, work, course)
-    length = go_round(problem, problem, scratch, work, depth, came_from, step, course)
+    length = go_round(problem, problem, scratch, work, depth, step, course)
     if length == 0.0:
         recall(problem, work, course)
         half = mirrored(problem)
-        length = go_round(half, problem, scratch, work, depth, came_from, step, course)
+        length = go_round(half, problem, scratch, work, depth, step, course)
     if length == 0.0:
         recall(problem, work, course)
     return length
@@ -125,14 +125,17 @@ def turn_corner(
 
 @kernel
 def go_round(
-    sought: Any, problem: Any, scratch: Any, work: Corrector, depth: Real, came_from: int,
-    step: float, course: Course,
+    sought: Any, problem: Any, scratch: Any, work: Corrector, depth: Real, step: float,
+    course: Course,
 ) -> float:  # fmt: skip
     """The same for motions of the problem that solve ``sought`` as well.
 
     A little beyond, the other contacts tell the Jacobian of the other side; its tangent is followed
     to where those contacts are.
     """
+    n = work.r.shape[0]
+    code = residual(sought, scratch, work.behind, float(work.behind[n]), work.r, work.J)
+    came_from = signature(sought, scratch) if code == status.OK else -1
     before = look_ahead(sought, scratch, work, 0.0, True)
     contacts = look_ahead(sought, scratch, work, step, True)
     if contacts < 0 or contacts == before or not bordered(work):

@@ -52,6 +52,7 @@ class Corrector(NamedTuple):
     home: Real  # (n + 1,) a point at section 0
     home_tangent: Real  # (n + 1,)
     phase: Real  # (1,) the section
+    uneven: Real  # (m,) difference of both gaps, 0 where a stop is the same on both sides
     w: Real  # (n + 1,)
     guess: Real  # (n + 1,)
     border: Real  # (n + 1,) normal of the plane to solve in
@@ -67,9 +68,9 @@ class Corrector(NamedTuple):
     depth: Real  # (m, 2) depth beyond each gap, as a branch records it
 
 
-def new_corrector(unknowns: int, gaps: int) -> Corrector:
-    """Scratch of the bordered Newton solves."""
-    n = unknowns
+def new_corrector(unknowns: int, uneven: Real) -> Corrector:
+    """Scratch of the bordered Newton solves; ``uneven`` is that of the machine's stops, (m,)."""
+    n, gaps = unknowns, uneven.size
     return Corrector(
         here=np.zeros(n + 1),
         here_tangent=np.zeros(n + 1),
@@ -78,6 +79,7 @@ def new_corrector(unknowns: int, gaps: int) -> Corrector:
         home=np.zeros(n + 1),
         home_tangent=np.zeros(n + 1),
         phase=np.zeros(1),
+        uneven=uneven,
         w=np.zeros(n + 1),
         guess=np.zeros(n + 1),
         border=np.zeros(n + 1),
@@ -163,8 +165,9 @@ def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tu
         code = residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
         if code != status.OK:
             return code, iteration
-        same = signature(problem, scratch) == contacts
-        contacts = signature(problem, scratch)
+        met = signature(problem, scratch)
+        same = met == contacts
+        contacts = met
         if not bordered(work):
             return status.SINGULAR, iteration
         length = newton_update(work)
@@ -277,7 +280,7 @@ def move_section(problem: Any, scratch: Any, work: Corrector, phase: float) -> i
     code = carried(problem, scratch, work.here, work.here_tangent, phase)
     if code == status.OK:
         code = carried(problem, scratch, work.behind, work.behind_tangent, phase)
-    set_section(problem, scratch, phase)
+    set_section(problem, scratch, phase, False)
     work.phase[0] = phase
     return code
 
@@ -286,7 +289,7 @@ def move_section(problem: Any, scratch: Any, work: Corrector, phase: float) -> i
 def choose_section(problem: Any, scratch: Any, work: Corrector) -> int:
     """Take the two points in work, which stand at section 0, to a section that is good there."""
     work.phase[0] = 0.0
-    set_section(problem, scratch, 0.0)
+    set_section(problem, scratch, 0.0, True)
     omega = float(work.here[work.r.shape[0]])
     code = residual(problem, scratch, work.here, omega, work.r, work.J)
     if code != status.OK:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,23 +55,27 @@ class FieldSolver(ExactSolver):
         self, system_at: SystemAt, bounds: tuple[float, float], own: float, omega: float, *,
         half_turn: bool, turns: int,
     ) -> None:  # fmt: skip
-        super().__init__(system_at(own), half_turn=half_turn, turns=turns)
+        low, high = bounds
+        inner = system_at(own if low < own < high else 0.5 * (low + high))
+        kept = [j for j, spring in enumerate(inner.springs) if spring.acts and not spring.bonded]
+        super().__init__(_with_springs(inner, kept), half_turn=half_turn, turns=turns)
         self.system_at, self.bounds, self.own, self.omega = system_at, bounds, own, omega
-        series = machine_series(lambda value: _parts(self._alike(system_at(value))), *bounds)
+        series = machine_series(
+            lambda value: _parts(_with_springs(system_at(value), kept)), *bounds
+        )
         if series is None:
-            low, high = bounds
             raise IncompleteError(
                 f"the machine does not change smoothly between {low:.6g} and {high:.6g}; "
                 "give an interval without a kink"
             )
-        self.varied = Varied(self.problem, series, omega, own)
-        self.problem = self.varied
+        self.problem = Varied(self.problem, series, omega, own)
         self.scratch = new_varied_work(self.shooting_work, self.system.size)
 
-    def _alike(self, system: MechanicalSystem) -> MechanicalSystem:
-        """A system with as many springs as the machine's own, where one's gap closes as well."""
-        bonded = system.with_bonded()
-        return bonded if len(bonded.springs) == len(self.springs) else system
+    @property
+    def uneven(self) -> Real:
+        gap = self.problem.series.gap
+        with np.errstate(invalid="ignore"):
+            return np.where((gap[:, :, 0] == gap[:, :, 1]).all(axis=0), 0.0, 1.0)
 
     def like(self, *, half_turn: bool, turns: int) -> FieldSolver:
         return FieldSolver(
@@ -125,12 +129,21 @@ class FieldSolver(ExactSolver):
 class FoldSolver(FieldSolver):
     """Folds over a field: the frequency is an unknown, too."""
 
+    branches_off = False
+
     def __init__(
         self, system_at: SystemAt, bounds: tuple[float, float], own: float, *, half_turn: bool,
         turns: int,
     ) -> None:  # fmt: skip
         super().__init__(system_at, bounds, own, 0.0, half_turn=half_turn, turns=turns)
         self.unknowns = 2 * self.system.size + 1
+
+
+def _with_springs(system: MechanicalSystem, kept: list[int]) -> MechanicalSystem:
+    """A system with these springs, whatever their gaps; of the others those that always act."""
+    others = [spring for j, spring in enumerate(system.springs) if j not in kept]
+    rest = replace(system, springs=tuple(others)).with_bonded()
+    return replace(rest, springs=tuple(system.springs[j] for j in kept))
 
 
 def _parts(system: MechanicalSystem) -> dict[str, Real]:

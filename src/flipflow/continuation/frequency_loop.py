@@ -14,7 +14,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_least, lu_sign
+from flipflow.compiled.dense import lu_sign, lu_spread
 from flipflow.continuation.corners import TURN_MOST, begins_to_lean, orient, turn_corner
 from flipflow.continuation.correction import (
     TOLERATED,
@@ -56,7 +56,7 @@ BACK = 1.0  # share of a step within which it may then have come back to that po
 MET = 1e-3  # distance from that point of a branch that has
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
 STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
-SINGULAR = 1e-2  # smallest pivot of that matrix, scaled, up to which another branch may cross
+CROSSING = 1e-2  # least pivot of that matrix, as a share of its largest, where others may cross
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
 # Why a step was refused, as a branch records it.
@@ -173,9 +173,9 @@ def judge(
         return REASON_CONTACT
     other_side = work.side[0] != branch.side[p]
     # Where another branch crosses the matrix is singular; a mere jump to another strand is not.
-    crossed = step <= STRAND_STEP and (changed or lu_least(work.A) < SINGULAR)
+    may_cross = step <= STRAND_STEP and (changed or lu_spread(work.A) < CROSSING)
     depths(problem, scratch, float(work.w[n]), work.depth)
-    if (other_side and not crossed) or begins_to_lean(
+    if (other_side and not may_cross) or begins_to_lean(
         problem, scratch, work, branch.depth[p], step
     ):
         return REASON_STRAND
@@ -222,9 +222,9 @@ def passes_start(
     work.home[n] = branch.omega[0]
     for k in range(n + 1):
         work.home_tangent[k] = branch.tangent[0, k]
-    set_section(problem, scratch, 0.0)
+    set_section(problem, scratch, 0.0, False)
     code = carried(problem, scratch, work.home, work.home_tangent, float(work.phase[0]))
-    set_section(problem, scratch, float(work.phase[0]))
+    set_section(problem, scratch, float(work.phase[0]), False)
     chord = chord_behind(work)
     share = 0.0
     for k in range(n + 1):
@@ -252,8 +252,8 @@ def arrival(branch: Record, course: Course, p: int, ends: bool, back: bool) -> i
 @kernel
 def begin(
     problem: Any, scratch: Any, work: Corrector, u: Real, omega: float, course: Course
-) -> int:
-    """Correct the first point from (u, omega) at fixed omega."""
+) -> tuple[int, int]:
+    """Correct the first point from (u, omega) at fixed omega; status and iterations."""
     n = work.r.shape[0]
     for k in range(n):
         work.here[k] = work.behind[k] = u[k]
@@ -262,18 +262,20 @@ def begin(
         work.here_tangent[k] = work.behind_tangent[k] = 0.0
     code = choose_section(problem, scratch, work)
     if code != status.OK:
-        return code
+        return code, 0
     for k in range(n + 1):
         work.guess[k] = work.here[k]
         work.border[k] = work.before[k] = 0.0
     work.border[n] = 1.0
     work.before[n] = course.direction
     set_scale(problem, work, work.guess, omega, course)
-    code, _ = correct(problem, scratch, work, course.tolerance)
+    code, iterations = correct(problem, scratch, work, course.tolerance)
     if code == status.OK:
         tangent_ahead(work)
         depths(problem, scratch, omega, work.depth)
-    return code
+        for k in range(n + 1):
+            work.here[k] = work.w[k]
+    return code, iterations
 
 
 @kernel
@@ -310,9 +312,8 @@ def attempt(
     branch.rejected[p] += 1
     if step > CORNER_STEP:
         return 0.0, False, iterations
-    came_from = branch.signature[p - 2] if p > 1 else -1
     depth = branch.depth[p - 1]
-    return turn_corner(problem, scratch, work, depth, came_from, step, course), False, NEWTON_FEW
+    return turn_corner(problem, scratch, work, depth, step, course), False, NEWTON_FEW
 
 
 @kernel
@@ -329,7 +330,7 @@ def trace(
     there.
     """
     n = work.r.shape[0]
-    code = begin(problem, scratch, work, u, omega, course)
+    code, branch.iterations[0] = begin(problem, scratch, work, u, omega, course)
     if code == status.OK:
         code = advance(problem, scratch, work, branch, 0, course)
     if code != status.OK:
@@ -372,9 +373,9 @@ def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = T
         phase=np.zeros(points),
         jacobian=np.empty((points, n, n) if with_jacobian else (points, 0, 0)),
         side=np.empty(points),
-        signature=np.empty(points, np.int64),
+        signature=np.zeros(points, np.int64),
         depth=np.empty((points, gaps, 2)),
-        iterations=np.empty(points, np.int64),
+        iterations=np.zeros(points, np.int64),
         rejected=np.zeros(points, np.int64),
         reason=np.zeros(points, np.int64),
     )

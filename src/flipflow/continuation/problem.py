@@ -71,7 +71,7 @@ def _stays(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> in
 
 
 @kernel
-def _no_section(problem: Any, scratch: Any, phase: float) -> None:
+def _no_section(problem: Any, scratch: Any, phase: float, anew: bool) -> None:
     """A series has none."""
 
 
@@ -136,13 +136,16 @@ def carried(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> i
     return int(_CARRIED[type(problem)](problem, scratch, w, tangent, end))
 
 
-def set_section(problem: Any, scratch: Any, phase: float) -> None:
-    """Let the unknowns stand at a phase of the force."""
-    _SET[type(problem)](problem, scratch, phase)
+def set_section(problem: Any, scratch: Any, phase: float, anew: bool) -> None:
+    """Let the unknowns stand at a phase of the force; ``anew`` forgets how good the last was."""
+    _SET[type(problem)](problem, scratch, phase, anew)
 
 
 def mirrored(problem: Any) -> Any:
-    """The problem of those motions that are their own mirror image after half their time."""
+    """The problem of motions that are their own mirror image after half their time.
+
+    The problem itself where it is that already, and where there is none, as of a series.
+    """
     return _MIRRORED[type(problem)](problem)
 
 
@@ -211,11 +214,11 @@ def _carried(problem: Any, scratch: Any, w: Any, tangent: Any, end: Any) -> Any:
 
 
 @chosen_by_type(set_section)
-def _set_section(problem: Any, scratch: Any, phase: Any) -> Any:
+def _set_section(problem: Any, scratch: Any, phase: Any, anew: Any) -> Any:
     chosen = _SET[_kind(problem)]
 
-    def run(problem: Any, scratch: Any, phase: Any) -> Any:
-        return chosen(problem, scratch, phase)
+    def run(problem: Any, scratch: Any, phase: Any, anew: Any) -> Any:
+        return chosen(problem, scratch, phase, anew)
 
     return run
 

@@ -220,7 +220,7 @@ def follow(
     """
     if p == TRACE_ALL:
         code, points = trace(problem, scratch, work, branch, u, omega, course)
-        set_section(problem, scratch, 0.0)
+        set_section(problem, scratch, 0.0, False)
         return code, points, 0.0
     code, share = load(problem, scratch, work, branch, p + 1, course), low
     if code == status.OK and low == high:
@@ -229,5 +229,5 @@ def follow(
         code, share = special_between(problem, scratch, work, branch, p, low, high, test, course)
     if code == status.OK:
         code = bring_home(problem, scratch, work)
-    set_section(problem, scratch, 0.0)
+    set_section(problem, scratch, 0.0, False)
     return code, p, share

@@ -47,7 +47,7 @@ def parent_of(solver: Solver) -> ExactSolver | None:
     A series has none: it spans one forcing period, with odd harmonics only if the machine is
     symmetric.
     """
-    if not isinstance(solver, ExactSolver) or solver.half_turn:
+    if not isinstance(solver, ExactSolver) or solver.half_turn or not solver.branches_off:
         return None
     if solver.turns % 2 == 0:
         return solver.like(half_turn=False, turns=solver.turns // 2)
@@ -83,15 +83,16 @@ def distance_to(state: Real, other: Real, omega: float) -> float:
 def meeting(parent: Solver, u: Real, omega: float) -> Point | None:
     """The parent's motion near (u, omega) whose return map has the eigenvalue -1, by secants."""
     last = [parent.solve(u, omega)]
+    size = abs(omega) or 1.0
 
     def value(w: float) -> float:
         guess = last[-1]
-        point = None if guess is None or w <= 0.0 else parent.solve(guess.u, w)
+        point = None if guess is None else parent.solve(guess.u, w)
         last.append(point)
         return math.nan if point is None else float(determinant_plus(parent.return_map(point)))
 
     answer = root_scalar(
-        value, method="secant", x0=omega, x1=omega * (1.0 + SECANT), xtol=1e-12 * omega,
+        value, method="secant", x0=omega, x1=omega + SECANT * size, xtol=1e-12 * size,
         maxiter=SECANT_MOST,
     )  # fmt: skip
     guess = last[-1]
@@ -120,7 +121,7 @@ def follow_until_meeting(
         landed = np.flatnonzero(apart < SAME)
         if landed.size == 0 or landed[0] == 0:
             break
-    # The sign of det [J; tangent] changes where two branches cross and nowhere else.
+    # The sign of det [J; tangent] changes where two branches cross, and at corners.
     crossed = np.flatnonzero(np.diff(np.sign(traced.record.side)))
     stalled = [apart.size - 1] if traced.code == status.STEP_TOO_SMALL else []
     beyond = [int(p) - 1 for p in landed[:1] if p > 0]

@@ -91,6 +91,7 @@ def stand_at(problem: Varied, work: VariedWork, value: float) -> bool:
     """Let the machine be that of a value; False where it cannot."""
     if work.at[0] == value:
         return True
+    work.at[0] = math.nan
     series, width = problem.series, problem.series.high - problem.series.low
     if not series.low - BEYOND * width <= value <= series.high + BEYOND * width:
         return False
@@ -98,8 +99,10 @@ def stand_at(problem: Varied, work: VariedWork, value: float) -> bool:
     for slot in range(flow.modes.ready.shape[0]):
         flow.modes.ready[slot] = 0
         flow.driven_at[slot] = math.nan
+    if not set_machine(series, work.series, value, problem.shooting.machine):
+        return False
     work.at[0] = value
-    return set_machine(series, work.series, value, problem.shooting.machine)
+    return True
 
 
 @kernel
@@ -123,11 +126,17 @@ def varied_residual(
         code = fold_row(problem, work, r, J)
     for k in range(size):
         J[k, n] = 0.0
-    for way in range(2):
-        if code == status.OK:
-            code = add_value_slope(problem, work, n, 1.0 - 2.0 * way, J)
-    if code != status.OK or not stand_at(problem, work, value):
-        return max(code, status.NO_CONVERGENCE)
+    # At an end of the interval the difference is one-sided: beyond it may lie another law.
+    step = float(work.move[n])
+    low, high = max(value - step, problem.series.low), min(value + step, problem.series.high)
+    if code == status.OK:
+        code = add_value_slope(problem, work, n, high, 1.0 / (high - low), J)
+    if code == status.OK:
+        code = add_value_slope(problem, work, n, low, -1.0 / (high - low), J)
+    if code != status.OK:
+        return code
+    if not stand_at(problem, work, value):
+        return status.NO_CONVERGENCE
     omega = frequency(problem, u[:n])
     work.at[1] = omega
     code = shooting_residual(problem.shooting, work.shooting, u, omega, work.r, work.J)
@@ -159,11 +168,13 @@ def value_size(problem: Varied, value: float) -> float:
 
 
 @kernel
-def add_value_slope(problem: Varied, work: VariedWork, n: int, way: float, J: Real) -> int:
+def add_value_slope(
+    problem: Varied, work: VariedWork, n: int, value: float, weight: float, J: Real
+) -> int:
     """Add one side's share of the difference quotient in the value to the last column of J."""
     size, flow = work.r.shape[0], work.shooting.flow
     omega = frequency(problem, work.z[:n])
-    if not omega > 0.0 or not stand_at(problem, work, work.z[n] + way * work.move[n]):
+    if not omega > 0.0 or not stand_at(problem, work, value):
         return status.NO_CONVERGENCE
     for k in range(size):
         flow.z[k] = work.z[k]
@@ -172,7 +183,7 @@ def add_value_slope(problem: Varied, work: VariedWork, n: int, way: float, J: Re
     machine = problem.shooting.machine
     code = run_flow(machine, flow, omega, begin, duration, work.shooting.rate)
     for k in range(size):
-        J[k, n] += way * problem.shooting.sign * flow.z[k] / (2.0 * work.move[n])
+        J[k, n] += weight * problem.shooting.sign * flow.z[k]
     return code
 
 
@@ -182,12 +193,15 @@ def fold_row(problem: Varied, work: VariedWork, r: Real, J: Real) -> int:
     size, n = work.r.shape[0], r.shape[0]
     for k in range(n + 1):
         here = work.z[k]
-        work.z[k] = here + work.move[k]
+        ahead, behind = here + work.move[k], here - work.move[k]
+        if k == n:
+            ahead, behind = min(ahead, problem.series.high), max(behind, problem.series.low)
+        work.z[k] = ahead
         code, after = determinant(problem, work, n)
-        work.z[k] = here - work.move[k]
+        work.z[k] = behind
         if code == status.OK:
             code, before = determinant(problem, work, n)
-            J[size, k] = (after - before) / (2.0 * work.move[k])
+            J[size, k] = (after - before) / (ahead - behind)
         work.z[k] = here
         if code != status.OK:
             return code
@@ -203,12 +217,14 @@ def determinant(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
     if not stand_at(problem, work, float(work.z[n])):
         return status.NO_CONVERGENCE, math.nan
     code = shooting_residual(problem.shooting, work.shooting, work.z, omega, work.r, work.J)
+    if code != status.OK:
+        return code, math.nan
     product = 1.0
     for i in range(size):
         for k in range(size):
             work.square[i, k] = work.J[i, k]
     if not lu_factor(work.square, work.pivot):
-        return code, 0.0
+        return status.NOT_FINITE, math.nan
     for k in range(size):
         product *= work.square[k, k] if work.pivot[k] == k else -work.square[k, k]
     return code, product
@@ -245,9 +261,9 @@ def varied_better(problem: Varied, work: VariedWork, value: float) -> float:
 
 
 @kernel
-def varied_section(problem: Varied, work: VariedWork, phase: float) -> None:
+def varied_section(problem: Varied, work: VariedWork, phase: float, anew: bool) -> None:
     """Set the shooting's section."""
-    section.set_section(problem.shooting, work.shooting, phase)
+    section.set_section(problem.shooting, work.shooting, phase, anew)
 
 
 @kernel
@@ -266,16 +282,19 @@ def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, en
     for k in range(n + 1):
         work.z[k] = w[k]
     set_moves(problem, work, n)
-    share = 1e-300
+    share = 0.0
     for k in range(n + 1):
         share = max(share, abs(tangent[k]) / work.move[k])
-    code = arrive_beside(problem, work, w, tangent, 1.0 / share, end)
+    step = 1.0 / share if share > 0.0 else 0.0
+    code_ahead = arrive_beside(problem, work, w, tangent, step, end)
     for k in range(size):
         work.ahead[k] = work.z[k]
-    code = max(code, arrive_beside(problem, work, w, tangent, -1.0 / share, end))
+    code_behind = arrive_beside(problem, work, w, tangent, -step, end)
     for k in range(size):
         work.ahead[k] = 0.5 * share * (work.ahead[k] - work.z[k])
-    code = max(code, arrive_beside(problem, work, w, tangent, 0.0, end))
+    code = arrive_beside(problem, work, w, tangent, 0.0, end)
+    if code == status.OK:
+        code = code_ahead if code_ahead != status.OK else code_behind
     if code != status.OK:
         return code
     for k in range(size):

@@ -23,7 +23,8 @@ from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.equation_of_motion import MachineArrays
 
 MOST_TERMS = 65  # of a series; a parameter that needs more is not smooth
-BETWEEN = (-0.77, -0.31, 0.13, 0.59)  # where a series is held against the machine, in [-1, 1]
+# Where a series is held against the machine, in [-1, 1].
+BETWEEN = (-1.0, -0.97, -0.88, -0.71, -0.45, -0.17, 0.13, 0.41, 0.68, 0.86, 0.96, 1.0)
 EXACT = 1e-12  # deviation of a series from the machine, relative to the largest value
 
 
@@ -126,7 +127,7 @@ def machine_series(
     low, high
         The interval.
     """
-    first = parts_at(low)
+    first = parts_at(0.5 * (low + high))
     sizes = [array.size for array in first.values()]
 
     def flat(x: float) -> Real:
@@ -135,7 +136,9 @@ def machine_series(
 
     between = np.array([flat(x) for x in BETWEEN])
     size = np.where(np.isfinite(between), np.abs(between), 0.0).max(axis=0)
-    largest = np.repeat([part.max() for part in np.split(size, np.cumsum(sizes)[:-1])], sizes)
+    largest = np.repeat(
+        [part.max(initial=0.0) for part in np.split(size, np.cumsum(sizes)[:-1])], sizes
+    )
     terms = 2
     while terms <= MOST_TERMS:
         nodes = chebyshev.chebpts1(terms)

@@ -22,7 +22,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 
 OF_SPRING = ("stiffness", "damping", "clearance", "clearance_minus")
-PATH = re.compile(rf"springs\[(\d+)\]\.({'|'.join(OF_SPRING)})")
+PATH = re.compile(rf"springs\[([0-9]+)\]\.({'|'.join(OF_SPRING)})")
 FORCING = "forcing"
 
 
@@ -81,7 +81,8 @@ def _of_system(machine: MechanicalSystem, name: str) -> Parameter:
         places = [
             f"'springs[{j}].{part}'" for j in range(len(machine.springs)) for part in OF_SPRING
         ]
-        raise InputError("field", name, f"choose one of 'omega', 'forcing', {', '.join(places)}")
+        listed = ", ".join(["'omega'", "'forcing'", *places])
+        raise InputError("field", name, f"choose one of {listed}")
     j, part = int(path[1]), path[2]
 
     def at(value: float) -> Machine:

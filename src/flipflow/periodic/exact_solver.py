@@ -28,6 +28,7 @@ class ExactSolver(Solver):
 
     reads_jacobian = True
     unit = " rad/s"  # of the parameter over which motions are followed
+    branches_off = True  # whether its branches may meet those of other symmetry or fewer turns
 
     def __init__(self, system: MechanicalSystem, *, half_turn: bool, turns: int = 1) -> None:
         super().__init__(system, half_turn=half_turn, turns=turns)

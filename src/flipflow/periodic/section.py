@@ -18,7 +18,7 @@ from flipflow.dynamics.law import exit_of, signed_gap
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
-CANDIDATES = 60  # phases a turn that are tried
+CANDIDATES = 60  # phases that are tried, in a motion of up to a turn
 NEAR = 0.15  # margin below which a better section is looked for, as a share of the motion
 WORN = 0.6  # share of the margin at the last choice below which it is looked for again
 BETTER = 1.5  # a section this many times better is moved to
@@ -126,8 +126,8 @@ def carried(problem: Shooting, work: ShootingWork, w: Real, tangent: Real, end: 
 
 
 @kernel
-def set_section(problem: Shooting, work: ShootingWork, phase: float) -> None:  # noqa: ARG001
-    """Let the unknown be the state at a phase of the force; phase 0 forgets the last choice."""
+def set_section(problem: Shooting, work: ShootingWork, phase: float, anew: bool) -> None:  # noqa: ARG001
+    """Let the unknown be the state at a phase of the force."""
     work.section[0] = phase
-    if phase == 0.0:
+    if anew:
         work.section[1] = math.inf

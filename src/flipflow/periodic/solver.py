@@ -278,10 +278,16 @@ class Solver(ABC):
             self.unknowns, gaps, points, with_jacobian=self.reads_jacobian
         )
 
+    @property
+    def uneven(self) -> Real:
+        """Difference of both gaps of each spring in m, (m,): 0 where the branch may be even."""
+        gaps = self.machine.stops.gap
+        return np.where(gaps[:, 0] == gaps[:, 1], 0.0, 1.0)
+
     @cached_property
     def corrector(self) -> correction.Corrector:
         """Scratch of the bordered Newton solves; the last point corrected stands in it."""
-        return correction.new_corrector(self.unknowns, len(self.springs))
+        return correction.new_corrector(self.unknowns, self.uneven)
 
     def _follow(
         self,
