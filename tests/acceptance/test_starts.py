@@ -78,3 +78,117 @@ def test_undamped_motions_beat_and_a_resonance_is_told() -> None:
         ff.simulate(machine, 2.0, 40)
     with pytest.raises(ff.InputError, match="damping"):
         ff.periodic_orbits(machine, 2.1)
+
+
+def a_machine_of_three_stops() -> ff.MechanicalSystem:
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    rows = (((1.9, 0.5), 0.71), ((-1.6, 1.7), 0.96), ((0.3, -0.9), 0.28))
+    springs = [ff.ClearanceSpring(direction, 20.0, 0.0, gap) for direction, gap in rows]
+    return ff.MechanicalSystem(np.eye(2), 0.03 * K, K, springs, ff.HarmonicForce([0.2, -0.4]))
+
+
+def free_of_contact(system: ff.MechanicalSystem, omega: float) -> tuple[np.ndarray, bool]:
+    """State at t = 0 of the motion of the open machine, and whether it stays within all gaps."""
+    Z = system.K - omega**2 * system.M + 1j * omega * system.C
+    X = np.linalg.solve(Z, system.excitation.vector * omega**system.excitation.power)
+    clear = all(abs(one.direction @ X) < min(one.gaps) for one in system.springs)
+    return np.concatenate([X.real, (1j * omega * X).real]), clear
+
+
+def test_a_motion_without_contact_is_found_among_others() -> None:
+    """Its basin is small; no start of a cloud settles on it."""
+    machine = a_machine_of_three_stops()
+    state, clear = free_of_contact(machine, 1.37)
+    found = ff.periodic_orbits(machine, 1.37)
+    assert clear
+    (quiet,) = (orbit for orbit in found if not orbit.touches)
+    assert quiet.stable
+    assert quiet.state == pytest.approx(state, abs=1e-12)
+    assert len(found) > 1
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_motion_without_contact_is_always_found(seed) -> None:
+    rng = np.random.default_rng(seed)
+    clear, machine, omega = False, a_machine_of_three_stops(), 0.0
+    while not clear:
+        omega = float(rng.uniform(0.8, 2.2))
+        springs = [
+            ff.ClearanceSpring(rng.normal(size=2), 20.0, 0.0, rng.uniform(0.2, 0.6))
+            for _ in range(3)
+        ]
+        force = ff.HarmonicForce(0.3 * rng.normal(size=2))
+        machine = ff.MechanicalSystem(machine.M, machine.C, machine.K, springs, force)
+        state, clear = free_of_contact(machine, omega)
+    quiet = [orbit for orbit in ff.periodic_orbits(machine, omega) if not orbit.touches]
+    assert len(quiet) == 1
+    assert quiet[0].state == pytest.approx(state, abs=1e-10)
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only"])
+def test_motions_held_by_a_stop_all_the_time(law) -> None:
+    """K = -25 pushes the mass onto either stop of 200: it rests at 200 * .5 / 175 and shakes."""
+    stop = ff.ClearanceSpring([1.0], 200.0, 1.0, 0.5, law=law)
+    machine = ff.MechanicalSystem([[1.0]], [[0.2]], [[-25.0]], (stop,), ff.HarmonicForce([1.0]))
+    found = ff.periodic_orbits(machine, 3.0)
+    held = [orbit for orbit in found if orbit.contact_share() == 1.0]
+    assert sorted(orbit.mean(0) for orbit in held) == pytest.approx([-4 / 7, 4 / 7], abs=1e-12)
+    for orbit in held:
+        assert orbit.stable
+        assert orbit.amplitude(0) == pytest.approx(1.0 / abs(175.0 - 9.0 + 3.6j), rel=1e-9)
+    (middle,) = (orbit for orbit in found if not orbit.touches)
+    assert not middle.stable
+
+
+@pytest.mark.parametrize("low", [0.2, 0.25, 0.29, 0.3, 0.31, 0.35, 0.5])
+@pytest.mark.parametrize(
+    "method", [ff.PiecewiseExact(), ff.HarmonicBalance(15)], ids=["exact", "H"]
+)
+def test_a_dead_zone_starts_at_any_speed(low, method) -> None:
+    """Nothing is settled from rest here, yet there are motions; the branch begins with one."""
+    stop = ff.ClearanceSpring([1.0], 1.0, 0.0, 1.0)
+    machine = ff.MechanicalSystem([[1.0]], [[0.1]], [[1e-6]], (stop,), ff.HarmonicForce([0.5]))
+    branch = ff.frequency_response(machine, (low, 2.0), method)
+    assert branch.complete
+    assert branch.omega[0] == low
+    first = branch.orbit(0)
+    exact = isinstance(method, ff.PiecewiseExact)
+    if exact:
+        turn = 2.0 * math.pi / low
+        back = integrate.flow(integrate.Machine.of(machine), first.state, low, 0.0, turn).final
+        assert back == pytest.approx(first.state, abs=1e-7)
+    sizes = [orbit.amplitude(0) for orbit in ff.periodic_orbits(machine, low)]
+    assert min(abs(first.amplitude(0) - size) for size in sizes) < (1e-8 if exact else 2e-3)
+
+
+def test_identical_axes_have_every_pair_of_motions() -> None:
+    """A square clearance: three motions on each axis make nine, each pair with its twin."""
+    springs = [ff.ClearanceSpring(axis, 20.0, 0.1, 0.5) for axis in np.eye(2)]
+    square = ff.MechanicalSystem(
+        np.eye(2), 0.05 * np.eye(2), np.eye(2), springs, ff.HarmonicForce([0.3, 0.3])
+    )
+    axis = ff.MechanicalSystem(
+        [[1.0]], [[0.05]], [[1.0]], [ff.ClearanceSpring([1.0], 20.0, 0.1, 0.5)],
+        ff.HarmonicForce([0.3]),
+    )  # fmt: skip
+    alone = [orbit.amplitude(0) for orbit in ff.periodic_orbits(axis, 1.5)]
+    found = ff.periodic_orbits(square, 1.5)
+    pairs = sorted((round(o.amplitude(0), 8), round(o.amplitude(1), 8)) for o in found)
+    assert len(alone) == 3
+    assert pairs == sorted((round(a, 8), round(b, 8)) for a in alone for b in alone)
+    for orbit in found:
+        quiet = abs(orbit.amplitude(0) - alone[1]) > 1e-6 < abs(orbit.amplitude(1) - alone[1])
+        assert orbit.stable == quiet
+    stable = ff.basins(square, 1.5, {0: [0.0, 0.6], 1: [0.0, 0.6]}).orbits
+    assert len(stable) == 4
+
+
+@pytest.mark.parametrize("gaps", [(0.0, math.inf), (0.0, 0.3), (0.3, 0.3)])
+@pytest.mark.parametrize("law", ["paper", "compression-only"])
+def test_without_force_everything_comes_to_rest(law, gaps) -> None:
+    """At the gap, too, where the machine is another on either side."""
+    stop = ff.ClearanceSpring([1.0], 5.0, 0.1, *gaps, law=law)
+    machine = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], (stop,), NO_FORCE)
+    basins = ff.basins(machine, 2.0, {0: np.linspace(-1.0, 1.0, 5)}, {0: [0.0, 1.0]})
+    assert [orbit.amplitude(0) for orbit in basins.orbits] == [0.0]
+    assert not basins.labels.any()

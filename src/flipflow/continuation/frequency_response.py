@@ -14,6 +14,7 @@ from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
+from flipflow.continuation.starts import found_motion
 from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.dynamics.first_contact import contact_free_up_to
 from flipflow.errors import InputError, SampledContactWarning
@@ -41,7 +42,9 @@ from flipflow.periodic.stability import (
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
 BACK = 0.96  # share of the last frequency without contact down to which its branch may turn back
-STEPS_UP = 8  # least steps from there up to the frequency asked for
+STEPS_UP = 8  # least steps from there to the frequency asked for
+RATIO_UP = 1.25  # of the frequencies above that are tried for a motion without contact
+RATIOS_UP = 40  # of them at most
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -165,14 +168,48 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
     Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
-    followed up from the last motion without contact; where there is none, the machine is left to
-    settle from rest.
+    followed up from the last motion without contact. Where there is none, the motion is that into
+    which the machine settles from rest; failing that, that on the branch which has no contact at
+    some higher frequency; failing that, any.
     """
     free = contact_free_up_to(solver.machine, solver.flow.modes, omega)
     if free == omega:
         return contact_free_unknowns(solver, omega)
     last = _followed_up(solver, free, omega) if free > 0.0 else None
-    return settled_unknowns(solver, omega) if last is None else last
+    return some_unknowns(solver, omega) if last is None else last
+
+
+def some_unknowns(solver: Solver, omega: float) -> Real:
+    """Unknowns of a motion that is not reached from below, or the best guess of one."""
+    settled = settled_unknowns(solver, omega)
+    if solver.solve(settled, omega) is not None:
+        return settled
+    exact = solver
+    if not isinstance(solver, ExactSolver):
+        exact = ExactSolver(solver.system, half_turn=solver.half_turn)
+    found = _followed_down(exact, omega)
+    if found is None:
+        found = found_motion(exact, omega)
+    if found is None:
+        return settled
+    return found if exact is solver else solver.unknowns_from(exact.motion(found, omega))
+
+
+def _followed_down(solver: ExactSolver, omega: float) -> Real | None:
+    """State at ``omega`` on the branch that is without contact at a higher frequency."""
+    for free in (omega * RATIO_UP ** np.arange(1, RATIOS_UP)).tolist():
+        X = solver.machine.direction @ complex_amplitude(solver.system, free)
+        if (np.abs(X) < solver.machine.stops.gap.min(axis=1)).all():
+            break
+    else:
+        return None
+    start, step = contact_free_unknowns(solver, free), (free - omega) / STEPS_UP
+    for way in WAYS:
+        course = correction.Course(omega, free / BACK, step, way.share, -1.0, way.tolerance)
+        last = solver.end_of_branch(start, free, course, way.points)
+        if last is not None:
+            return last
+    return None
 
 
 def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:

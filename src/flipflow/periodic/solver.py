@@ -256,14 +256,16 @@ class Solver(ABC):
     def end_of_branch(
         self, u: Real, omega: float, course: correction.Course, points: int
     ) -> Real | None:
-        """Unknowns where the branch through (u, omega) meets the upper bound of ``course``.
+        """Unknowns where the branch through (u, omega) meets the bound of ``course`` ahead.
 
-        None where it does not within that many points.
+        That is the upper one where its direction is up. None where the branch does not meet it
+        within that many points.
         """
         gaps = len(self.springs)
         record = frequency_loop.new_branch(self.unknowns, gaps, points, with_jacobian=False)
         code, points, _ = self._follow(record, u, omega, course)
-        return record.u[points - 1].copy() if code == status.REACHED_UPPER else None
+        ahead = status.REACHED_UPPER if course.direction > 0.0 else status.REACHED_LOWER
+        return record.u[points - 1].copy() if code == ahead else None
 
     def new_branch(self, points: int) -> frequency_loop.Record:
         """An empty record for up to ``points`` points."""
