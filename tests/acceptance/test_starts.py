@@ -192,3 +192,16 @@ def test_without_force_everything_comes_to_rest(law, gaps) -> None:
     basins = ff.basins(machine, 2.0, {0: np.linspace(-1.0, 1.0, 5)}, {0: [0.0, 1.0]})
     assert [orbit.amplitude(0) for orbit in basins.orbits] == [0.0]
     assert not basins.labels.any()
+
+
+@pytest.mark.parametrize("omega", [350.04, 350.1, 350.3, 352.0, 356.0, 360.0])
+def test_both_motions_of_a_family_just_above_its_fold(omega) -> None:
+    """FFS0827's motions of three periods begin at 350.033 rad/s; as DOP853 says."""
+    screen = ff.load("ffs0827")
+    machine = integrate.Machine.of(screen.system())
+    several = [orbit for orbit in ff.periodic_orbits(screen, omega, 3) if orbit.periods == 3]
+    assert sorted(orbit.stability for orbit in several) == ["stable", "unstable"]
+    for orbit in several:
+        back = integrate.flow(machine, orbit.state, omega, 0.0, 6.0 * np.pi / omega).final
+        assert np.abs(back[:2] - orbit.state[:2]).max() < 1e-9
+    assert all(orbit.periods == 1 for orbit in ff.periodic_orbits(screen, 350.02, 3))

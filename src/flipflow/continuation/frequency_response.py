@@ -184,9 +184,7 @@ def some_unknowns(solver: Solver, omega: float) -> Real:
     settled = settled_unknowns(solver, omega)
     if solver.solve(settled, omega) is not None:
         return settled
-    exact = solver
-    if not isinstance(solver, ExactSolver):
-        exact = ExactSolver(solver.system, half_turn=solver.half_turn)
+    exact = _exact(solver, half_turn=solver.half_turn)
     found = _followed_down(exact, omega)
     if found is None:
         found = found_motion(exact, omega)
@@ -246,14 +244,19 @@ def contact_free_unknowns(solver: Solver, omega: float) -> Real:
 
 def settled_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
-    exact = (
-        solver if isinstance(solver, ExactSolver) else ExactSolver(solver.system, half_turn=False)
-    )
+    exact = _exact(solver, half_turn=False)
     z = exact.settled(np.zeros(exact.unknowns), omega, SETTLING_TURNS)
     if exact is solver:
         return z
     point = exact.solve(z, omega)
     return solver.unknowns_from(exact.motion(z if point is None else point.u, omega))
+
+
+def _exact(solver: Solver, *, half_turn: bool) -> ExactSolver:
+    """The solver itself where it is exact, else one of the same machine."""
+    if isinstance(solver, ExactSolver):
+        return solver
+    return ExactSolver(solver.system, half_turn=half_turn)
 
 
 def _finished(

@@ -34,7 +34,9 @@ def one_state_motions(system: MechanicalSystem, omega: float) -> list[Real]:
         except np.linalg.LinAlgError:
             continue
         if all(
-            _stays(spring, regime, float(spring.direction @ rest), spring.direction @ X, omega)
+            _stays(
+                spring, regime, float(spring.direction @ rest), complex(spring.direction @ X), omega
+            )
             for spring, regime in zip(linear.springs, regimes, strict=True)
         ):
             found.append(np.concatenate([rest + X.real, (1j * omega * X).real]))
@@ -82,7 +84,7 @@ def _linear_motion(
         push += f_k * spring.stiffness * _gap(spring, regime) * np.sign(regime) * d
     force = system.excitation.vector * omega**system.excitation.power
     Z = K - omega**2 * system.M + 1j * omega * C
-    return np.linalg.solve(K, push), np.asarray(np.linalg.solve(Z, force))
+    return np.asarray(np.linalg.solve(K, push)), np.asarray(np.linalg.solve(Z, force))
 
 
 def _gap(spring: ClearanceSpring, regime: int) -> float:

@@ -35,6 +35,8 @@ MOST_PERIODS = 6  # longest period that may be looked for, in forcing periods
 SWEEP_RATIO = 1.3  # speed at which a stepped start begins, over the one asked for or under it
 SWEEP_STEPS = 12  # speeds on the way
 BRANCH_RATIOS = (1.15, 2.5)  # ends of the branch from below over the speed asked for, and under it
+FAMILY_RATIOS = (1.1, 1.0 / 1.1)  # speeds over the one asked for with families that may reach it
+FAMILY_REACH = 1.15  # how far a family of several periods is followed to either side, as a factor
 BRANCH_STEPS = 60  # longest step on it: the interval divided by this
 
 logger = logging.getLogger("flipflow")
@@ -49,13 +51,17 @@ def periodic_orbits(
 ) -> tuple[Orbit, ...]:
     """Periodic motions at ``omega`` that repeat after up to ``max_periods`` forcing periods.
 
-    Starts: the motions of the branch reached from below, between its folds too; for one symmetric
-    stop, every zero of the scalar problem of two-touch motions; rest; what is reached by stepping
-    the speed up and down to ``omega``; and a low-discrepancy cloud of states as large as the linear
-    motion or the gaps. Each is tried as it is (unstable motions are found so) and after some turns
-    of settling. Newton on the exact flow over 1, 2, ... turns, so that motions need not be
-    symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
-    A start whose flow does not end is left out; the monitor and the log hear how many were.
+    Motions that never change their contacts are closed form. The others are searched for from
+    these starts: the motions of the branch reached from below, between its folds too; for one
+    symmetric stop, every zero of the scalar problem of two-touch motions; rest; what is reached by
+    stepping the speed up and down to ``omega``; and a low-discrepancy cloud of states as large as
+    the linear motion or the gaps. Each is tried as it is (unstable motions are found so) and after
+    some turns of settling. Newton on the exact flow over 1, 2, ... turns, so that motions need not
+    be symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
+    Motions of several periods, found here or a tenth above or below, are followed through their
+    folds. Parts of a machine that nothing connects are searched one by one, and each combination of
+    their motions is one of the machine. A start whose flow does not end is left out; the monitor
+    and the log hear how many were.
 
     Parameters
     ----------
@@ -101,6 +107,8 @@ def periodic_orbits(
     for k, start in enumerate(starts):
         search.try_from(start)
         say(search.progress(), (k + 1) / len(starts))
+    if max_periods > 1:
+        search.follow_families(random)
     return search.orbits()
 
 
@@ -216,13 +224,42 @@ class _Search:
             z = None if z is None else self._flown(z, float(speed))
         return z
 
+    def follow_families(self, rng: np.random.Generator) -> None:
+        """Follow motions of several periods, found here or at speeds nearby, through their folds.
+
+        Close to the fold with which a family begins no start leads to it.
+        """
+        for ratio in FAMILY_RATIOS:
+            near = _Search(self.machine, ratio * self.omega, self.max_periods)
+            for z in cloud(near.settling.solver, near.omega, rng):
+                near.try_from(z)
+            for point in near.found:
+                if point.formulation.turns > 1:
+                    self._follow(point, math.copysign(1.0, self.omega - near.omega))
+        for point in tuple(self.found):
+            if point.formulation.turns > 1:
+                self._follow(point, 1.0)
+                self._follow(point, -1.0)
+
+    def _follow(self, point: Point, direction: float) -> None:
+        """Add the motions in which a family passes the speed asked for."""
+        periods = point.formulation.turns
+        solver = self.settling.solver_of(periods)
+        low, high = self.omega / FAMILY_REACH, self.omega * FAMILY_REACH
+        for z in _passes(solver, point.u, point.omega, self.omega, (low, high), direction):
+            self._try_over(z, periods)
+
     def _try(self, z: Real) -> None:
         for periods in range(1, self.max_periods + 1):
-            point = self.settling.solver_of(periods).solve(z, self.omega)
-            if point is not None and self.settling.shortest(point) is point:
-                self._keep(point)
-                if self.settling.solver.system.symmetric:
-                    self._keep(self._mirrored(point))
+            self._try_over(z, periods)
+
+    def _try_over(self, z: Real, periods: int) -> None:
+        """Newton for a motion of so many periods and no fewer."""
+        point = self.settling.solver_of(periods).solve(z, self.omega)
+        if point is not None and self.settling.shortest(point) is point:
+            self._keep(point)
+            if self.settling.solver.system.symmetric:
+                self._keep(self._mirrored(point))
 
     def _keep(self, point: Point) -> None:
         """Add a motion unless it is known, in whatever phase."""
@@ -251,10 +288,22 @@ def _on_branch(system: MechanicalSystem, omega: float, ratio: float) -> list[Rea
     """
     solver = ExactSolver(system, half_turn=system.symmetric)
     low, high = omega / ratio, omega * ratio
-    course = correction.Course(
-        low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, correction.QUICK
-    )
-    traced = solver.trace(first_unknowns(solver, low), low, course)
+    return _passes(solver, first_unknowns(solver, low), low, omega, (low, high), 1.0)
+
+
+def _passes(
+    solver: ExactSolver,
+    u: Real,
+    start: float,
+    omega: float,
+    bounds: tuple[float, float],
+    direction: float,
+) -> list[Real]:
+    """States at ``omega`` of the branch through u at ``start``, wherever it passes that speed."""
+    low, high = bounds
+    step = (high - low) / BRANCH_STEPS
+    course = correction.Course(low, high, step, STEP_SHARE, direction, correction.QUICK)
+    traced = solver.trace(u, start, course)
     ahead = traced.omega - omega
     states = []
     for p in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
