@@ -9,6 +9,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import IncompleteError
+from flipflow.periodic.stability import determinant_plus, neimark_sacker
 from reference import integrate
 
 pytestmark = pytest.mark.numerical
@@ -205,3 +206,85 @@ def test_both_motions_of_a_family_just_above_its_fold(omega) -> None:
         back = integrate.flow(machine, orbit.state, omega, 0.0, 6.0 * np.pi / omega).final
         assert np.abs(back[:2] - orbit.state[:2]).max() < 1e-9
     assert all(orbit.periods == 1 for orbit in ff.periodic_orbits(screen, 350.02, 3))
+
+
+# Stiff stops without gap on one side: a turn at 5 rad/s has more contacts than are recorded.
+CHATTERING = {
+    "main_mass": 2795.3,
+    "floating_mass": 8904.2,
+    "eccentric_moment": 0.18590,
+    "isolation_stiffness": 4.6669e6,
+    "isolation_damping": 5956.7,
+    "shear_stiffness": 1.20742e8,
+    "shear_damping": 1.61782e5,
+    "stop_stiffness": 5.36297e11,
+    "stop_damping": 703.0,
+    "clearance": 0.24016,
+    "clearance_minus": 0.0,
+}
+RELEASING = {
+    "main_mass": 1539.8,
+    "floating_mass": 21826.0,
+    "eccentric_moment": 0.78493,
+    "isolation_stiffness": 5.8283e7,
+    "isolation_damping": 695.4,
+    "shear_stiffness": 3.33675e7,
+    "shear_damping": 572.4,
+    "stop_stiffness": 1.16598e11,
+    "stop_damping": 36.16,
+    "clearance": 1.0648e-3,
+    "clearance_minus": 0.0,
+    "stop_law": "compression-only",
+}
+
+
+@pytest.mark.parametrize("changes", [CHATTERING, RELEASING], ids=["chattering", "releasing"])
+def test_a_branch_without_points_says_so_and_nothing_else_breaks(changes) -> None:
+    """Warnings are errors here. Whoever asks for its highest motion gets the sentence."""
+    screen = ff.load("ffs0827").replace(**changes)
+    branch = ff.frequency_response(screen, (5.0, 250.0))
+    assert branch.omega.size == 0
+    assert not branch.complete
+    for ask in (ff.figure, lambda b: ff.figure([b, b]), lambda b: b.peak("relative")):
+        with pytest.raises(IncompleteError, match="no points.*" + branch.status.value[:20]):
+            ask(branch)
+    assert branch.peaks("relative") == branch.troughs("relative") == ()
+    assert branch.error.size == branch.amplitude("relative").size == 0
+
+
+@pytest.mark.parametrize("changes", [CHATTERING, RELEASING], ids=["chattering", "releasing"])
+def test_a_series_of_a_machine_far_away_is_followed_without_a_warning(changes) -> None:
+    """Its special points, peaks and picture too, though the exact flow beside it has no end."""
+    screen = ff.load("ffs0827").replace(**changes)
+    branch = ff.frequency_response(screen, (5.0, 250.0), ff.HarmonicBalance(3))
+    assert len(branch.status.value) > 20
+    if branch.omega.size:
+        top = branch.peak("relative").amplitude("relative")
+        sizes = [one.amplitude("relative") for one in branch.peaks("relative")]
+        assert top >= max(sizes, default=0.0)
+        assert ff.figure(branch).panels
+
+
+@pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(3)], ids=["exact", "H"])
+def test_screens_within_a_factor_of_a_hundred(method) -> None:
+    """Every branch ends with a status and a sentence, whatever the machine."""
+    bundled, rng = ff.load("ffs0827"), np.random.default_rng(11)
+    fields = [name for name in CHATTERING if name != "clearance_minus"]
+    for _ in range(16):
+        changes = {name: getattr(bundled, name) * 10.0 ** rng.uniform(-2, 2) for name in fields}
+        changes["stop_stiffness"] = changes["shear_stiffness"] * 10.0 ** rng.uniform(-2, 4)
+        minus = rng.choice([1.0, 3.0, 0.0, math.inf]) * changes["clearance"]
+        law = rng.choice(["paper", "compression-only"])
+        screen = bundled.replace(**changes, clearance_minus=minus, stop_law=str(law))
+        branch = ff.frequency_response(screen, (5.0, 250.0), method)
+        assert branch.complete or len(branch.status.value) > 20
+        assert branch.error.shape == branch.omega.shape
+        assert all(point.amplitude("relative") >= 0.0 for point in branch.special_points)
+
+
+def test_test_functions_of_maps_that_no_number_holds() -> None:
+    """A pair of modulus one is still told where other multipliers overflow their product."""
+    far = np.array([1e200, 1e200, 0.9, 0.9], complex)
+    assert neimark_sacker(far) < 0.0 < neimark_sacker(far * [1.0, 1.0, 1.2, 1.2])
+    assert np.isfinite(determinant_plus(np.eye(4) * 1e100))
+    assert determinant_plus(-2.0 * np.eye(3)) == pytest.approx(-1.0)

@@ -17,7 +17,7 @@ from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_
 from flipflow.continuation.starts import found_motion
 from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.dynamics.first_contact import contact_free_up_to
-from flipflow.errors import InputError, SampledContactWarning
+from flipflow.errors import IncompleteError, InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.contact_law import pushes_whole
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -188,9 +188,7 @@ def some_unknowns(solver: Solver, omega: float) -> Real:
     found = _followed_down(exact, omega)
     if found is None:
         found = found_motion(exact, omega)
-    if found is None:
-        return settled
-    return found if exact is solver else solver.unknowns_from(exact.motion(found, omega))
+    return settled if found is None else _unknowns_of(solver, exact, found, omega)
 
 
 def _followed_down(solver: ExactSolver, omega: float) -> Real | None:
@@ -246,10 +244,18 @@ def settled_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
     exact = _exact(solver, half_turn=False)
     z = exact.settled(np.zeros(exact.unknowns), omega, SETTLING_TURNS)
+    point = None if exact is solver else exact.solve(z, omega)
+    return _unknowns_of(solver, exact, z if point is None else point.u, omega)
+
+
+def _unknowns_of(solver: Solver, exact: ExactSolver, z: Real, omega: float) -> Real:
+    """Unknowns of the motion from a state; where its flow does not end, of that without contact."""
     if exact is solver:
         return z
-    point = exact.solve(z, omega)
-    return solver.unknowns_from(exact.motion(z if point is None else point.u, omega))
+    try:
+        return solver.unknowns_from(exact.motion(z, omega))
+    except IncompleteError:
+        return contact_free_unknowns(solver, omega)
 
 
 def _exact(solver: Solver, *, half_turn: bool) -> ExactSolver:

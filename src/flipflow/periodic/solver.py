@@ -154,8 +154,14 @@ class Point(Frozen):
 
     @cached_property
     def return_map(self) -> Real:
-        """Return map (2 N, 2 N) of a turn, or of half a turn with sign; worked out when asked."""
-        return self.formulation.solver().return_map(self)
+        """Return map (2 N, 2 N) of a turn, or of half a turn with sign; worked out when asked.
+
+        NaN where the flow over a turn does not end.
+        """
+        try:
+            return self.formulation.solver().return_map(self)
+        except IncompleteError:
+            return np.full((2 * self.formulation.system.size,) * 2, np.nan)
 
     @property
     def eigenvalues(self) -> Complex:
@@ -241,11 +247,20 @@ class Solver(ABC):
         """The flow's scratch, with the modes met so far."""
 
     def return_map(self, point: Point) -> Real:
-        """The return map of a point that this solver, or one like it, has found."""
+        """The return map of a point that this solver, or one like it, has found.
+
+        Raises
+        ------
+        IncompleteError
+            When the flow over a turn does not end.
+        """
         if point.known_map is not None:
             return point.known_map
         none = np.zeros((1, 0, 0))
-        return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
+        found = np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
+        if not np.isfinite(found).all():
+            raise IncompleteError(f"the flow over one turn at {point.omega:.6g} rad/s did not end")
+        return found
 
     def trace(self, u: Real, omega: float, course: correction.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
