@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,7 @@ from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
-from flipflow.continuation.starts import found_motion
+from flipflow.continuation.starts import found_motions
 from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.dynamics.first_contact import contact_free_up_to
 from flipflow.errors import IncompleteError, InputError, SampledContactWarning
@@ -182,30 +184,31 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def some_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of a motion that is not reached from below, or the best guess of one."""
     settled = settled_unknowns(solver, omega)
-    if solver.solve(settled, omega) is not None:
+    if solver.solve(settled, omega, correction.QUICK) is not None:
         return settled
     exact = _exact(solver, half_turn=solver.half_turn)
-    found = _followed_down(exact, omega)
-    if found is None:
-        found = found_motion(exact, omega)
-    return settled if found is None else _unknowns_of(solver, exact, found, omega)
+    for z in chain(_followed_down(exact, omega), found_motions(exact, omega)):
+        u = _unknowns_of(solver, exact, z, omega)
+        if solver.solve(u, omega, correction.QUICK) is not None:
+            return u
+    return settled
 
 
-def _followed_down(solver: ExactSolver, omega: float) -> Real | None:
+def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
     """State at ``omega`` on the branch that is without contact at a higher frequency."""
     for free in (omega * RATIO_UP ** np.arange(1, RATIOS_UP)).tolist():
         X = solver.machine.direction @ complex_amplitude(solver.system, free)
         if (np.abs(X) < solver.machine.stops.gap.min(axis=1)).all():
             break
     else:
-        return None
+        return
     start, step = contact_free_unknowns(solver, free), (free - omega) / STEPS_UP
     for way in WAYS:
         course = correction.Course(omega, free / BACK, step, way.share, -1.0, way.tolerance)
         last = solver.end_of_branch(start, free, course, way.points)
         if last is not None:
-            return last
-    return None
+            yield last
+            return
 
 
 def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:

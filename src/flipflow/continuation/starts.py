@@ -15,6 +15,7 @@ from flipflow.periodic.one_state import one_state_motions
 from flipflow.periodic.two_event import TwoEventProblem
 
 STARTS = 64  # states of a cloud
+SAME = 1e-6  # difference of two states, as a share of their size, within which they are one
 SETTLING_TURNS = 60  # forcing periods that each is run before a motion is solved for
 
 
@@ -29,17 +30,21 @@ def cloud(solver: ExactSolver, omega: float, rng: np.random.Generator) -> Real:
     return np.asarray((2.0 * spread - 1.0) * box)
 
 
-def found_motion(solver: ExactSolver, omega: float) -> Real | None:
-    """State of a motion that Newton reaches from states of all kinds; None where it reaches none.
+def found_motions(solver: ExactSolver, omega: float) -> Iterator[Real]:
+    """States of the motions that Newton reaches from states of all kinds, each once.
 
-    They are the motions that never change their contacts, those of two touches, and a cloud with
-    what it settles to.
+    They are the motions that never change their contacts, those of two touches, and what a cloud of
+    states and the states that these settle to lead to.
     """
+    found: list[Real] = []
     for z in _states(solver, omega):
         point = solver.solve(z, omega)
-        if point is not None:
-            return point.u
-    return None
+        if point is None:
+            continue
+        size = SAME * (np.abs(point.u).max() + solver.length * min(1.0, omega))
+        if all(np.abs(point.u - one).max() > size for one in found):
+            found.append(point.u)
+            yield point.u
 
 
 def _states(solver: ExactSolver, omega: float) -> Iterator[Real]:

@@ -361,9 +361,9 @@ class Solver(ABC):
         forces = np.concatenate([-self.machine.stiffness, -self.machine.damping], axis=1)
         return eigenvalues(np.concatenate([motion, forces]))
 
-    def solve(self, u: Real, omega: float) -> Point | None:
+    def solve(self, u: Real, omega: float, tolerance: float = correction.SHARP) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
-        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, correction.SHARP)
+        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, tolerance)
         record = self.new_branch(1)
         _, points, _ = self._follow(record, u, omega, course)
         if points == 0:
