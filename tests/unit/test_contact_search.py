@@ -193,3 +193,15 @@ def test_extremes_of_random_sums(seed: int, terms: int) -> None:
     close("most", high, y.max(), abs=1e-6 * size)
     assert low <= y.min() + 1e-12 * size
     assert high >= y.max() - 1e-12 * size
+
+
+def test_extremes_of_a_ripple_that_grows() -> None:
+    """At first it is nothing beside the slow motion, at last it is all of it."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        rate = np.array([-0.1 + 1.0j, rng.uniform(4.0, 6.0) + 1j * rng.uniform(40.0, 80.0)])
+        m = motion(0.1, [1.0, 1e-4 * np.exp(1j * rng.uniform(0.0, 6.0))], rate)
+        y = sampled(m, np.linspace(0.0, 2.0, SAMPLES))
+        low, high = range_of(m, 2.0)
+        close("least", low, y.min(), abs=1e-6)
+        close("most", high, y.max(), abs=1e-6)

@@ -286,12 +286,12 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
     radian apart at the mean frequency of the motion. A pair of zeros between two samples could hide
     only a ripple smaller than what the samples resolve.
     """
-    weight = 0.0
+    frequency = _mean_frequency(motion, count, j, 0.0)
     for i in range(count):
-        weight += modulus(motion.amplitude[j, i])
-    exponentials(motion, count, 0.0)
-    _, second, _ = gap_bounds(motion, count, j)
-    frequency = math.sqrt(second / weight) if weight > 0.0 else 0.0
+        if motion.rate[i].real > 0.0:
+            # What grows may be nothing at first and all of the motion at last.
+            frequency = max(frequency, _mean_frequency(motion, count, j, duration))
+            break
     samples = min(1 + int(3.0 * frequency * duration), 4000)
     step = duration / samples
     for i in range(count):
@@ -312,6 +312,18 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
             low, high = min(low, y), max(high, y)
         v_before = v
     return low, high
+
+
+@kernel(inline=True)
+def _mean_frequency(motion: GapMotion, count: int, j: int, t: float) -> float:
+    """Root mean square of |rate|, each weighted with the size of its term at time t."""
+    weight, second = 0.0, 0.0
+    exponentials(motion, count, t)
+    for i in range(count):
+        size = modulus(motion.amplitude[j, i]) * motion.decay[i]
+        weight += size
+        second += size * motion.size[i] * motion.size[i]
+    return math.sqrt(second / weight) if weight > 0.0 else 0.0
 
 
 @kernel(inline=True)
