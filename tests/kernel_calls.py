@@ -7,8 +7,10 @@ import numpy as np
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.continuation.frequency_loop import predict
+from flipflow.continuation.varied import varied_residual
 from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
 from flipflow.dynamics.flow import contact_number, saltation
+from flipflow.dynamics.machine_series import set_machine
 from flipflow.periodic.balance import balance_residual
 from flipflow.periodic.sampled import sampled_residual
 from flipflow.periodic.shooting import shooting_residual
@@ -102,3 +104,15 @@ def predicted(work, step, course, bends):
 def number_of(flow, sided):
     """``contact_number``."""
     return contact_number(flow, sided)
+
+
+@kernel(entry=True)
+def varied(problem, work, u, value, r, J):
+    """``varied_residual``."""
+    return varied_residual(problem, work, u, value, r, J)
+
+
+@kernel(entry=True)
+def series_machine(series, work, value, machine):
+    """``set_machine``."""
+    return set_machine(series, work, value, machine)

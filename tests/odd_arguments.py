@@ -367,6 +367,7 @@ def methods() -> tuple[Call, ...]:
         (one, "stop_force", {"spring": 0, "t": None}, array),
         (one, "stop_force_peak", {"spring": 0}, (float,)),
         (one, "contact_share", {"spring": 0}, (float,)),
+        (one, "stop_power", {"spring": 0}, (float,)),
         (one, "mean_square_velocity", {"which": 0, "spring": None}, (float,)),
         (one, "peak", {"quantity": lambda _t, x, _v, _a: x[:, 0]}, (float,)),
         (motion, "derivative", {"t": [0.0, 0.1], "order": 1}, array),

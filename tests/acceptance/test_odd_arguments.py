@@ -31,7 +31,6 @@ from odd_arguments import (
 )
 
 SEED, DRAWS = 9, 6
-LOOP = "flipflow.continuation.field_loop"  # its steps are few where only its words count
 KINDS = {"functions": functions, "classes": classes, "methods": methods}
 ERRORS = (
     errors.FlipflowError("a sentence"),
@@ -46,19 +45,17 @@ ERRORS = (
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_valid_calls_are_valid(monkeypatch, kind):
-    monkeypatch.setattr(f"{LOOP}.TRIES_MOST", 10)
+def test_valid_calls_are_valid(kind):
     ended = {call.name: ending(call, call.arguments) for call in KINDS[kind]()}
     assert {name: words for name, words in ended.items() if words} == {}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_odd_arguments(monkeypatch, kind):
+def test_odd_arguments(kind):
     """Each place of each call with a few odd arguments; all of them: benchmarks/odd_arguments.py.
 
     Dear calls have fewer draws, so that this stays a matter of seconds.
     """
-    monkeypatch.setattr(f"{LOOP}.TRIES_MOST", 10)
     print(f"seed {SEED}")  # noqa: T201  shown where it fails
     found = [
         finding
@@ -194,7 +191,7 @@ def test_a_fold_over_a_wide_interval_closes():
 
 
 def test_steps_that_lead_nowhere_end(monkeypatch):
-    monkeypatch.setattr(f"{LOOP}.TRIES_MOST", 5)
+    monkeypatch.setattr("flipflow.periodic.solver.POINTS_MOST", 5)
     branch = ff.continue_fold(folded().folds[0], "clearance", (2e-3, 9e-3))
     assert branch.status.name == "POINT_LIMIT"
     assert not branch.complete
@@ -217,8 +214,7 @@ FOLLOWED = {
 
 
 @pytest.mark.parametrize("name", FOLLOWED)
-def test_following_tells_how_far_it_is_and_can_be_cancelled(monkeypatch, name):
-    monkeypatch.setattr(f"{LOOP}.TRIES_MOST", 10)
+def test_following_tells_how_far_it_is_and_can_be_cancelled(name):
     heard = []
     FOLLOWED[name](lambda words, share: heard.append((words, share)))
     shares = [share for _, share in heard]

@@ -1,11 +1,14 @@
 """Event-located integration of M x'' + C x' + K x + sum d H = Re(F exp(i w t)) by DOP853.
 
 Between contacts the machine is linear, but nothing here makes use of that: every smooth piece is
-handed to scipy, which stops at the first event. The contact of a stop is a state machine:
+handed to scipy, which stops at the first event. The contact of a stop is a state machine, with p
+how far beyond the gap:
 
     OPEN      y within the gaps, no force
-    ENGAGED   k (y -+ e) + c y'
-    RELEASED  beyond the gap, but the force has fallen to zero (compression-only law)
+    ENGAGED   k p + c p'
+    RELEASED  beyond the gap, but the force has fallen to zero (compression-only, elasto-gap)
+    OUTWARDS  k p on the way out (undamped-rebound)
+    DOUBLED   2 k p, where the damper would carry more than the spring (elasto-gap)
 """
 
 from __future__ import annotations
@@ -19,6 +22,19 @@ from scipy.integrate import solve_ivp
 from flipflow.model.system import MechanicalSystem
 
 OPEN, ENGAGED, RELEASED = "open", "engaged", "released"
+OUTWARDS, DOUBLED = "outwards", "doubled"
+# What each state watches, the way it crosses zero, and the state that follows: k p + c p' is the
+# push, k p - c p' the spring's lead over its damper.
+WATCHED = {
+    ("paper", ENGAGED): [("depth", -1.0, OPEN)],
+    ("compression-only", ENGAGED): [("push", -1.0, RELEASED)],
+    ("compression-only", RELEASED): [("depth", -1.0, OPEN), ("push", 1.0, ENGAGED)],
+    ("undamped-rebound", ENGAGED): [("rate", -1.0, OUTWARDS)],
+    ("undamped-rebound", OUTWARDS): [("depth", -1.0, OPEN), ("rate", 1.0, ENGAGED)],
+    ("elasto-gap", DOUBLED): [("lead", 1.0, ENGAGED)],
+    ("elasto-gap", ENGAGED): [("lead", -1.0, DOUBLED), ("push", -1.0, RELEASED)],
+    ("elasto-gap", RELEASED): [("depth", -1.0, OPEN), ("push", 1.0, ENGAGED)],
+}
 RTOL, ATOL_SHARE = 1e-11, 1e-13
 STEPS_PER_TURN = 100
 MOST_PIECES = 10_000
@@ -34,7 +50,7 @@ class Stop:
     gap: float
     stiffness: float
     damping: float
-    clipped: bool
+    law: str
 
     def depth(self, x: np.ndarray) -> float:
         """How far beyond the gap."""
@@ -45,14 +61,39 @@ class Stop:
         return float(self.side * (self.direction @ v))
 
     def push(self, x: np.ndarray, v: np.ndarray) -> float:
-        """Force against the motion, not clipped."""
+        """Force against the motion of spring and damper together."""
         return self.stiffness * self.depth(x) + self.damping * self.rate(v)
+
+    def watched(self, what: str, x: np.ndarray, v: np.ndarray) -> float:
+        """Value of one of the functions that are watched."""
+        if what == "depth":
+            return self.depth(x)
+        if what == "rate":
+            return self.rate(v)
+        if what == "push":
+            return self.push(x, v)
+        return self.stiffness * self.depth(x) - self.damping * self.rate(v)
+
+    def force_in(self, state: str, x: np.ndarray, v: np.ndarray) -> float:
+        """Force against the motion in a state."""
+        if state == ENGAGED:
+            return self.push(x, v)
+        return {OUTWARDS: 1.0, DOUBLED: 2.0}.get(state, 0.0) * self.stiffness * self.depth(x)
 
     def state_at(self, x: np.ndarray, v: np.ndarray) -> str:
         """State as position and push say."""
         if self.depth(x) < 0.0 or (self.depth(x) == 0.0 and self.rate(v) <= 0.0):
             return OPEN
-        return RELEASED if self.clipped and self.push(x, v) < 0.0 else ENGAGED
+        if self.law == "undamped-rebound":
+            return ENGAGED if self.rate(v) > 0.0 else OUTWARDS
+        if self.law == "elasto-gap" and self.watched("lead", x, v) < 0.0:
+            return DOUBLED
+        return RELEASED if self.law != "paper" and self.push(x, v) < 0.0 else ENGAGED
+
+    @property
+    def entered(self) -> str:
+        """State on the way in."""
+        return DOUBLED if self.law == "elasto-gap" and self.damping > 0.0 else ENGAGED
 
 
 @dataclass(frozen=True)
@@ -70,7 +111,7 @@ class Machine:
     def of(cls, system: MechanicalSystem) -> Machine:
         """The same machine with every two-sided spring written as two one-sided stops."""
         stops = tuple(
-            Stop(s.direction, side, gap, s.stiffness, s.damping, s.law == "compression-only")
+            Stop(s.direction, side, gap, s.stiffness, s.damping, s.law)
             for s in system.springs
             for side, gap in zip((1, -1), s.gaps, strict=True)
             if np.isfinite(gap)
@@ -147,10 +188,10 @@ def amplitude(
     n = vector.size
     t = np.linspace(start, end, count)
     y = trajectory(t)[:, :n] @ vector
-    return (_top(t, y, trajectory, vector) + _top(t, -y, trajectory, -vector)) / 2.0
+    return (top(t, y, trajectory, vector) + top(t, -y, trajectory, -vector)) / 2.0
 
 
-def _top(t: np.ndarray, y: np.ndarray, trajectory: Trajectory, vector: np.ndarray) -> float:
+def top(t: np.ndarray, y: np.ndarray, trajectory: Trajectory, vector: np.ndarray) -> float:
     """Largest value: the zero of the velocity around the largest sample, by bisection."""
     n = vector.size
     k = int(y.argmax())
@@ -172,15 +213,15 @@ def right_side(
 ) -> Callable[[float, np.ndarray], np.ndarray]:
     """z' with the stops that are engaged now."""
     n = machine.M.shape[0]
-    engaged = [s for s, state in zip(machine.stops, states, strict=True) if state == ENGAGED]
+    touched = [pair for pair in zip(machine.stops, states, strict=True) if pair[1] != OPEN]
     inverse = np.linalg.inv(machine.M)
     force = machine.force * omega**machine.power
 
     def rate(t: float, z: np.ndarray) -> np.ndarray:
         x, v = z[:n], z[n:]
         total = (force * np.exp(1j * omega * t)).real - machine.C @ v - machine.K @ x
-        for stop in engaged:
-            total = total - stop.side * stop.push(x, v) * stop.direction
+        for stop, state in touched:
+            total = total - stop.side * stop.force_in(state, x, v) * stop.direction
         return np.concatenate([v, inverse @ total])
 
     return rate
@@ -193,11 +234,11 @@ def _events(
     n = machine.M.shape[0]
     events, targets = [], []
 
-    def add(which: int, target: str, direction: float, *, push: bool) -> None:
+    def add(which: int, target: str, direction: float, what: str) -> None:
         stop = machine.stops[which]
 
         def event(_: float, z: np.ndarray) -> float:
-            return stop.push(z[:n], z[n:]) if push else stop.depth(z[:n])
+            return stop.watched(what, z[:n], z[n:])
 
         event.terminal, event.direction = True, direction
         events.append(event)
@@ -205,12 +246,8 @@ def _events(
 
     for which, (stop, state) in enumerate(zip(machine.stops, states, strict=True)):
         if state == OPEN:
-            add(which, ENGAGED, 1.0, push=False)
-        elif state == ENGAGED and stop.clipped:
-            add(which, RELEASED, -1.0, push=True)
-        elif state == ENGAGED:
-            add(which, OPEN, -1.0, push=False)
-        else:
-            add(which, OPEN, -1.0, push=False)
-            add(which, ENGAGED, 1.0, push=True)
+            add(which, stop.entered, 1.0, "depth")
+            continue
+        for what, direction, target in WATCHED[stop.law, state]:
+            add(which, target, direction, what)
     return events, targets

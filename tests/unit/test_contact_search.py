@@ -6,6 +6,7 @@ are as sharp as the search promises, 2e-11 of its horizon.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from flipflow.dynamics.contact_search import GapMotion, new_gap_motion
 from flipflow.dynamics.law import Stops
-from flipflow.model.contact_law import NUMBER
+from flipflow.model.contact_law import FORCE, NUMBER
 from judge import close
 from kernel_calls import change_after, range_of
 
@@ -35,11 +36,11 @@ def motion(offset: float, amplitude, rate, spacing: int = 0) -> GapMotion:
 
 def contact(
     plus: float, minus: float = math.inf, stiffness: float = 1.0, damping: float = 0.0,
-    *, clipped: bool = False,
+    *, law: str = "paper",
 ) -> Stops:  # fmt: skip
-    law = NUMBER["compression-only" if clipped else "paper"]
+    number = NUMBER[law]
     one = np.ones(1)
-    return Stops(np.array([law]), stiffness * one, damping * one, np.array([[plus, minus]]))
+    return Stops(np.array([number]), stiffness * one, damping * one, np.array([[plus, minus]]))
 
 
 def sampled(m: GapMotion, t: np.ndarray, order: int = 0) -> np.ndarray:
@@ -152,7 +153,7 @@ def test_what_has_just_fired_does_not_fire_again() -> None:
 
 def test_compression_only_lets_go_before_the_gap() -> None:
     """Where k (y - e) + c y' = 0: y = cos t, e = 0.5, c / k = 0.4."""
-    c = contact(0.5, stiffness=1.0, damping=0.4, clipped=True)
+    c = contact(0.5, stiffness=1.0, damping=0.4, law="compression-only")
     m = motion(0.0, [1.0], [1j])
     t, event = search(m, c, PLUS, 10.0)
     assert event == (0, RELEASED_PLUS)
@@ -163,6 +164,83 @@ def test_compression_only_lets_go_before_the_gap() -> None:
     length, event = search(later, c, RELEASED_PLUS, 10.0, fired=0)
     assert event == (0, OPEN)
     close("back at the gap", t + length, math.pi / 3.0, abs=20.0 * SHARP)
+
+
+def test_a_piece_entered_where_gap_and_rate_vanish_together_is_left() -> None:
+    """At the top of a touch one rounding deep: Newton's step from there would be 11 s long."""
+    c = contact(np.nextafter(1.0, 0.0), law="undamped-rebound", damping=0.4)
+    t, event = search(motion(0.0, [1.0 + 1e-17j], [1j]), c, 2, 3.0, fired=0)
+    assert event == (0, OPEN)
+    close("time", t, 0.0, abs=1e-7)
+
+
+def walked(m: GapMotion, c: Stops, state: int, horizon: float) -> list[tuple[float, int]]:
+    """Times of all changes of contact over the horizon, and the regimes that they begin."""
+    found, t, fired = [], 0.0, -1
+    while True:
+        here = motion(m.offset[0], m.amplitude[0] * np.exp(m.rate * t), m.rate)
+        length, (spring, new) = search(here, c, state, horizon - t, fired)
+        if spring < 0:
+            return found
+        t, state, fired = t + length, new, spring
+        found.append((t, state))
+        assert len(found) < 1000, "the stop chatters"
+
+
+def test_pieces_of_elasto_gap_follow_each_other() -> None:
+    """y = cos t, e = 0.5, c / k = 0.4: 2 k p, k p + c y', nothing; and the mirror image."""
+    c = contact(0.5, 0.5, stiffness=1.0, damping=0.4, law="elasto-gap")
+    size, phase = math.hypot(1.0, 0.4), math.atan2(0.4, 1.0)
+    turn, half = math.acos(0.5 / size), math.pi
+    rising = [(-math.pi / 3.0, 2), (phase - turn, 1), (turn - phase, 3), (math.pi / 3.0, OPEN)]
+    found = walked(motion(0.0, [np.exp(-0.5j * half)], [1j]), c, OPEN, 2.0 * half)
+    expected = [(0.5 * half + t, q) for t, q in rising] + [(1.5 * half + t, -q) for t, q in rising]
+    assert [q for _, q in found] == [q for _, q in expected]
+    close("times", [t for t, _ in found], [t for t, _ in expected], abs=1e2 * SHARP)
+
+
+def test_pieces_of_undamped_rebound_follow_each_other() -> None:
+    """y = cos t - 0.4 cos 2 t dips between two tops, all of it beyond the gap of 0.4.
+
+    y' = sin t (1.6 cos t - 1) is zero at t = 0 and where cos t = 0.625.
+    """
+    c = contact(0.4, stiffness=1.0, damping=0.4, law="undamped-rebound")
+    start = np.exp(1j * np.array([1.0, 2.0]) * -math.pi)
+    found = walked(motion(0.0, [start[0], -0.4 * start[1]], [1j, 2j]), c, OPEN, 2.0 * math.pi)
+    edge, top = math.pi / 2.0, math.acos(0.625)
+    times = math.pi + np.array([-edge, -top, 0.0, top, edge])
+    assert [q for _, q in found] == [1, 2, 1, 2, OPEN]
+    close("times", [t for t, _ in found], times, abs=1e2 * SHARP)
+
+
+@pytest.mark.parametrize("law", ["compression-only", "undamped-rebound", "elasto-gap"])
+@pytest.mark.parametrize("damping", [0.01, 0.1, 1.0])
+def test_every_piece_is_the_one_that_the_force_is_in(law: str, damping: float) -> None:
+    """Random sums: between two changes the piece's force is that of the law's formula."""
+    formula = {
+        "compression-only": lambda kp, cv: max(0.0, kp + cv),
+        "undamped-rebound": lambda kp, cv: kp + max(0.0, cv),
+        "elasto-gap": lambda kp, cv: kp + min(max(cv, -kp), kp),
+    }[law]
+    c, met = contact(0.3, 0.5, damping=damping, law=law), set()
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        rate = np.append(-rng.uniform(0.0, 0.3, 3), 0.0) + 1j * rng.uniform(0.0, 10.0, 4)
+        amplitude = rng.normal(size=4) + 1j * rng.normal(size=4)
+        # The walk begins within the gap.
+        m = motion(-amplitude.real.sum(), amplitude, rate)
+        changes = [(0.0, OPEN), *walked(m, c, OPEN, 10.0), (10.0, OPEN)]
+        for (begin, regime), (end, _) in itertools.pairwise(changes):
+            met.add(regime)
+            for t in np.linspace(begin, end, 9)[1:-1]:
+                y, v = (float(sampled(m, np.array([t]), order)[0]) for order in (0, 1))
+                side = 1 if y > 0.3 else -1 if y < -0.5 else 0
+                p = y - 0.3 if side > 0 else -0.5 - y
+                expected = formula(p, damping * side * v) if side else 0.0
+                f_k, f_c = FORCE[NUMBER[law], abs(regime)]
+                assert regime == 0 or np.sign(regime) == side
+                close(f"force at {t}", f_k * p + f_c * damping * side * v, expected, abs=1e-7)
+    assert met == {side * q for q in range(4 if law == "elasto-gap" else 3) for side in (1, -1)}
 
 
 def test_equally_spaced_rates_are_the_same_search() -> None:

@@ -11,7 +11,7 @@ import flipflow as ff
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.dynamics.contact_free import complex_amplitudes
-from flipflow.dynamics.first_contact import FINEST, contact_free_up_to
+from flipflow.dynamics.contact_free_range import FINEST, contact_free_up_to
 from flipflow.periodic.exact_solver import ExactSolver
 
 pytestmark = pytest.mark.numerical

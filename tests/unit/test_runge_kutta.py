@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import math
 from fractions import Fraction
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 import flipflow as ff
 from flipflow.errors import InputError
+from flipflow.model.contact_law import ContactLaw
 from flipflow.model.drive import Drive, Motor, SpeedProfile
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
 from flipflow.model.system import MechanicalSystem
@@ -99,7 +101,7 @@ def test_error_weights_are_of_order_four():
     assert any(value != 0 for value in differences(5))
 
 
-@pytest.fixture(scope="module", params=["paper", "compression-only"])
+@pytest.fixture(scope="module", params=get_args(ContactLaw))
 def shaken(request, screen):
     """A motion with contacts that is not periodic, and where the exact flow takes it in 2 turns."""
     system = screen.replace(stop_law=request.param).system()

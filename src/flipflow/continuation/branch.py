@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from flipflow.continuation.between_points import SHARE_TOLERANCE
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
+from flipflow.continuation.refinement import SHARE_TOLERANCE
 from flipflow.continuation.special_points import FOLD
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import (

@@ -23,8 +23,7 @@ from flipflow.continuation.switching import (
     meeting,
 )
 from flipflow.errors import InputError, SampledContactWarning
-from flipflow.model.arguments import checked_interval, checked_monitor, checked_word
-from flipflow.model.fields import MOTION_FIELDS
+from flipflow.model.arguments import checked_interval, checked_monitor
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine
 from flipflow.periodic.balance_solver import SampledSolver
@@ -59,13 +58,13 @@ def continue_orbit(
         Where to start: a motion of :func:`~flipflow.periodic_orbits`, of a branch, or a special
         point's.
     field
-        "omega", or a field of :class:`~flipflow.FlipFlowScreen` such as "clearance": the speed
-        then stays that of ``orbit``, and the motions are exact.
+        "omega", or a field of the screen such as "clearance", or of any frozen dataclass with
+        ``.system()``; of a plain system "forcing", a factor on the excitation, or a path such as
+        "springs[0].clearance". The speed then stays that of ``orbit``, and the motions are exact.
     interval
         (low, high) in rad/s or in the field's SI unit; it holds the motion's own value.
     monitor
-        Called with a sentence and the share done: before each step over a field, before each way
-        over omega. Raise from it to cancel.
+        Called before each way with a sentence and the share done; raise from it to cancel.
 
     Returns
     -------
@@ -85,7 +84,6 @@ def continue_orbit(
         When the orbit's own method samples the contact force.
     """
     checked_orbit("orbit", orbit)
-    checked_word("field", field, ("omega", *MOTION_FIELDS))
     say = checked_monitor(monitor)
     if field != "omega":
         return field_branch(orbit, field, interval, formulation_like(orbit, ExactSolver), say)

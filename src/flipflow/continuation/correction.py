@@ -98,10 +98,11 @@ def new_corrector(unknowns: int, gaps: int) -> Corrector:
 def set_scale(problem: Any, work: Corrector, u: Real, omega: float, course: Course) -> None:
     """Length of one step in each unknown."""
     n = work.r.shape[0]
+    work.scale[n] = course.omega_step
     unknown_scale(problem, u, omega, work.scale)
     for k in range(n):
         work.scale[k] *= course.u_step
-    work.scale[n] = course.omega_step
+    work.scale[n] = min(float(work.scale[n]), course.omega_step)
 
 
 @kernel
@@ -159,8 +160,6 @@ def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tu
         work.w[k] = work.guess[k]
     before, contacts = math.inf, -1
     for iteration in range(1, NEWTON_MOST + 1):
-        if not work.w[n] > 0.0:
-            return status.NO_CONVERGENCE, iteration
         code = residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
         if code != status.OK:
             return code, iteration

@@ -13,8 +13,7 @@ from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import FOLD
 from flipflow.model.arguments import checked_index, checked_text
-from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import Coordinate
+from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
 from flipflow.results.frozen import Frozen
@@ -46,11 +45,11 @@ class FieldBranch(Frozen):
     Parameters
     ----------
     machine
-        The screen from which the branch was followed.
+        The machine from which the branch was followed.
     field
         Name of the field.
     orbits
-        The motions, each of its own screen.
+        The motions, each of its own machine.
     values
         The field's values in SI, (n,).
     special_points
@@ -63,7 +62,7 @@ class FieldBranch(Frozen):
         Version of flipflow.
     """
 
-    machine: FlipFlowScreen
+    machine: Machine
     field: str
     orbits: tuple[Orbit, ...]
     values: Real

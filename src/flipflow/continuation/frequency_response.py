@@ -18,7 +18,7 @@ from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
 from flipflow.continuation.starts import found_motions
 from flipflow.dynamics.contact_free import complex_amplitude
-from flipflow.dynamics.first_contact import contact_free_up_to
+from flipflow.dynamics.contact_free_range import contact_free_up_to
 from flipflow.errors import IncompleteError, InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.contact_law import pushes_whole
@@ -184,12 +184,12 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def some_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of a motion that is not reached from below, or the best guess of one."""
     settled = settled_unknowns(solver, omega)
-    if solver.solve(settled, omega, correction.QUICK) is not None:
+    if solver.starts(settled, omega):
         return settled
     exact = _exact(solver, half_turn=solver.half_turn)
     for z in chain(_followed_down(exact, omega), found_motions(exact, omega)):
         u = _unknowns_of(solver, exact, z, omega)
-        if solver.solve(u, omega, correction.QUICK) is not None:
+        if solver.starts(u, omega):
             return u
     return settled
 

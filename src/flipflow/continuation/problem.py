@@ -13,6 +13,8 @@ from numba.core.types import NamedTuple as NamedTupleType
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import chosen_by_type, kernel
+from flipflow.continuation import varied
+from flipflow.continuation.varied import Varied
 from flipflow.periodic import section
 from flipflow.periodic.balance import balance_residual, series_scale
 from flipflow.periodic.sampled import (
@@ -33,17 +35,29 @@ from flipflow.periodic.shooting import (
 )
 
 _RESIDUAL: dict[type, Any] = {
+    Varied: varied.varied_residual,
     Shooting: shooting_residual,
     Balance: balance_residual,
     Sampled: sampled_residual,
 }
-_SIGNATURE: dict[type, Any] = {Shooting: crossings, Balance: contact_count, Sampled: passages}
+_SIGNATURE: dict[type, Any] = {
+    Varied: varied.varied_crossings,
+    Shooting: crossings,
+    Balance: contact_count,
+    Sampled: passages,
+}
 _DEPTHS: dict[type, Any] = {
+    Varied: varied.varied_depths,
     Shooting: flow_depths,
     Balance: series_depths,
     Sampled: sampled_depths,
 }
-_SCALE: dict[type, Any] = {Shooting: state_scale, Balance: series_scale, Sampled: sampled_scale}
+_SCALE: dict[type, Any] = {
+    Varied: varied.varied_scale,
+    Shooting: state_scale,
+    Balance: series_scale,
+    Sampled: sampled_scale,
+}
 
 
 @kernel
@@ -67,17 +81,25 @@ def _itself(problem: Any) -> Any:
 
 
 _MIRRORED: dict[type, Any] = {
+    Varied: varied.varied_mirrored,
     Shooting: mirrored_shooting,
     Balance: _itself,
     Sampled: _itself,
 }
 _BETTER: dict[type, Any] = {
+    Varied: varied.varied_better,
     Shooting: section.better_section,
     Balance: _no_better,
     Sampled: _no_better,
 }
-_CARRIED: dict[type, Any] = {Shooting: section.carried, Balance: _stays, Sampled: _stays}
+_CARRIED: dict[type, Any] = {
+    Varied: varied.varied_carried,
+    Shooting: section.carried,
+    Balance: _stays,
+    Sampled: _stays,
+}
 _SET: dict[type, Any] = {
+    Varied: varied.varied_section,
     Shooting: section.set_section,
     Balance: _no_section,
     Sampled: _no_section,

@@ -4,7 +4,7 @@ Every test function is a smooth number along the branch: the tangent's share in 
 det(I + map) (loss of symmetry or period doubling), prod (1 - lambda_i lambda_j) (Neimark-Sacker),
 and the depth of each contact. A zero is refined on corrected points of the branch, never
 interpolated. Two zeros within one step leave a dip without a change of sign: every dip is followed
-to its bottom. Folds and contacts are refined by :mod:`flipflow.continuation.between_points`.
+to its bottom. Folds and contacts are refined by :mod:`flipflow.continuation.refinement`.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
-from flipflow.continuation.between_points import FOLD as OF_FOLD
-from flipflow.continuation.between_points import SHARE_TOLERANCE
 from flipflow.continuation.exact_check import ExactBeside, unconfirmed_note
+from flipflow.continuation.refinement import FOLD as OF_FOLD
+from flipflow.continuation.refinement import SHARE_TOLERANCE
 from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.solver import Point, Solver, Traced
@@ -203,10 +203,7 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
             if np.isinf(gap) or (side < 0 and solver.half_turn):
                 continue
 
-            def evaluate(point: Point, j: int = j, side: int = side, gap: float = gap) -> float:
-                least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
-                return float((most[0, j] if side > 0 else -least[0, j]) - gap)
-
+            evaluate = partial(solver.depth, spring=j, side=at)
             depth = traced.depth[:, j, at]
             zero = partial(solver.zero_between, traced, 2 * j + at)
             tests.append(Test(CONTACT_BEGIN, depth, evaluate, j, side, zero=zero))

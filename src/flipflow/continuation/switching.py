@@ -16,13 +16,16 @@ from scipy.optimize import root_scalar
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import correction
-from flipflow.continuation.field_loop import CLOSE, NEAR, SAME
 from flipflow.errors import IncompleteError
 from flipflow.model.monitor import Monitor, silent
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus
 
+# Distances of a motion from the parent branch, relative to the motion.
+NEAR = 1e-2  # a branch that stalls within it has met its parent
+CLOSE = 1e-3  # points within it are left out at a meeting
+SAME = 1e-7  # a motion within it is one of the parent's
 FINER = (1.0, 0.05, 0.01, 0.001)  # factors on the step, tried until no point lands on the parent
 SMALL = 1e-3  # distance of a child's first motion from its parent, relative to the motion
 SECANT = 1e-6  # relative distance in omega of the first two points of the secant method
@@ -47,9 +50,9 @@ def parent_of(solver: Solver) -> ExactSolver | None:
     if not isinstance(solver, ExactSolver) or solver.half_turn:
         return None
     if solver.turns % 2 == 0:
-        return ExactSolver(solver.system, half_turn=False, turns=solver.turns // 2)
+        return solver.like(half_turn=False, turns=solver.turns // 2)
     if solver.system.symmetric and solver.system.springs:
-        return ExactSolver(solver.system, half_turn=True, turns=solver.turns)
+        return solver.like(half_turn=True, turns=solver.turns)
     return None
 
 
@@ -137,14 +140,15 @@ def follow_both_ways(
     solver: Solver, u: Real, omega: float, course: correction.Course, monitor: Monitor = silent
 ) -> Followed:
     """Follow the branch from (u, omega) both ways; it begins at its end of lower omega."""
-    monitor(f"from {omega:.6g} rad/s", 0.0)
+    unit = solver.unit if isinstance(solver, ExactSolver) else " rad/s"
+    monitor(f"from {omega:.6g}{unit}", 0.0)
     up, down = course._replace(direction=1.0), course._replace(direction=-1.0)
     if omega == course.upper:
         return _one_way(*follow_until_meeting(solver, u, omega, down), None)
     ahead, end = follow_until_meeting(solver, u, omega, up)
     if ahead.code == status.CLOSED or ahead.omega.size == 0 or omega == course.lower:
         return _one_way(ahead, end, None)
-    monitor(f"back from {omega:.6g} rad/s", 0.4)
+    monitor(f"back from {omega:.6g}{unit}", 0.4)
     back, start = follow_until_meeting(solver, u, omega, down)
     if ahead.omega[-1] < back.omega[-1]:
         return Followed(ahead.reversed_into(back), end, start)
@@ -170,7 +174,7 @@ def _distances(parent: ExactSolver, traced: Traced) -> Real:
     """How far each motion is from being one of the parent's."""
     return np.array(
         [
-            distance_to(u, image(parent, u, float(omega)), float(omega))
+            distance_to(u, image(parent, u, float(omega)), parent.frequency(float(omega)))
             for u, omega in zip(traced.u, traced.omega, strict=True)
         ]
     )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.errors import InputError
 from flipflow.model.contact_law import NUMBER
 from flipflow.model.elements import ClearanceSpring

@@ -25,8 +25,8 @@ import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.law import Stops, exit_of, signed_gap
-from flipflow.model.contact_law import ENTERED, MOST_EXITS, NO_EXIT, OPEN
+from flipflow.dynamics.law import Stops, entered, exit_of, signed_gap
+from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 
 NOTHING = -9  # no regime: nothing has changed yet
 MAX_SEARCH = 20_000  # steps of one search; thirty are usual
@@ -215,9 +215,12 @@ def next_change(
         step = longest
         for j in range(regime.shape[0]):
             low, new = spring_change(motion, stops, regime[j], count, j)
-            if new != NOTHING and not (t == 0.0 and j == fired):
-                # The last step may have been the smallest one: Newton takes back what it overshot.
-                return max(t + max(min(low, least), -least), 0.0), j, new
+            if new != NOTHING:
+                if not (t == 0.0 and j == fired):
+                    # The last step may have been the smallest: Newton takes back what it overshot.
+                    return max(t + max(min(low, least), -least), 0.0), j, new
+                # Newton's step is no safe one where a function and its rate vanish together.
+                low = least
             step = min(step, max(low, least))
         t += step
         if t >= horizon:
@@ -236,9 +239,10 @@ def spring_change(
     if regime == OPEN:
         up = stops.gap[j, 0] - y
         down = y + stops.gap[j, 1]
+        piece = entered(stops, j)
         return _sooner(
-            _approach(up, -v, -a, second, third, scale, ENTERED),
-            _approach(down, v, a, second, third, scale, -ENTERED),
+            _approach(up, -v, -a, second, third, scale, piece),
+            _approach(down, v, a, second, third, scale, -piece),
         )
     side = 1 if regime > OPEN else -1
     gap = signed_gap(stops, j, regime)

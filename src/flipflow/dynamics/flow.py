@@ -25,13 +25,13 @@ from flipflow.dynamics.contact_search import (
     next_change,
     reciprocal,
 )
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import (
     kind,
     regime_at,
     signed_gap,
     tangent_kick,
 )
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, new_modes, state_number
 
 MOST_SEGMENTS = 600  # that a flow can record; a turn has one more than changes of contact

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.model.contact_law import (
-    ENTERED,
+    ENTRY,
     EXITS,
     FORCE,
     KIND,
@@ -19,6 +19,7 @@ from flipflow.model.contact_law import (
     NO_EXIT,
     OPEN,
     TARGET,
+    WHOLE,
 )
 
 
@@ -66,13 +67,27 @@ def force(stops: Stops, j: int, regime: int, y: float, v: float) -> float:
 
 
 @kernel(inline=True)
-def stored_energy(stops: Stops, j: int, regime: int, y: float) -> float:
-    """Energy in J that spring j holds in a regime at position y."""
-    f_k = stiffness_share(stops, j, regime)
+def spring_force(stops: Stops, j: int, regime: int, y: float) -> float:
+    """What of the force the spring alone carries in a regime at position y: the rest is damping."""
+    f_k = min(stiffness_share(stops, j, regime), 1.0)
     if f_k == 0.0:
         return 0.0
+    return f_k * stops.stiffness[j] * (y - signed_gap(stops, j, regime))
+
+
+@kernel(inline=True)
+def stored_energy(stops: Stops, j: int, regime: int, y: float) -> float:
+    """Energy in J that spring j holds in a regime at position y; 2 k p holds no more than k p."""
+    if stiffness_share(stops, j, regime) == 0.0:
+        return 0.0
     depth = y - signed_gap(stops, j, regime)
-    return 0.5 * f_k * stops.stiffness[j] * depth * depth
+    return 0.5 * spring_force(stops, j, regime, y) * depth
+
+
+@kernel(inline=True)
+def entered(stops: Stops, j: int) -> int:
+    """The piece with which spring j is entered at the gap."""
+    return ENTRY[stops.law[j]] if stops.damping[j] > 0.0 else WHOLE
 
 
 @kernel(inline=True)
@@ -84,11 +99,11 @@ def exit_of(stops: Stops, j: int, regime: int, e: int) -> tuple[float, float, in
     """
     law, piece = stops.law[j], abs(regime)
     target = TARGET[law, piece, e]
+    if stops.damping[j] == 0.0:
+        # Without damping the force falls to zero at the gap and not before: the spring opens.
+        return (1.0, 0.0, OPEN) if e == 0 else (0.0, 0.0, NO_EXIT)
     if target == NO_EXIT:
         return 0.0, 0.0, NO_EXIT
-    if stops.damping[j] == 0.0 and KIND[law, target] == 0:
-        # Without damping the force falls to zero at the gap and not before: the spring opens.
-        target = OPEN
     alpha = EXITS[law, piece, e, 0] + EXITS[law, piece, e, 1] * stops.stiffness[j]
     beta = EXITS[law, piece, e, 2] + EXITS[law, piece, e, 3] * stops.damping[j]
     return alpha, beta, target
@@ -105,7 +120,7 @@ def regime_at(stops: Stops, j: int, y: float, v: float) -> int:
     else:
         return OPEN
     depth, rate = side * (y - signed_gap(stops, j, side)), side * v
-    piece = ENTERED
+    piece = entered(stops, j)
     for _ in range(MOST_PIECES):
         for e in range(MOST_EXITS):
             alpha, beta, target = exit_of(stops, j, piece, e)

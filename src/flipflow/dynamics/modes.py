@@ -22,8 +22,8 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.compiled.eigen import Schur, eigenvector, new_schur, real_schur
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import kind
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.errors import InputError
 from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 
@@ -73,7 +73,10 @@ def new_modes(machine: MachineArrays) -> Modes:
     states = place.pop()
     modes = 2 * n
     if states > MOST_STATES or states * (2 * modes + 2 * m) * modes * 16 > MOST_BYTES:
-        remedy = "give at most 12 springs with a gap, fewer of a large machine"
+        remedy = (
+            "give at most 12 springs with a gap, 7 of laws with three forces, fewer of a large "
+            "machine"
+        )
         raise InputError("springs", m, remedy)
     table = (states, modes)
     return Modes(

@@ -157,7 +157,7 @@ def _machine_entries() -> Iterable[Entry]:
     )  # fmt: skip
     yield Entry(
         "stops", "law", "choice",
-        "Force law: as the paper writes it, or without the pull at release.",
+        "Force law: the paper's, no pull, no damping outwards, damping within the spring's force.",
         "paper", choices=get_args(ContactLaw),
     )  # fmt: skip
     yield Entry(

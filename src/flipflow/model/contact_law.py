@@ -11,13 +11,17 @@ and leaves the piece when a switching function
 
 falls through zero. Between two changes the machine is therefore linear, whatever the law. A
 regime is a piece with its side: 0 open, q or -q piece q on the plus or minus side. A side is
-entered at the gap with piece 1, where the force jumps by f_c c p'.
+entered at the gap, with the piece that holds at p = 0 and p' > 0; there the force jumps by
+f_c c p'. From piece to piece it does not jump: what two pieces differ by vanishes with the h
+between them. Without damping every law is k p down to the gap, which piece 1 is.
 
 =================  ==================================  ==========================================
 law                force in contact                    source
 =================  ==================================  ==========================================
 paper              k p + c p', pulls before release    Lin et al., Minerals 14 (2024) 406, Eq. (2)
 compression-only   max(0, k p + c p')                  the same, its pull cut off
+undamped-rebound   k p + c max(0, p')                  Simscape's stop with undamped rebound
+elasto-gap         k p + clip(c p', -k p, k p)         ElastoGap of Modelica's standard library
 =================  ==================================  ==========================================
 """
 
@@ -31,8 +35,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
-ContactLaw = Literal["paper", "compression-only"]
-OPEN, ENTERED, NO_EXIT = 0, 1, -1
+ContactLaw = Literal["paper", "compression-only", "undamped-rebound", "elasto-gap"]
+OPEN, WHOLE, NO_EXIT = 0, 1, -1  # piece 1 of every law carries all of k p + c p'
 
 
 @dataclass(frozen=True)
@@ -63,11 +67,30 @@ LAWS: dict[str, tuple[Piece, ...]] = {
         Piece(1.0, 1.0, (Exit(2, a_k=1.0, b_c=1.0),)),
         Piece(0.0, 0.0, (AT_THE_GAP, Exit(1, a_k=-1.0, b_c=-1.0))),
     ),
+    # Its damper acts on the way in, and again where the way out turns back inwards.
+    "undamped-rebound": (
+        Piece(1.0, 1.0, (Exit(2, b=1.0),)),
+        Piece(1.0, 0.0, (AT_THE_GAP, Exit(1, b=-1.0))),
+    ),
+    # Its damper never carries more than its spring: both are equal after entry, and cancel at last.
+    "elasto-gap": (
+        Piece(1.0, 1.0, (Exit(3, a_k=1.0, b_c=1.0), Exit(2, a_k=1.0, b_c=-1.0))),
+        Piece(2.0, 0.0, (Exit(1, a_k=-1.0, b_c=1.0),)),
+        Piece(0.0, 0.0, (AT_THE_GAP, Exit(1, a_k=-1.0, b_c=-1.0))),
+    ),
 }
 NUMBER = {name: number for number, name in enumerate(get_args(ContactLaw))}
 
 MOST_PIECES = max(map(len, LAWS.values()))
 MOST_EXITS = max(len(piece.exits) for pieces in LAWS.values() for piece in pieces)
+
+
+def _entered(pieces: tuple[Piece, ...]) -> int:
+    """The piece that holds just inside the gap on the way in, p = 0 and p' > 0, with damping."""
+    q = WHOLE
+    for _ in pieces:
+        q = next((way.to for way in pieces[q - 1].exits if way.b + way.b_c < 0.0), q)
+    return q
 
 
 def _flattened() -> tuple[Real, Real, Int, Int, Int]:
@@ -92,6 +115,7 @@ def _flattened() -> tuple[Real, Real, Int, Int, Int]:
 # What kernels read: f_k and f_c; a, a_k, b, b_c; the piece that follows; pieces of equal force
 # have one number, since the machine is the same linear one in all of them; how many there are.
 FORCE, EXITS, TARGET, KIND, KINDS = _flattened()
+ENTRY: Int = np.array([_entered(LAWS[name]) for name in NUMBER])  # the piece entered, with damping
 
 
 def shares(law: ContactLaw, regime: Int | int) -> tuple[Real, Real]:
@@ -134,8 +158,9 @@ def force_in(
 def stored_energy(
     law: ContactLaw, k: float, gaps: tuple[float, float], regime: Int, y: Real
 ) -> Real:
-    """Energy in J of a stop's spring in known regimes."""
+    """Energy in J of a stop's spring in known regimes; what a force of 2 k p adds is damping."""
     f_k, _ = shares(law, regime)
+    f_k = np.minimum(f_k, 1.0)
     depth = np.where(f_k != 0.0, y - np.where(f_k != 0.0, signed_gap(regime, gaps), 0.0), 0.0)
     return np.asarray(0.5 * f_k * k * depth**2)
 
@@ -147,8 +172,8 @@ def regime_at(
     y, v = np.broadcast_arrays(np.asarray(y, float), np.asarray(v, float))
     side = np.where(y > gaps[0], 1, np.where(y < -gaps[1], -1, 0))
     depth = np.where(side != 0, side * (y - np.where(side != 0, signed_gap(side, gaps), 0.0)), 0.0)
-    piece = np.abs(side)
-    for _ in range(MOST_PIECES):
+    piece = np.abs(side) * WHOLE
+    for _ in range(MOST_PIECES if c > 0.0 else 0):
         for e in range(MOST_EXITS):
             a, a_k, b, b_c = np.moveaxis(EXITS[NUMBER[law], piece, e], -1, 0)
             target = TARGET[NUMBER[law], piece, e]

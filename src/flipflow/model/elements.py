@@ -32,8 +32,13 @@ class ClearanceSpring:
     .. math:: H = k (y - e_+) + c \dot y,
 
     and for :math:`y < -e_-` the same with :math:`y + e_-`; zero between. At the gap itself the
-    force jumps by :math:`c \dot y` on entry and pulls for a moment before release. The
-    "compression-only" law clips that pull: it lets go where the force has fallen to zero.
+    force jumps by :math:`c \dot y` on entry and pulls for a moment before release. With
+    the penetration p > 0 and its rate p' the other laws push with
+
+    - "compression-only": :math:`\max(0, k p + c p')`, without that pull;
+    - "undamped-rebound": :math:`k p + c \max(0, p')`, without damping on the way out;
+    - "elasto-gap": :math:`k p + \mathrm{clip}(c p', -k p, k p)`, with no more damping than the
+      spring carries, so that nothing jumps at the gap.
 
     Parameters
     ----------
@@ -44,7 +49,7 @@ class ClearanceSpring:
     clearance, clearance_minus
         e+ and e- in m; None means the same on both sides, infinity no stop on that side.
     law
-        ``"paper"`` or ``"compression-only"``.
+        ``"paper"``, ``"compression-only"``, ``"undamped-rebound"`` or ``"elasto-gap"``.
 
     Raises
     ------

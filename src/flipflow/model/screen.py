@@ -80,7 +80,8 @@ class FlipFlowScreen:
     clearance, clearance_minus
         Gap per side e+ and, where it differs, e- in m; infinite means no stop on that side.
     stop_law
-        ``"paper"`` or ``"compression-only"``; see :class:`~flipflow.ClearanceSpring`.
+        ``"paper"``, ``"compression-only"``, ``"undamped-rebound"`` or ``"elasto-gap"``; see
+        :class:`~flipflow.ClearanceSpring`.
     normal_stiffness, normal_damping
         k1n in N/m and c1n in N s/m normal to the surface; None leaves that direction unchecked.
     temperature_factor

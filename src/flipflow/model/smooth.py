@@ -40,7 +40,7 @@ def smooth_force(
     Raises
     ------
     InputError
-        For the compression-only law, which has no such form, and a sharpness of 0 or less.
+        For a law other than the paper's, which have no such form, and a sharpness of 0 or less.
 
     Notes
     -----

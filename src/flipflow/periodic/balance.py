@@ -103,7 +103,7 @@ def balance_residual(
 ) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
     set_series(problem, work, u)
-    code = prepare_receptance(problem, work, omega)
+    code = prepare_receptance(problem, work, omega) if omega > 0.0 else status.NO_CONVERGENCE
     if code == status.OK:
         code = record_contacts(problem, work, omega)
     if code != status.OK:

@@ -27,6 +27,7 @@ class ExactSolver(Solver):
     """
 
     reads_jacobian = True
+    unit = " rad/s"  # of the parameter over which motions are followed
 
     def __init__(self, system: MechanicalSystem, *, half_turn: bool, turns: int = 1) -> None:
         super().__init__(system, half_turn=half_turn, turns=turns)
@@ -39,6 +40,14 @@ class ExactSolver(Solver):
     @property
     def flow(self) -> Flow:
         return self.shooting_work.flow
+
+    def like(self, *, half_turn: bool, turns: int) -> ExactSolver:
+        """A solver of the same machine's motions of another kind."""
+        return ExactSolver(self.system, half_turn=half_turn, turns=turns)
+
+    def frequency(self, at: float) -> float:
+        """Frequency in rad/s of motions at a value of the parameter that is followed."""
+        return at
 
     def residual(self, z: Real, omega: float) -> tuple[Real, Real] | None:
         """r = sign flow(z) - z and [dr/dz, dr/d omega]; None where the flow does not end."""

@@ -19,7 +19,7 @@ from flipflow.model.arguments import (
     checked_reals,
     takes,
 )
-from flipflow.model.contact_law import ENTERED, OPEN, force_in, shares
+from flipflow.model.contact_law import OPEN, WHOLE, force_in, shares
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
@@ -203,8 +203,8 @@ class Orbit(Frozen):
     def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
         """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
 
-        With ``spring``, only the time is counted during which that stop's damper acts: damping
-        times this is the power that the stop takes.
+        With ``spring``, only the time is counted during which that stop's damper acts; what the
+        stop takes is :meth:`stop_power`.
         """
         vector = self.system.coordinate(which)
         if spring is not None:
@@ -218,6 +218,19 @@ class Orbit(Frozen):
             return np.asarray(rate**2 * damped)
 
         return self._mean(square)
+
+    def stop_power(self, spring: int = 0) -> float:
+        """Mean power that a stop takes in W: the mean of H y' over the period, by Gauss quadrature.
+
+        It is what its damping takes, and what its spring still holds where the law lets go early.
+        """
+        stop = self._spring(spring)
+
+        def power(t: Real, piece: NDArray[np.intp]) -> Real:
+            rate = self.motion.piece_derivative(t, piece, 1) @ stop.direction
+            return self._force(spring, t, piece) * rate
+
+        return self._mean(power)
 
     def input_power(self) -> float:
         """Mean power that the excitation feeds in, W: only the first harmonic takes part in it."""
@@ -278,7 +291,7 @@ class Orbit(Frozen):
     def _regime(self, spring: int, piece: NDArray[np.intp]) -> Int:
         """Regime of a spring in each piece: one without gap always pushes."""
         if self._spring(spring).bonded:
-            return np.full(piece.shape, ENTERED)
+            return np.full(piece.shape, WHOLE)
         if spring not in self._kept:
             return np.full(piece.shape, OPEN)
         return np.asarray(self.motion.regime[piece, self._kept.index(spring)])

@@ -151,6 +151,8 @@ def sampled_residual(
 ) -> int:
     """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
     set_series(problem.balance, work.balance, u)
+    if not omega > 0.0:
+        return status.NO_CONVERGENCE
     code = prepare_receptance(problem.balance, work.balance, omega)
     if code != status.OK:
         return code

@@ -12,9 +12,9 @@ import math
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, carry_tangent, run_flow, segment_state
 from flipflow.dynamics.law import exit_of, signed_gap
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
@@ -38,14 +38,19 @@ def margin(machine: MachineArrays, flow: Flow, e: int, z: Real, omega: float) ->
             y += machine.direction[j, k] * z[k]
             v += machine.direction[j, k] * z[n + k]
             reach += abs(machine.direction[j, k])
-        away = _distance(machine, j, flow.regimes[e, j], y, v)
+        away = _distance(machine, j, flow.regimes[e, j], y, v, omega)
         least = min(least, away / (reach * size))
     return least
 
 
 @kernel
-def _distance(machine: MachineArrays, j: int, regime: int, y: float, v: float) -> float:
-    """Distance in m of spring j from its next change, had all of it to be covered by the gap."""
+def _distance(
+    machine: MachineArrays, j: int, regime: int, y: float, v: float, omega: float
+) -> float:
+    """Distance in m of spring j from its next change, had all of it to be covered by the gap.
+
+    Where a change looks at the rate alone, a rate v is as far as v / omega.
+    """
     stops = machine.stops
     if regime == OPEN:
         return min(abs(stops.gap[j, 0] - y), abs(stops.gap[j, 1] + y))
@@ -54,8 +59,10 @@ def _distance(machine: MachineArrays, j: int, regime: int, y: float, v: float) -
     least = abs(depth)
     for e in range(MOST_EXITS):
         alpha, beta, target = exit_of(stops, j, regime, e)
-        if target != NO_EXIT and alpha != 0.0:
-            least = min(least, abs(depth + beta / alpha * rate))
+        if target == NO_EXIT:
+            continue
+        away = depth + beta / alpha * rate if alpha != 0.0 else rate / omega
+        least = min(least, abs(away))
     return least
 
 

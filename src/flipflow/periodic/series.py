@@ -24,6 +24,7 @@ from flipflow.dynamics.contact_search import (
     next_change,
     prepare_search,
 )
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, contact_number, new_flow
 from flipflow.dynamics.law import (
     Stops,
@@ -33,7 +34,6 @@ from flipflow.dynamics.law import (
     signed_gap,
     tangent_kick,
 )
-from flipflow.dynamics.machine import MachineArrays
 
 NO_SPRING = -1  # no change of contact began the segment
 

@@ -20,6 +20,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import extremes, prepare_search
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
     carry_tangent,
@@ -29,7 +30,6 @@ from flipflow.dynamics.flow import (
     segment_motion,
     segment_state,
 )
-from flipflow.dynamics.machine import MachineArrays
 
 
 class Shooting(NamedTuple):
@@ -114,7 +114,9 @@ def shooting_residual(
     problem: Shooting, work: ShootingWork, z: Real, omega: float, r: Real, J: Real
 ) -> int:
     """r = sign flow(z) - z and J = [dr/dz, dr/d omega], shapes (2 N,) and (2 N, 2 N + 1)."""
-    size = r.shape[0]
+    if not omega > 0.0:
+        return status.NO_CONVERGENCE
+    size = work.rate.shape[0]
     U = work.tangent
     code = shoot(problem, work, z, omega, U)
     if code != status.OK:

@@ -14,10 +14,10 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation import correction, frequency_loop
-from flipflow.continuation.between_points import FOLD, TRACE_ALL, follow
+from flipflow.continuation.refinement import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
@@ -225,6 +225,12 @@ class Solver(ABC):
         low, high, _ = self.extremes(u, omega, self.machine.direction)
         return low, high
 
+    def depth(self, point: Point, spring: int, side: int) -> float:
+        """Greatest depth in m of a motion beyond a gap: side 0 plus, 1 minus."""
+        least, most = self.gap_extremes(point.u[None], np.array([point.omega]))
+        reach = most[0, spring] if side == 0 else -least[0, spring]
+        return float(reach - self.springs[spring].gaps[side])
+
     @abstractmethod
     def states(self, u: Real, omega: Real) -> Real:
         """State (x, x') at t = 0, shape (P, 2 N)."""
@@ -327,9 +333,7 @@ class Solver(ABC):
         code, _, share = self._follow(traced.record, traced.u[p], 0.0, course, p, (low, high), test)
         if code != status.OK:
             omega = traced.omega[p]
-            raise IncompleteError(
-                f"no point found between two of the branch near {omega:.6g} rad/s"
-            )
+            raise IncompleteError(f"no point found between two of the branch near {omega:.6g}")
         w, tangent = self.corrector.home, float(self.corrector.tangent[-1])
         at_home = self.corrector.phase[0] == 0.0
         J = self.corrector.J[:, :-1] if at_home else None
@@ -361,15 +365,25 @@ class Solver(ABC):
         forces = np.concatenate([-self.machine.stiffness, -self.machine.damping], axis=1)
         return eigenvalues(np.concatenate([motion, forces]))
 
-    def solve(self, u: Real, omega: float, tolerance: float = correction.SHARP) -> Point | None:
+    def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
-        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, tolerance)
         record = self.new_branch(1)
-        _, points, _ = self._follow(record, u, omega, course)
-        if points == 0:
+        if not self._corrected(record, u, omega, correction.SHARP):
             return None
         J = record.jacobian[0] if record.phase[0] == 0.0 else None
         return self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
+
+    def starts(self, u: Real, omega: float) -> bool:
+        """Whether a branch can start from the guess u, which asks less of Newton than a solution."""
+        return self._corrected(self.new_branch(1), u, omega, correction.QUICK)
+
+    def _corrected(
+        self, record: frequency_loop.Record, u: Real, omega: float, tolerance: float
+    ) -> bool:
+        """Whether Newton at fixed omega leads from the guess u to the only point of a record."""
+        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, tolerance)
+        _, points, _ = self._follow(record, u, omega, course)
+        return points > 0
 
     def errors(self, u: Real, omega: Real) -> Real:
         """Distance in m of each motion from the exact one; infinite where it is not bounded.

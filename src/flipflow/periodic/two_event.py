@@ -24,8 +24,8 @@ from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.contact_search import exponential
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, new_flow, prepare_drive, run_flow
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.dynamics.modes import Modes, prepare
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.errors import InputError
 from flipflow.model.fields import FIELD
+from flipflow.model.system import Coordinate
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
@@ -95,32 +96,38 @@ def field_branch_figure(branch: FieldBranch) -> Figure:
     """Relative amplitude over a field; of a curve of folds the jump speed, too."""
     if not branch.orbits:
         raise InputError("result", "a branch without points", branch.status.value)
-    field = FIELD[branch.field]
-    # Lengths are read in mm; every other field is drawn in SI.
-    scale, unit = (MM, "mm") if field.unit == "m" else (1.0, field.unit)
+    field, words = FIELD.get(branch.field), branch.field.replace("_", " ")
+    # Lengths are read in mm; every other field is drawn in SI, that of another machine as it is.
+    scale, unit = (MM, "mm") if field and field.unit == "m" else (1.0, field.unit if field else "")
     x = branch.values * scale
-    axis = Axis(f"{field.name.replace('_', ' ')} ({field.symbol})", unit, _with_margin(x))
-    amplitude = branch.amplitude("relative")
+    axis = Axis(f"{words} ({field.symbol})" if field else words, unit, _with_margin(x))
+    named = "relative" in branch.machine.system().coordinates
+    which: Coordinate = "relative" if named else 0
+    amplitude = branch.amplitude(which)
     curve = Curve(branch.values, amplitude, amplitude, branch.stability)
     traces = [
-        Trace(label("relative"), x[run], amplitude[run] * MM, role, bold=True)  # type: ignore[arg-type]
+        Trace(label(which), x[run], amplitude[run] * MM, role, bold=True)  # type: ignore[arg-type]
         for role, run in curve.runs()
     ]
     for kind in dict.fromkeys(point.kind for point in branch.special_points):
         points = branch.points_of(kind)
         at = np.array([point.value for point in points]) * scale
-        heights = np.array([point.amplitude("relative") for point in points]) * MM
+        heights = np.array([point.amplitude(which) for point in points]) * MM
         traces.append(
             Trace(KIND_WORDS.get(kind, kind), at, heights, "point", "jump",
                   symbol=KIND_SYMBOLS.get(kind, "square-open"))
         )  # fmt: skip
-    height = Axis("amplitude (|x2|)", "mm", (0.0, 1.08 * MM * float(amplitude.max())))
+    height = Axis(
+        "amplitude (|x2|)" if named else "amplitude",
+        "mm",
+        (0.0, 1.08 * MM * float(amplitude.max())),
+    )
     panels = [Panel(axis, height, traces=tuple(traces))]
     if np.ptp(branch.omega) > 0.0:
         speed = Trace("speed of the fold", x, branch.omega * RPM, colour="main")
         panels.append(Panel(axis, Axis("shaft speed", "rpm"), traces=(speed,)))
-    caption = f"Half the peak-to-peak motion as {field.name.replace('_', ' ')} is changed."
-    return Figure(f"Motions over {field.name.replace('_', ' ')}", caption, tuple(panels))
+    caption = f"Half the peak-to-peak motion as {words} is changed."
+    return Figure(f"Motions over {words}", caption, tuple(panels))
 
 
 def _with_margin(x: Real) -> tuple[float, float]:

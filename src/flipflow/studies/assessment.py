@@ -9,14 +9,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from flipflow import __version__
 from flipflow.continuation.branch import Branch
 from flipflow.dynamics.normal import NormalMotion
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY, RPM
-from flipflow.model.contact_law import ENTERED, stored_energy
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
 from flipflow.model.monitor import Monitor
@@ -258,7 +255,7 @@ def assess_case(
 def energy_balance(working: Working) -> dict[str, float]:
     """Mean powers in W; "input" along the surface equals isolation + shear + stop.
 
-    The stop's is what its damping takes and what it still holds when a clipped one lets go.
+    The stop's is what its damping takes and what it still holds when it lets go early.
     """
     screen, orbit = working.screen, working.orbit
     powers = {
@@ -268,26 +265,10 @@ def energy_balance(working: Working) -> dict[str, float]:
         "stop": 0.0,
     }
     if screen.has_stop:
-        contact = None if screen.stop().bonded else 0
-        powers["stop"] = screen.stop_damping * orbit.mean_square_velocity("relative", contact)
-        powers["stop"] += _let_go_power(screen, orbit)
+        powers["stop"] = orbit.stop_power()
     if working.normal is not None:
         powers["normal"] = working.normal.power
     return powers
-
-
-def _let_go_power(screen: FlipFlowScreen, orbit: Orbit) -> float:
-    """Mean power in W of the energy that clipped stops still hold when they let go.
-
-    The paper's law lets go at the gap, where the spring holds none.
-    """
-    stop, lost = screen.stop(), 0.0
-    for touch in orbit.contact_intervals:
-        ends = orbit.displacement("relative", [touch.start, touch.end])
-        regime = np.full(2, touch.side * ENTERED)
-        taken, left = stored_energy(stop.law, stop.stiffness, stop.gaps, regime, ends)
-        lost += float(left - taken)
-    return lost / orbit.period
 
 
 def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) -> LimitRow:

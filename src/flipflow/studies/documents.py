@@ -20,8 +20,9 @@ from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
-from flipflow.continuation.field_path import FieldPoint
+from flipflow.continuation.field_solver import FieldPoint
 from flipflow.continuation.frequency_response import formulation_of, method_of
+from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_count,
     checked_numbers,
@@ -30,6 +31,7 @@ from flipflow.model.arguments import (
 )
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+from flipflow.model.parameters import parameter_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -81,7 +83,7 @@ BRANCH = CODEC.table(
     **{name: f"traced.record.{name}" for name in RECORDED},
     **{name: f"traced.{name}" for name in TRIED},
 )  # fmt: skip
-FIELD_BRANCH = CODEC.table({"machine": FlipFlowScreen, **FOLLOWED, "field": str, "values": Real})
+FIELD_BRANCH = CODEC.table({**FOLLOWED, "field": str, "values": Real})
 SWEEP = CODEC.table(
     {
         "machine": Machine, "version": str, "omega": Real, "settled": NDArray[np.bool_],
@@ -156,7 +158,9 @@ def orbit_from(document: Document) -> Orbit:
 def branch_document(branch: Branch) -> dict[str, Any]:
     """A branch over frequency."""
     steps = [dataclasses.asdict(step) for step in branch.shortened_steps]
-    return {"shortened_steps": steps, **_read_off(branch, branch.system), **BRANCH.write(branch)}
+    read_off = _read_off(branch, branch.system)
+    section = CODEC.form(Real).write(branch.traced.record.phase)
+    return {"shortened_steps": steps, **read_off, **BRANCH.write(branch), "section": section}
 
 
 def branch_from(document: Document) -> Branch:
@@ -166,9 +170,12 @@ def branch_from(document: Document) -> Branch:
     solver = motions.solver(read["half_turn"], read["turns"])
     n, points = motions.states, read["omega"].size
     maps = read["return_maps"].reshape(points, n, n)
+    # Files of the time when every point was solved for at phase 0 do not say so.
+    stored = document.get("section")
+    phase = np.zeros(points) if stored is None else CODEC.form(Real).read(stored)
     return Branch(
         formulation=solver.formulation,
-        traced=_traced_from(read, solver, maps),
+        traced=_traced_from({**read, "phase": phase}, solver, maps),
         return_maps=maps,
         multipliers=read["multipliers"].reshape(points, n),
         stability=np.asarray(read["stability"], dtype="<U12").reshape(points),
@@ -188,7 +195,9 @@ def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:
     record = solver.new_branch(points + 1)
     record.depth[:] = np.nan
     record.omega[:points] = checked_speeds(read["omega"]) if points else 0.0
-    for name, values in {"u": read["unknowns"], **{name: read[name] for name in RECORDED}}.items():
+    kept_as = {"u": "unknowns", "phase": "phase", **{name: name for name in RECORDED}}
+    for name, word in kept_as.items():
+        values = read[word]
         kept = getattr(record, name)[:points]
         kept[:] = values.reshape(kept.shape)
     if solver.reads_jacobian:
@@ -200,18 +209,26 @@ def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:
 
 def field_branch_document(branch: FieldBranch) -> dict[str, Any]:
     """A branch over a field of the machine."""
+    if not isinstance(branch.machine, (FlipFlowScreen, MechanicalSystem)):
+        remedy = "only branches of a FlipFlowScreen or a MechanicalSystem can be saved"
+        raise InputError("result", type(branch.machine).__name__, remedy)
     points = [POINT.write(orbit.point) for orbit in branch.orbits]
-    system = branch.machine.system()
-    return {**_read_off(branch, system), **FIELD_BRANCH.write(branch), "points": points}
+    return {
+        **_read_off(branch, branch.machine.system()),
+        "machine": machine_document(branch.machine),
+        **FIELD_BRANCH.write(branch),
+        "points": points,
+    }
 
 
 def field_branch_from(document: Document) -> FieldBranch:
     """The branch of a document."""
     read = FIELD_BRANCH.read(document)
+    machine = MACHINES.read(document["machine"])
+    parameter = parameter_of(machine, read["field"])
 
     def orbit_at(value: float, one: Document) -> Orbit:
-        machine = read["machine"].replace(**{read["field"]: value})
-        return Motions(machine, PiecewiseExact()).orbit(one, FieldPoint, value=value)
+        return Motions(parameter.at(value), PiecewiseExact()).orbit(one, FieldPoint, value=value)
 
     def special_point(one: Document) -> FieldSpecialPoint:
         value = CODEC.form(float).read(one["value"])
@@ -221,7 +238,8 @@ def field_branch_from(document: Document) -> FieldBranch:
     return FieldBranch(
         orbits=tuple(orbit_at(value, {**one, "stability": word}) for value, one, word in points),
         special_points=tuple(map(special_point, document["special_points"])),
-        **{name: read[name] for name in ("machine", "field", "values", *ENDED)},
+        machine=machine,
+        **{name: read[name] for name in ("field", "values", *ENDED)},
     )
 
 

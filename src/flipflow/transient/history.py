@@ -12,7 +12,7 @@ from flipflow import __version__
 from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import IncompleteError
 from flipflow.model.arguments import checked_index
-from flipflow.model.contact_law import ENTERED, force_in
+from flipflow.model.contact_law import WHOLE, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
 
 
@@ -162,7 +162,7 @@ def stop_forces(system: MechanicalSystem, x: Real, v: Real, regimes: Int) -> Rea
     for j, spring in enumerate(system.springs):
         if not spring.acts:
             continue
-        regime = np.full(x.shape[0], ENTERED) if spring.bonded else next(columns)
+        regime = np.full(x.shape[0], WHOLE) if spring.bonded else next(columns)
         y, rate = x @ spring.direction, v @ spring.direction
         of = spring.law, spring.stiffness, spring.damping, spring.gaps
         force[:, j] = force_in(*of, regime, y, rate)

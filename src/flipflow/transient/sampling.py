@@ -8,9 +8,9 @@ from typing import NamedTuple
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, run_flow, segment_state
 from flipflow.dynamics.law import force
-from flipflow.dynamics.machine import MachineArrays
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
 PANEL = 2.0  # radians of the fastest mode in a Gauss panel

@@ -13,14 +13,15 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.law import (
     Stops,
-    damping_share,
+    entered,
     exit_of,
     force,
     regime_at,
     signed_gap,
+    spring_force,
     stored_energy,
 )
-from flipflow.model.contact_law import ENTERED, NO_EXIT, OPEN
+from flipflow.model.contact_law import NO_EXIT, OPEN
 
 SHAFT_STATES = 5  # of the shaft: phi, phi', work put in, work dissipated, work of friction
 
@@ -173,7 +174,7 @@ def _press(eq: Equations, regime: Int, point: Real) -> float:
             continue
         y, v = gap_motion(eq, point, j)
         H = force(eq.stops, j, regime[j], y, v)
-        power += damping_share(eq.stops, j, regime[j]) * eq.stops.damping[j] * v * v
+        power += (H - spring_force(eq.stops, j, regime[j], y)) * v
         for i in range(eq.vector.shape[0]):
             eq.push[i] -= eq.direction[j, i] * H
     return power
@@ -218,7 +219,8 @@ def switch(eq: Equations, regime: Int, point: Real, j: int, which: int) -> None:
     n = eq.vector.shape[0]
     before = regime[j]
     if before == OPEN:
-        regime[j] = ENTERED if which == 0 else -ENTERED
+        piece = entered(eq.stops, j)
+        regime[j] = piece if which == 0 else -piece
         return
     _, _, target = exit_of(eq.stops, j, before, which)
     regime[j] = target if before > OPEN else -target

@@ -18,7 +18,7 @@ from flipflow.model.arguments import (
     checked_numbers,
     checked_speed,
 )
-from flipflow.model.contact_law import ENTERED, engaged_side, force_in, regime_at, stored_energy
+from flipflow.model.contact_law import WHOLE, engaged_side, force_in, regime_at, stored_energy
 from flipflow.model.disturbance import Disturbance, Impulse, LoadStep, Lump
 from flipflow.model.elements import Unbalance
 from flipflow.model.monitor import Monitor
@@ -226,7 +226,7 @@ class _Run:
             if spring.bonded:
                 y, rate = table.x @ spring.direction, table.v @ spring.direction
                 of = spring.law, spring.stiffness, spring.damping, spring.gaps
-                forces[:, k] = force_in(*of, np.full(y.shape, ENTERED), y, rate)
+                forces[:, k] = force_in(*of, np.full(y.shape, WHOLE), y, rate)
         return forces
 
     def events(self) -> tuple[ContactChange, ...]:

@@ -18,7 +18,7 @@ import math
 
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import modulus, reciprocal
-from flipflow.dynamics.machine import MachineArrays
+from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.modes import Modes, prepare
 
 FINEST = 1.0 / 2000.0  # share of the highest frequency below which a step needs no certificate

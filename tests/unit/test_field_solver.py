@@ -1,0 +1,102 @@
+"""Motions and folds over a field: their Jacobians, and the machine as a series of the field."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.continuation.field_solver import FieldSolver, FoldSolver
+from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.machine_series import machine_series
+from judge import close
+from kernel_calls import residual_of, series_machine, varied
+
+pytestmark = pytest.mark.numerical
+BOUNDS = (2e-3, 9e-3)
+
+
+def solver(screen, kind):
+    speed = () if kind is FoldSolver else (203.0,)
+    return kind(
+        lambda e: screen.replace(clearance=e).system(), BOUNDS, 6e-3, *speed,
+        half_turn=True, turns=1,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [FieldSolver, FoldSolver])
+def test_jacobians_by_differences_of_the_residual(screen, exact, kind) -> None:
+    """At points off the solution; 1e-5 of each row's size."""
+    orbit = exact.orbits_at(203.0)[0]
+    ours = solver(screen, kind)
+    extra = [203.0, 6e-3] if kind is FoldSolver else [6e-3]
+    w = np.concatenate([1.01 * orbit.state, extra])
+    evaluate = residual_of(varied, ours.problem, ours.scratch, ours.unknowns)
+    _, J = evaluate(w[:-1], w[-1])
+    columns = []
+    for k, step in enumerate(1e-5 * np.abs(w)):
+        move = np.eye(w.size)[k] * step
+        ahead, behind = (evaluate((w + s * move)[:-1], (w + s * move)[-1])[0] for s in (1, -1))
+        columns.append((ahead - behind) / (2.0 * step))
+    differences = np.array(columns).T
+    size = np.abs(J * np.abs(w)).max(axis=1, keepdims=True) / np.abs(w)
+    assert np.all(np.abs(J - differences) <= 1e-5 * size)
+
+
+@pytest.mark.parametrize(
+    ("field", "bounds"),
+    [
+        ("clearance", BOUNDS), ("main_mass", (500.0, 2000.0)), ("stop_damping", (0.0, 9e3)),
+        ("eccentric_moment", (1.0, 9.0)), ("shear_stiffness", (1e6, 5e6)),
+    ],
+)  # fmt: skip
+def test_the_series_is_the_machine(screen, field: str, bounds) -> None:
+    """Two terms: every field enters the matrices linearly, the masses' inverse is solved for."""
+
+    def system(value: float):
+        return screen.replace(**{field: value}).system()
+
+    ours = FieldSolver(
+        system, bounds, getattr(screen, field), 203.0, half_turn=False, turns=1
+    )  # fmt: skip
+    assert ours.problem.series.inertia.shape[0] == 2
+    for value in np.linspace(*bounds, 7):
+        assert series_machine(ours.problem.series, ours.scratch.series, value, ours.machine)
+        expected = machine_arrays(system(value))
+        for name in ("stiffness", "damping", "direction", "reach", "push"):
+            got, want = getattr(ours.machine, name), getattr(expected, name)
+            close(name, got, want, rel=1e-12, abs=1e-12 * np.abs(want).max(initial=0.0))
+        for name in ("stiffness", "damping", "gap"):
+            close(name, getattr(ours.machine.stops, name), getattr(expected.stops, name), rel=1e-12)
+
+
+def test_a_series_takes_the_terms_it_needs() -> None:
+    """Smooth: enough of them; with a kink: none are enough."""
+
+    def parts(shape):
+        return lambda v: {
+            "inertia": np.eye(1), "damping": np.eye(1), "stiffness": np.array([[shape(v)]]),
+            "direction": np.eye(1), "force": np.ones((2, 1)), "stop": np.ones((2, 1)),
+            "gap": np.array([[v, math.inf]]),
+        }  # fmt: skip
+
+    smooth = machine_series(parts(math.exp), 0.0, 2.0)
+    assert smooth is not None
+    assert 9 <= smooth.stiffness.shape[0] <= 33
+    assert np.isinf(smooth.gap[0, 0, 1])
+    assert machine_series(parts(lambda v: abs(v - 1.0)), 0.0, 2.0) is None
+
+
+def test_folds_in_slivers_are_folds() -> None:
+    """Curves of folds of the three-period family, where a very short contact appears.
+
+    Nearly half of the points had a multiplier up to 1e-2 away from 1.
+    """
+    screen = ff.load("ffs0827")
+    orbit = next(o for o in ff.periodic_orbits(screen, 446.0, max_periods=3) if o.periods == 3)
+    branch = ff.continue_orbit(orbit, "omega", (300.0, 600.0))
+    curve = ff.continue_fold(branch.folds[0], "clearance", (1e-3, 20e-3))
+    off = np.abs(curve.multipliers - 1.0).min(axis=1)
+    assert off.max() < 1e-6
