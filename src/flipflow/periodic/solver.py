@@ -374,7 +374,7 @@ class Solver(ABC):
         return self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
 
     def starts(self, u: Real, omega: float) -> bool:
-        """Whether a branch can start from the guess u: Newton need not end as sharp as a solution."""
+        """Whether a branch can start from the guess u: Newton may end less sharp than that."""
         return self._corrected(self.new_branch(1), u, omega, correction.QUICK)
 
     def _corrected(
