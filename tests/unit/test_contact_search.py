@@ -68,11 +68,16 @@ def search(m: GapMotion, c: Stops, state: int, horizon: float, fired: int = -1):
 
 
 @settings(max_examples=200, deadline=None)
-@given(seed=st.integers(0, 10**6), terms=st.integers(1, 5), share=st.floats(0.3, 1.1))
-def test_first_crossing_of_random_sums(seed: int, terms: int, share: float) -> None:
-    """Random decaying sums: the crossing lies within one sample of the first one beyond."""
+@given(
+    seed=st.integers(0, 10**6),
+    terms=st.integers(1, 5),
+    share=st.floats(0.3, 1.1),
+    fastest=st.sampled_from([0.0, 3.0]),
+)
+def test_first_crossing_of_random_sums(seed: int, terms: int, share: float, fastest: float) -> None:
+    """Random sums, some growing: the crossing lies within one sample of the first one beyond."""
     rng = np.random.default_rng(seed)
-    rate = -rng.uniform(0.0, 3.0, terms) + 1j * rng.uniform(0.0, 40.0, terms)
+    rate = rng.uniform(-3.0, fastest, terms) + 1j * rng.uniform(0.0, 40.0, terms)
     amplitude = rng.normal(size=terms) + 1j * rng.normal(size=terms)
     m = motion(0.2 * rng.normal(), amplitude, rate)
     horizon = 3.0
@@ -266,3 +271,15 @@ def test_extremes_of_random_sums(seed: int, terms: int) -> None:
     close("most", high, y.max(), abs=1e-6 * size)
     assert low <= y.min() + 1e-12 * size
     assert high >= y.max() - 1e-12 * size
+
+
+def test_extremes_of_a_ripple_that_grows() -> None:
+    """At first it is nothing beside the slow motion, at last it is all of it."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        rate = np.array([-0.1 + 1.0j, rng.uniform(4.0, 6.0) + 1j * rng.uniform(40.0, 80.0)])
+        m = motion(0.1, [1.0, 1e-4 * np.exp(1j * rng.uniform(0.0, 6.0))], rate)
+        y = sampled(m, np.linspace(0.0, 2.0, SAMPLES))
+        low, high = range_of(m, 2.0)
+        close("least", low, y.min(), abs=1e-6)
+        close("most", high, y.max(), abs=1e-6)

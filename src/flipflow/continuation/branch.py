@@ -339,9 +339,10 @@ class Branch(Frozen):
 
     def peak(self, which: Coordinate) -> SpecialPoint:
         """The motion of largest amplitude on the branch, refined between its points."""
-        if self.omega.size == 0:
+        size = self.amplitude(which)
+        if not np.isfinite(size).any():
             raise IncompleteError(f"The branch has no points. {self.status.value}")
-        return self._refined(which, int(self.amplitude(which).argmax()), "peak")
+        return self._refined(which, int(np.nanargmax(size)), "peak")
 
     def peaks(self, which: Coordinate) -> tuple[SpecialPoint, ...]:
         """Every resonance peak: local maxima of the amplitude in branch order, refined."""
@@ -359,6 +360,7 @@ class Branch(Frozen):
         vector = self.system.coordinate(which)[None]
         solver = self.formulation.solver()
         best = SpecialPoint(kind, self.orbit(top), float(top))
+        worst = sign * best.amplitude(which) + abs(best.amplitude(which))
         for p in (top - 1, top):
             if not 0 <= p < self.omega.size - 1:
                 continue
@@ -367,16 +369,17 @@ class Branch(Frozen):
                 try:
                     point = solver.between(self.traced, p, share)
                 except IncompleteError:
-                    return math.inf  # Newton may fail between two sharp bends
+                    return worst  # Newton may fail between two sharp bends
                 low, high, _ = solver.extremes(point.u[None], np.array([point.omega]), vector)
-                return sign * float(high[0, 0] - low[0, 0])
+                size = sign * 0.5 * float(high[0, 0] - low[0, 0])
+                return size if math.isfinite(size) else worst
 
             share = float(
                 minimize_scalar(
                     rise, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
                 ).x
             )
-            if not math.isfinite(rise(share)):
+            if rise(share) == worst:
                 continue
             point = solver.between(self.traced, p, share)
             orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))

@@ -36,7 +36,8 @@ class BranchStatus(Enum):
         "A turn had too many contacts to record; the stops may chatter. Look at it in time."
     )
     NO_START = (
-        "No periodic motion was found at the start of the interval. Start from another frequency."
+        "No periodic motion was found at the start of the interval. Start from another frequency; "
+        "for harmonic balance, raise the harmonics."
     )
     NO_MODES = (
         "The modes of the machine could not be found in one of its contact states; change a "

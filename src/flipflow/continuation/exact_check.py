@@ -112,7 +112,7 @@ class ExactBeside:
         def value(share: float) -> float:
             if share in (0.0, 1.0):
                 return values[int(share)]
-            return test(self.exact.between(chord, 0, share).return_map)
+            return test(self.exact.return_map(self.exact.between(chord, 0, share)))
 
         try:
             root = float(brentq(value, 0.0, 1.0, xtol=1e-9, rtol=1e-9))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +16,10 @@ from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
+from flipflow.continuation.starts import found_motions
 from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.dynamics.contact_free_range import contact_free_up_to
-from flipflow.errors import InputError, SampledContactWarning
+from flipflow.errors import IncompleteError, InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
 from flipflow.model.contact_law import pushes_whole
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -41,7 +44,9 @@ from flipflow.periodic.stability import (
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
 BACK = 0.96  # share of the last frequency without contact down to which its branch may turn back
-STEPS_UP = 8  # least steps from there up to the frequency asked for
+STEPS_UP = 8  # least steps from there to the frequency asked for
+RATIO_UP = 1.25  # of the frequencies above that are tried for a motion without contact
+RATIOS_UP = 40  # of them at most
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -165,14 +170,45 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
     Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
-    followed up from the last motion without contact; where there is none, the machine is left to
-    settle from rest.
+    followed up from the last motion without contact. Where there is none, the motion is that into
+    which the machine settles from rest; failing that, that on the branch which has no contact at
+    some higher frequency; failing that, any.
     """
     free = contact_free_up_to(solver.machine, solver.flow.modes, omega)
     if free == omega:
         return contact_free_unknowns(solver, omega)
     last = _followed_up(solver, free, omega) if free > 0.0 else None
-    return settled_unknowns(solver, omega) if last is None else last
+    return some_unknowns(solver, omega) if last is None else last
+
+
+def some_unknowns(solver: Solver, omega: float) -> Real:
+    """Unknowns of a motion that is not reached from below, or the best guess of one."""
+    settled = settled_unknowns(solver, omega)
+    if solver.starts(settled, omega):
+        return settled
+    exact = _exact(solver, half_turn=solver.half_turn)
+    for z in chain(_followed_down(exact, omega), found_motions(exact, omega)):
+        u = _unknowns_of(solver, exact, z, omega)
+        if solver.starts(u, omega):
+            return u
+    return settled
+
+
+def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
+    """State at ``omega`` on the branch that is without contact at a higher frequency."""
+    for free in (omega * RATIO_UP ** np.arange(1, RATIOS_UP)).tolist():
+        X = solver.machine.direction @ complex_amplitude(solver.system, free)
+        if (np.abs(X) < solver.machine.stops.gap.min(axis=1)).all():
+            break
+    else:
+        return
+    start, step = contact_free_unknowns(solver, free), (free - omega) / STEPS_UP
+    for way in WAYS:
+        course = correction.Course(omega, free / BACK, step, way.share, -1.0, way.tolerance)
+        last = solver.end_of_branch(start, free, course, way.points)
+        if last is not None:
+            yield last
+            return
 
 
 def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
@@ -209,14 +245,27 @@ def contact_free_unknowns(solver: Solver, omega: float) -> Real:
 
 def settled_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
-    exact = (
-        solver if isinstance(solver, ExactSolver) else ExactSolver(solver.system, half_turn=False)
-    )
+    exact = _exact(solver, half_turn=False)
     z = exact.settled(np.zeros(exact.unknowns), omega, SETTLING_TURNS)
+    point = None if exact is solver else exact.solve(z, omega)
+    return _unknowns_of(solver, exact, z if point is None else point.u, omega)
+
+
+def _unknowns_of(solver: Solver, exact: ExactSolver, z: Real, omega: float) -> Real:
+    """Unknowns of the motion from a state; where its flow does not end, of that without contact."""
     if exact is solver:
         return z
-    point = exact.solve(z, omega)
-    return solver.unknowns_from(exact.motion(z if point is None else point.u, omega))
+    try:
+        return solver.unknowns_from(exact.motion(z, omega))
+    except IncompleteError:
+        return contact_free_unknowns(solver, omega)
+
+
+def _exact(solver: Solver, *, half_turn: bool) -> ExactSolver:
+    """The solver itself where it is exact, else one of the same machine."""
+    if isinstance(solver, ExactSolver):
+        return solver
+    return ExactSolver(solver.system, half_turn=half_turn)
 
 
 def _finished(

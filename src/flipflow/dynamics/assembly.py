@@ -16,16 +16,23 @@ from flipflow.model.system import MechanicalSystem
 EPSILON = float(np.finfo(float).eps)
 
 
-def machine_arrays(system: MechanicalSystem) -> MachineArrays:
+def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineArrays:
     """Flatten a system whose springs can all open and close.
+
+    Parameters
+    ----------
+    system
+        The machine.
+    damped
+        Whether it must have damping: without any no steady state is reached.
 
     Raises
     ------
     InputError
-        Without any damping (no steady state is reached), and with a singular stiffness (nothing
-        holds the machine).
+        Without a damping that is needed, and with a singular stiffness (nothing holds the machine).
     """
-    system.require_damping()
+    if damped:
+        system.require_damping()
     n, springs = system.size, system.springs
     m, force = len(springs), system.excitation.vector
     D = np.array([spring.direction for spring in springs]).reshape(m, n)

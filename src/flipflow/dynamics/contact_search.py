@@ -5,11 +5,15 @@ Both a free flight of the exact flow and a truncated Fourier series are, at gap 
     y_j(t) = offset_j + Re sum_i amplitude_ji exp(rate_i t),
 
 so one search serves both. Let a switching function have the value h > 0 and the slope h', and let
-|h''| <= B hold at all later times. The function then cannot vanish before the positive root of
+|h''| <= B hold over the step. The function then cannot vanish before the positive root of
 h + h' s - B s^2 / 2. Steps to that root, repeated, converge to the first zero and never jump over
 a zero, nor over two that are close together. With a bound B3 on the third derivative, the curvature
 over the next S seconds stays above h'' - B3 S. Close to a zero that allows a far smaller B, and the
 search converges with third order.
+
+The derivatives are bounded by the sizes of their terms. A term that decays is largest now; one that
+grows is largest at the end of the step, which is therefore kept so short that none grows by more
+than the factor e.
 """
 
 from __future__ import annotations
@@ -41,6 +45,7 @@ class GapMotion(NamedTuple):
     curve: Complex  # (m, r) amplitude rate^2, filled by ``prepare_search``
     bound: Real  # (m, r) its size
     size: Real  # (r,) |rate|
+    growth: Real  # (r,) greatest exp(Re rate s) within a step, filled by ``longest_step``
     turn: Complex  # (r,) terms of one gap, carried from sample to sample by ``extremes``
     ratio: Complex  # (r,) factors from one sample to the next
     spacing: Int  # (1,) 0: any rates; s > 0: rates are i (r_0, r_0 + s, r_0 + 2 s, ...)
@@ -78,6 +83,24 @@ def prepare_search(motion: GapMotion, count: int) -> None:
 
 
 @kernel(inline=True)
+def longest_step(motion: GapMotion, count: int, horizon: float) -> float:
+    """Longest step of the search; what grows over it is counted into the bounds."""
+    fastest = 0.0
+    for i in range(count):
+        motion.growth[i] = 1.0
+        fastest = max(fastest, motion.rate[i].real)
+    if fastest * horizon <= 0.0:
+        return horizon
+    longest = min(horizon, 1.0 / fastest)
+    for i in range(count):
+        if motion.rate[i].real > 0.0:
+            motion.growth[i] = math.exp(motion.rate[i].real * longest)
+            for j in range(motion.offset.shape[0]):
+                motion.bound[j, i] *= motion.growth[i]
+    return longest
+
+
+@kernel(inline=True)
 def exponentials(motion: GapMotion, count: int, t: float) -> None:
     """factor_i = exp(rate_i t) and its size, by powers where the rates are equally spaced."""
     if motion.spacing[0] > 0:
@@ -109,7 +132,7 @@ def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float]:
 
 @kernel(inline=True)
 def gap_bounds(motion: GapMotion, count: int, j: int) -> tuple[float, float, float]:
-    """y'', and bounds on the second and third derivative from now on."""
+    """y'', and bounds on the second and third derivative over the next step."""
     curvature = 0.0
     second = 0.0
     third = 0.0
@@ -139,7 +162,7 @@ def switching_state(
         slope += term.real
         term *= motion.rate[i]
         curvature += term.real
-        size = modulus(term)
+        size = modulus(term) * motion.growth[i]
         second += size
         third += size * motion.size[i]
     return value, slope, curvature, second, third
@@ -159,7 +182,7 @@ def root_of_bound(h: float, slope: float, bound: float) -> float:
 
 @kernel(inline=True)
 def safe_step(h: float, slope: float, curvature: float, second: float, third: float) -> float:
-    """Time before which h has no zero; second and third bound its derivatives from now on."""
+    """Time before which h has no zero; second and third bound its derivatives until then."""
     h = max(h, 0.0)
     certain = root_of_bound(h, slope, second)
     reach = root_of_bound(h, slope, -curvature)
@@ -186,9 +209,10 @@ def next_change(
     t = 0.0
     least = SMALLEST_STEP * horizon
     prepare_search(motion, count)
+    longest = longest_step(motion, count, horizon)
     for _ in range(MAX_SEARCH):
         exponentials(motion, count, t)
-        step = math.inf
+        step = longest
         for j in range(regime.shape[0]):
             low, new = spring_change(motion, stops, regime[j], count, j)
             if new != NOTHING:
@@ -266,12 +290,12 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
     radian apart at the mean frequency of the motion. A pair of zeros between two samples could hide
     only a ripple smaller than what the samples resolve.
     """
-    weight = 0.0
+    frequency = _mean_frequency(motion, count, j, 0.0)
     for i in range(count):
-        weight += modulus(motion.amplitude[j, i])
-    exponentials(motion, count, 0.0)
-    _, second, _ = gap_bounds(motion, count, j)
-    frequency = math.sqrt(second / weight) if weight > 0.0 else 0.0
+        if motion.rate[i].real > 0.0:
+            # What grows may be nothing at first and all of the motion at last.
+            frequency = max(frequency, _mean_frequency(motion, count, j, duration))
+            break
     samples = min(1 + int(3.0 * frequency * duration), 4000)
     step = duration / samples
     for i in range(count):
@@ -292,6 +316,18 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
             low, high = min(low, y), max(high, y)
         v_before = v
     return low, high
+
+
+@kernel(inline=True)
+def _mean_frequency(motion: GapMotion, count: int, j: int, t: float) -> float:
+    """Root mean square of |rate|, each weighted with the size of its term at time t."""
+    weight, second = 0.0, 0.0
+    exponentials(motion, count, t)
+    for i in range(count):
+        size = modulus(motion.amplitude[j, i]) * motion.decay[i]
+        weight += size
+        second += size * motion.size[i] * motion.size[i]
+    return math.sqrt(second / weight) if weight > 0.0 else 0.0
 
 
 @kernel(inline=True)
@@ -392,6 +428,7 @@ def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:
         curve=np.zeros(shape, np.complex128),
         bound=np.zeros(shape),
         size=np.zeros(rates.size),
+        growth=np.ones(rates.size),
         turn=np.zeros(rates.size, np.complex128),
         ratio=np.zeros(rates.size, np.complex128),
         spacing=np.array([spacing], np.int64),

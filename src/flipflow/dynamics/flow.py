@@ -113,6 +113,8 @@ def prepare_drive(machine: MachineArrays, flow: Flow, slot: int, omega: float) -
         flow.drive[slot, k] = 0.0
         flow.drive_slope[slot, k] = 0.0
     for i in range(modes.mode_count[slot]):
+        if modes.force[slot, i] == 0.0 and modes.force_conj[slot, i] == 0.0:
+            continue  # at rest, even in resonance without damping
         gap = reciprocal(1j * omega - modes.rate[slot, i])
         plain = modes.force[slot, i] * gap
         plain_slope = plain * (scale_slope - 1j * scale * gap)

@@ -154,8 +154,14 @@ class Point(Frozen):
 
     @cached_property
     def return_map(self) -> Real:
-        """Return map (2 N, 2 N) of a turn, or of half a turn with sign; worked out when asked."""
-        return self.formulation.solver().return_map(self)
+        """Return map (2 N, 2 N) of a turn, or of half a turn with sign; worked out when asked.
+
+        NaN where the flow over a turn does not end.
+        """
+        try:
+            return self.formulation.solver().return_map(self)
+        except IncompleteError:
+            return np.full((2 * self.formulation.system.size,) * 2, np.nan)
 
     @property
     def eigenvalues(self) -> Complex:
@@ -247,11 +253,20 @@ class Solver(ABC):
         """The flow's scratch, with the modes met so far."""
 
     def return_map(self, point: Point) -> Real:
-        """The return map of a point that this solver, or one like it, has found."""
+        """The return map of a point that this solver, or one like it, has found.
+
+        Raises
+        ------
+        IncompleteError
+            When the flow over a turn does not end.
+        """
         if point.known_map is not None:
             return point.known_map
         none = np.zeros((1, 0, 0))
-        return np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
+        found = np.asarray(self.return_maps(point.u[None], np.array([point.omega]), none)[0])
+        if not np.isfinite(found).all():
+            raise IncompleteError(f"the flow over one turn at {point.omega:.6g} rad/s did not end")
+        return found
 
     def trace(self, u: Real, omega: float, course: correction.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
@@ -262,14 +277,16 @@ class Solver(ABC):
     def end_of_branch(
         self, u: Real, omega: float, course: correction.Course, points: int
     ) -> Real | None:
-        """Unknowns where the branch through (u, omega) meets the upper bound of ``course``.
+        """Unknowns where the branch through (u, omega) meets the bound of ``course`` ahead.
 
-        None where it does not within that many points.
+        That is the upper one where its direction is up. None where the branch does not meet it
+        within that many points.
         """
         gaps = len(self.springs)
         record = frequency_loop.new_branch(self.unknowns, gaps, points, with_jacobian=False)
         code, points, _ = self._follow(record, u, omega, course)
-        return record.u[points - 1].copy() if code == status.REACHED_UPPER else None
+        ahead = status.REACHED_UPPER if course.direction > 0.0 else status.REACHED_LOWER
+        return record.u[points - 1].copy() if code == ahead else None
 
     def new_branch(self, points: int) -> frequency_loop.Record:
         """An empty record for up to ``points`` points."""
@@ -356,13 +373,23 @@ class Solver(ABC):
 
     def solve(self, u: Real, omega: float) -> Point | None:
         """Newton at fixed omega from the guess u; None where it does not converge."""
-        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, correction.SHARP)
         record = self.new_branch(1)
-        _, points, _ = self._follow(record, u, omega, course)
-        if points == 0:
+        if not self._corrected(record, u, omega, correction.SHARP):
             return None
         J = record.jacobian[0] if record.phase[0] == 0.0 else None
         return self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
+
+    def starts(self, u: Real, omega: float) -> bool:
+        """Whether a branch can start from the guess u: Newton may end less sharp than that."""
+        return self._corrected(self.new_branch(1), u, omega, correction.QUICK)
+
+    def _corrected(
+        self, record: frequency_loop.Record, u: Real, omega: float, tolerance: float
+    ) -> bool:
+        """Whether Newton at fixed omega leads from the guess u to the only point of a record."""
+        course = correction.Course(omega, omega, 1e-3 * omega, STEP_SHARE, 1.0, tolerance)
+        _, points, _ = self._follow(record, u, omega, course)
+        return points > 0
 
     def errors(self, u: Real, omega: Real) -> Real:
         """Distance in m of each motion from the exact one; infinite where it is not bounded.

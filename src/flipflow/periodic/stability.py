@@ -9,6 +9,7 @@ from flipflow.compiled.arrays import Complex, Real
 
 STABLE, UNSTABLE, UNDETERMINED = "stable", "unstable", "undetermined"
 NEAR_ONE = 1e-6  # distance of the largest modulus from 1 within which stability is undetermined
+LARGEST_LOG = 690.0  # logarithm above which a determinant is cut off, near the largest number
 SADDLE_NODE_BAND = 0.2  # distance from +1 within which the Jacobian overrules a real multiplier
 
 
@@ -79,14 +80,26 @@ def determinant_minus(maps: Real) -> Real:
 def _determinant(matrices: Real) -> Real:
     known = np.isfinite(matrices).all(axis=(-2, -1))
     found = np.full(matrices.shape[:-2], np.nan)
-    found[known] = np.linalg.det(matrices[known])
+    # The map of a wild motion has entries whose products no number holds.
+    sign, size = np.linalg.slogdet(matrices[known])
+    found[known] = sign * np.exp(np.minimum(size, LARGEST_LOG))
     return found
 
 
 def neimark_sacker(eigenvalues: Complex) -> Real:
     """prod over pairs i < j of (1 - lambda_i lambda_j): zero where a pair has modulus one."""
     i, j = np.triu_indices(eigenvalues.shape[-1], k=1)
-    return np.asarray(np.prod(1.0 - eigenvalues[..., i] * eigenvalues[..., j], axis=-1).real)
+    first, second = eigenvalues[..., i], eigenvalues[..., j]
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = np.asarray(np.prod(1.0 - first * second, axis=-1).real)
+    # Where no number holds the product, each factor is taken as a share of its size.
+    beyond = ~np.isfinite(found) & np.isfinite(eigenvalues).all(axis=-1)
+    if beyond.any():
+        first, second = first[beyond], second[beyond]
+        of_first, of_second = (np.maximum(np.abs(one), 1.0) for one in (first, second))
+        factors = 1.0 / of_first / of_second - (first / of_first) * (second / of_second)
+        found[beyond] = np.prod(factors, axis=-1).real
+    return found
 
 
 def has_unit_pair(eigenvalues: Complex) -> bool:

@@ -50,11 +50,14 @@ def branches_figure(branches: Sequence[Branch]) -> Figure:
     ------
     InputError
         Where there is no branch, or something else among them.
+    IncompleteError
+        When none of them has points.
     """
     if not branches or not all(isinstance(branch, Branch) for branch in branches):
         kinds = [type(branch).__name__ for branch in branches]
         raise InputError("result", kinds, "give a list of branches over frequency")
     which = coordinates(branches[0].system)[-1]
+    branches = [branch for branch in branches if branch.omega.size] or branches[:1]
     curves = [Curve.of(branch, which) for branch in branches]
     traces: list[Trace] = []
     for k, (branch, curve) in enumerate(zip(branches, curves, strict=True)):

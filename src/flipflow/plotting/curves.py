@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.branch_status import BranchStatus
+from flipflow.errors import IncompleteError
 from flipflow.model.system import Coordinate
 
 Real = NDArray[np.float64]
@@ -37,7 +38,15 @@ class Curve:
 
     @classmethod
     def of(cls, branch: Branch, which: Coordinate) -> Curve:
-        """The curve of a coordinate, in SI and rad; the phase is continuous and starts near 0."""
+        """The curve of a coordinate, in SI and rad; the phase is continuous and starts near 0.
+
+        Points at which the flow over a turn does not end have no amplitude, and are left out.
+
+        Raises
+        ------
+        IncompleteError
+            When the branch has no points.
+        """
         special = branch.special_points
         position = [*range(branch.omega.size), *(point.position for point in special)]
         order = np.argsort(position, kind="stable")
@@ -47,6 +56,9 @@ class Curve:
         following = [branch.stability[_next(point.position, branch)] for point in special]
         if branch.status is BranchStatus.CLOSED:
             order = np.append(order, order[0])
+        order = order[np.isfinite(amplitude[order]) & np.isfinite(phase[order])]
+        if order.size == 0:
+            raise IncompleteError(f"The branch has no points. {branch.status.value}")
         return cls(
             omega[order],
             amplitude[order],

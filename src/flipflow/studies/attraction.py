@@ -6,7 +6,9 @@ For a stable motion with monodromy M over its period the discrete Lyapunov equat
 
 gives a form V(z) = (z - c)^T P (z - c) that falls over every period close to the motion. Where a
 slow multiplier leaves V hardly any room to fall, M is that of up to sixteen periods: what is back
-in the ellipsoid after them goes to the motion, wherever it was in between. How far that holds is
+in the ellipsoid after them goes to the motion, wherever it was in between. More periods are watched
+as well where V falls from no size on: a motion that rests at a gap has another map on each side,
+and only one of them is M. How far that holds is
 found by trying: the ellipsoid grows, or shrinks, until V falls along the exact flow from every one
 of a few hundred states on it and within it. Displacements are scaled by the motion's size,
 velocities by that times omega.
@@ -30,6 +32,7 @@ MOST_HALVINGS = 30  # times that the radius is halved until V falls
 FIRST_RADIUS = 0.1  # first radius tried: sqrt V, with states in units of the motion
 FALL = 0.9  # factor by which the slowest part must fall over the periods watched
 MOST_PASSES = 16  # periods watched
+PATIENCE = (1, 4, 16)  # times as many are watched where V falls over none
 
 
 def capture_of(
@@ -58,7 +61,19 @@ def _form(lanes: Lanes, centre: Point, length: float, rng: np.random.Generator) 
     size = float(np.abs(scaled).max()) + length
     scale = size * np.repeat([1.0, centre.omega], n)
     M = centre.return_map * scale / scale[:, None]
-    passes = _passes(M)
+    least = _passes(M)
+    for passes in (share * least for share in PATIENCE):
+        found = _form_over(lanes, centre, passes, M, scale, rng)
+        if found is not None:
+            return found
+    return None
+
+
+def _form_over(
+    lanes: Lanes, centre: Point, passes: int, M: Real, scale: Real, rng: np.random.Generator
+) -> Real | None:
+    """The same with V watched over a number of periods, each with the monodromy M."""
+    n = centre.u.size // 2
     M = np.linalg.matrix_power(M, passes)
     try:
         P = solve_discrete_lyapunov(M.T, np.eye(2 * n))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import correction
 from flipflow.continuation.frequency_response import first_unknowns
-from flipflow.dynamics.contact_free import complex_amplitudes
+from flipflow.continuation.starts import SETTLING_TURNS, cloud
 from flipflow.errors import IncompleteError
 from flipflow.model.arguments import (
     checked_count,
@@ -22,17 +24,19 @@ from flipflow.model.arguments import (
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.one_state import one_state_motions
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.two_event import TwoEventProblem
+from flipflow.studies.independent_parts import IndependentPart, independent_parts, joined_state
 from flipflow.transient.settling import Settling
 
-STARTS = 64  # random states from which the machine is run
-SETTLING_TURNS = 60  # forcing periods that each start is run before a motion is solved for
 MOST_PERIODS = 6  # longest period that may be looked for, in forcing periods
 SWEEP_RATIO = 1.3  # speed at which a stepped start begins, over the one asked for or under it
 SWEEP_STEPS = 12  # speeds on the way
 BRANCH_RATIOS = (1.15, 2.5)  # ends of the branch from below over the speed asked for, and under it
+FAMILY_RATIOS = (1.1, 1.0 / 1.1)  # speeds over the one asked for with families that may reach it
+FAMILY_REACH = 1.15  # how far a family of several periods is followed to either side, as a factor
 BRANCH_STEPS = 60  # longest step on it: the interval divided by this
 
 logger = logging.getLogger("flipflow")
@@ -47,13 +51,17 @@ def periodic_orbits(
 ) -> tuple[Orbit, ...]:
     """Periodic motions at ``omega`` that repeat after up to ``max_periods`` forcing periods.
 
-    Starts: the motions of the branch reached from below, between its folds too; for one symmetric
-    stop, every zero of the scalar problem of two-touch motions; rest; what is reached by stepping
-    the speed up and down to ``omega``; and a low-discrepancy cloud of states as large as the linear
-    motion or the gaps. Each is tried as it is (unstable motions are found so) and after some turns
-    of settling. Newton on the exact flow over 1, 2, ... turns, so that motions need not be
-    symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
-    A start whose flow does not end is left out; the monitor and the log hear how many were.
+    Motions that never change their contacts are closed form. The others are searched for from
+    these starts: the motions of the branch reached from below, between its folds too; for one
+    symmetric stop, every zero of the scalar problem of two-touch motions; rest; what is reached by
+    stepping the speed up and down to ``omega``; and a low-discrepancy cloud of states as large as
+    the linear motion or the gaps. Each is tried as it is (unstable motions are found so) and after
+    some turns of settling. Newton on the exact flow over 1, 2, ... turns, so that motions need not
+    be symmetric; for a machine that is its own mirror image every motion's mirror image is one too.
+    Motions of several periods, found here or a tenth above or below, are followed through their
+    folds. Parts of a machine that nothing connects are searched one by one, and each combination of
+    their motions is one of the machine. A start whose flow does not end is left out; the monitor
+    and the log hear how many were.
 
     Parameters
     ----------
@@ -84,13 +92,23 @@ def periodic_orbits(
     """
     max_periods = checked_count("max_periods", max_periods, MOST_PERIODS)
     say = checked_monitor(monitor)
+    random = checked_generator(rng)
     search = _Search(machine, checked_speed(omega), max_periods)
-    starts = search.starts(checked_generator(rng))
+    parts = independent_parts(search.settling.solver.system)
+    if len(parts) > 1:
+        search.combine(
+            [periodic_orbits(part.system, omega, max_periods, random) for part in parts], parts
+        )
+        return search.orbits()
+    search.add_one_state_motions()
+    starts = search.starts(random)
     if TwoEventProblem.applies(search.settling.solver.system):
         starts += list(TwoEventProblem(search.settling.solver.machine).states(search.omega)[0])
     for k, start in enumerate(starts):
         search.try_from(start)
         say(search.progress(), (k + 1) / len(starts))
+    if max_periods > 1:
+        search.follow_families(random)
     return search.orbits()
 
 
@@ -101,9 +119,15 @@ def attracting_orbits(
 
     Cheaper than :func:`periodic_orbits` where unstable motions are of no use; the largest first.
     """
+    random = checked_generator(rng)
     search = _Search(machine, checked_speed(omega), 1)
-    for start in search.starts(checked_generator(rng)):
-        search.try_settled(start)
+    parts = independent_parts(search.settling.solver.system)
+    if len(parts) > 1:
+        search.combine([attracting_orbits(part.system, omega, random) for part in parts], parts)
+    else:
+        search.add_one_state_motions()
+        for start in search.starts(random):
+            search.try_settled(start)
     return tuple(orbit for orbit in search.orbits() if orbit.stable)
 
 
@@ -120,20 +144,37 @@ class _Search:
     def starts(self, rng: np.random.Generator) -> list[Real]:
         """Rest, the branch from below, a cloud of states, and stepped speeds."""
         solver = self.settling.solver
-        n = solver.system.size
-        X = np.abs(complex_amplitudes(solver.system, np.array([self.omega]))[0])
-        gaps = [g for s in solver.springs for g in s.gaps if math.isfinite(g)]
-        size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
-        box = np.concatenate([size, self.omega * size])
-        cloud = _spread(STARTS if solver.springs else 0, 2 * n, rng)
         stepped = (self._stepped(ratio) for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO))
         return [
-            np.zeros(2 * n),
+            np.zeros(2 * solver.system.size),
             first_unknowns(solver, self.omega),
             *(z for ratio in BRANCH_RATIOS for z in _on_branch(solver.system, self.omega, ratio)),
-            *((2.0 * cloud - 1.0) * box),
+            *cloud(solver, self.omega, rng),
             *(z for z in stepped if z is not None),
         ]
+
+    def add_one_state_motions(self) -> None:
+        """Add the motions that never change their contacts."""
+        solver = self.settling.solver
+        for z in one_state_motions(solver.system, self.omega):
+            point = solver.solve(z, self.omega)
+            if point is not None:
+                self._keep(point)
+
+    def combine(self, found: Sequence[Sequence[Orbit]], parts: Sequence[IndependentPart]) -> None:
+        """Add every combination of motions of independent parts, in every phase to each other."""
+        phases = [
+            [(orbit.periods, z) for orbit in orbits for z in _phases(part.system, orbit)]
+            for part, orbits in zip(parts, found, strict=True)
+        ]
+        for chosen in product(*phases):
+            periods = math.lcm(*(one for one, _ in chosen))
+            if periods > self.max_periods:
+                continue
+            z = joined_state(parts, [one for _, one in chosen])
+            point = self.settling.solver_of(periods).solve(z, self.omega)
+            if point is not None:
+                self._keep(point)
 
     def try_from(self, start: Real) -> None:
         """Newton from a state and from where it settles to, for every number of periods."""
@@ -183,13 +224,42 @@ class _Search:
             z = None if z is None else self._flown(z, float(speed))
         return z
 
+    def follow_families(self, rng: np.random.Generator) -> None:
+        """Follow motions of several periods, found here or at speeds nearby, through their folds.
+
+        Close to the fold with which a family begins no start leads to it.
+        """
+        for ratio in FAMILY_RATIOS:
+            near = _Search(self.machine, ratio * self.omega, self.max_periods)
+            for z in cloud(near.settling.solver, near.omega, rng):
+                near.try_from(z)
+            for point in near.found:
+                if point.formulation.turns > 1:
+                    self._follow(point, math.copysign(1.0, self.omega - near.omega))
+        for point in tuple(self.found):
+            if point.formulation.turns > 1:
+                self._follow(point, 1.0)
+                self._follow(point, -1.0)
+
+    def _follow(self, point: Point, direction: float) -> None:
+        """Add the motions in which a family passes the speed asked for."""
+        periods = point.formulation.turns
+        solver = self.settling.solver_of(periods)
+        low, high = self.omega / FAMILY_REACH, self.omega * FAMILY_REACH
+        for z in _passes(solver, point.u, point.omega, self.omega, (low, high), direction):
+            self._try_over(z, periods)
+
     def _try(self, z: Real) -> None:
         for periods in range(1, self.max_periods + 1):
-            point = self.settling.solver_of(periods).solve(z, self.omega)
-            if point is not None and self.settling.shortest(point) is point:
-                self._keep(point)
-                if self.settling.solver.system.symmetric:
-                    self._keep(self._mirrored(point))
+            self._try_over(z, periods)
+
+    def _try_over(self, z: Real, periods: int) -> None:
+        """Newton for a motion of so many periods and no fewer."""
+        point = self.settling.solver_of(periods).solve(z, self.omega)
+        if point is not None and self.settling.shortest(point) is point:
+            self._keep(point)
+            if self.settling.solver.system.symmetric:
+                self._keep(self._mirrored(point))
 
     def _keep(self, point: Point) -> None:
         """Add a motion unless it is known, in whatever phase."""
@@ -218,10 +288,22 @@ def _on_branch(system: MechanicalSystem, omega: float, ratio: float) -> list[Rea
     """
     solver = ExactSolver(system, half_turn=system.symmetric)
     low, high = omega / ratio, omega * ratio
-    course = correction.Course(
-        low, high, (high - low) / BRANCH_STEPS, STEP_SHARE, 1.0, correction.QUICK
-    )
-    traced = solver.trace(first_unknowns(solver, low), low, course)
+    return _passes(solver, first_unknowns(solver, low), low, omega, (low, high), 1.0)
+
+
+def _passes(
+    solver: ExactSolver,
+    u: Real,
+    start: float,
+    omega: float,
+    bounds: tuple[float, float],
+    direction: float,
+) -> list[Real]:
+    """States at ``omega`` of the branch through u at ``start``, wherever it passes that speed."""
+    low, high = bounds
+    step = (high - low) / BRANCH_STEPS
+    course = correction.Course(low, high, step, STEP_SHARE, direction, correction.QUICK)
+    traced = solver.trace(u, start, course)
     ahead = traced.omega - omega
     states = []
     for p in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
@@ -232,15 +314,8 @@ def _on_branch(system: MechanicalSystem, omega: float, ratio: float) -> list[Rea
     return states
 
 
-def _spread(count: int, size: int, rng: np.random.Generator) -> Real:
-    """A Kronecker sequence from a random point on: (count, size) in [0, 1), evenly spread.
-
-    Its steps are powers of 1 / g with g^(size + 1) = g + 1, after Roberts.
-    """
-    # Kept apart from scipy.stats, whose import takes half a second of every report.
-    g = float(max(np.roots([1.0, *[0.0] * (size - 1), -1.0, -1.0]).real))
-    step = g ** -np.arange(1.0, size + 1.0)
-    return np.mod(rng.random(size) + np.outer(np.arange(count), step), 1.0)
+def _phases(part: MechanicalSystem, orbit: Orbit) -> Real:
+    return Settling(part, orbit.periods).phases(orbit.point)
 
 
 def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
-from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 from flipflow.transient.sampling import Budget, Changes, Table, sample_motion
 
 Real = NDArray[np.float64]
@@ -54,12 +56,16 @@ class Recording:
         Raises
         ------
         IncompleteError
-            When the flow does not end even over a short part of a turn, as where stops chatter.
+            When the flow does not end even over a short part of a turn, as where stops chatter, and
+        when the state is no longer finite.
         """
-        solver = ExactSolver(system, half_turn=False)
+        linear = system.with_bonded()
+        machine = machine_arrays(linear, damped=False)
+        problem = new_shooting(machine, half_turn=False, length=math.nan)
+        work = new_shooting_work(machine)
         node, weight = np.polynomial.legendre.leggauss(GAUSS_NODES)
         budget = Budget(
-            solver.system.C.copy(), solver.system.excitation.vector.astype(np.complex128),
+            linear.C.copy(), linear.excitation.vector.astype(np.complex128),
             node, weight, np.zeros(3),
         )  # fmt: skip
         turn = 2.0 * np.pi / omega
@@ -67,21 +73,32 @@ class Recording:
         t = begin
         while t < end:
             until = min(t + stretch, end)
-            reached = self._stretch(solver, z, omega, t, until, budget)
+            reached = self._stretch(problem, work, z, omega, t, until, budget)
             if reached is None:
                 # A turn has more contacts than are recorded at once: go on by parts of it.
                 stretch = min(stretch, turn) / 2.0
                 if stretch < turn * SHORTEST:
-                    raise IncompleteError(f"the motion could not be carried on beyond {t:.6g} s")
+                    raise IncompleteError(
+                        f"the motion could not be carried on beyond {t:.6g} s: its contacts are "
+                        "too many, it grows beyond all numbers, or it is in resonance without "
+                        "damping"
+                    )
                 continue
             z, t = reached, until
             tell(t)
-        for name, work in zip(self.work, budget.work, strict=True):
-            self.work[name] += float(work)
+        for name, done in zip(self.work, budget.work, strict=True):
+            self.work[name] += float(done)
         return z
 
     def _stretch(
-        self, solver: ExactSolver, z: Real, omega: float, t: float, until: float, budget: Budget
+        self,
+        problem: Shooting,
+        work: ShootingWork,
+        z: Real,
+        omega: float,
+        t: float,
+        until: float,
+        budget: Budget,
     ) -> Real | None:
         """State at ``until``; None, and nothing recorded, where the flow does not end."""
         capacity = (TURNS_A_CALL + 2) * MOST_SEGMENTS
@@ -90,11 +107,11 @@ class Recording:
             np.empty(capacity), np.empty(capacity, np.int64), np.empty(capacity, np.int64),
             np.zeros(1, np.int64),
         )  # fmt: skip
-        solver.flow.z[:] = z
+        work.flow.z[:] = z
         code, row = sample_motion(
-            solver.whole, solver.scratch, omega, t, until, self.row, self.table, changes, budget
+            problem, work, omega, t, until, self.row, self.table, changes, budget
         )
-        if code != status.OK:
+        if code != status.OK or not np.isfinite(work.flow.z).all():
             budget.work[:] = kept
             return None
         self.row = row
@@ -105,4 +122,4 @@ class Recording:
             changes.state[:count].tolist(),
             strict=True,
         )
-        return solver.flow.z.copy()
+        return work.flow.z.copy()

@@ -81,10 +81,10 @@ def simulate(
     Raises
     ------
     InputError
-        For a speed, count, state or disturbance that makes no sense, and for a machine without
-        any damping, which never settles.
+        For a speed, count, state or disturbance that makes no sense.
     IncompleteError
-        Where stops chatter: too many contacts even in a small part of a turn.
+        Where stops chatter: too many contacts even in a small part of a turn. Where the motion
+        grows beyond all numbers, and at the very natural frequency of a machine without damping.
     """
     speed = checked_speed(omega)
     periods = checked_count("periods", periods, MOST_PERIODS)
@@ -99,9 +99,7 @@ def simulate(
     z = initial_state(system.size, initial)
     run = _Run(machine, system_of, speed, end, say)
     run.carry(Recording(times, system.size, len(run.kept)), z, blows)
-    settling = Settling(system_of(run.machine), MAX_PERIODS)
-    distance = settling.distance_ahead(run.z, speed)
-    near = distance is not None and distance <= SETTLED * settling.size(run.z[None], speed)
+    distance, near = _settled(system_of(run.machine), run.z, speed)
     return History(
         system=system,
         t=times,
@@ -120,6 +118,16 @@ def simulate(
         method="exact flow",
         counters={"events": len(run.recording.changes)},
     )
+
+
+def _settled(system: MechanicalSystem, z: Real, omega: float) -> tuple[float | None, bool]:
+    """Distance of z from the motion that is approached, and whether it is next to none."""
+    if not np.count_nonzero(system.with_bonded().C):
+        return None, False  # without damping no motion is approached
+    settling = Settling(system, MAX_PERIODS)
+    distance = settling.distance_ahead(z, omega)
+    near = distance is not None and distance <= SETTLED * settling.size(z[None], omega)
+    return distance, near
 
 
 def _checked_blows(disturbances: object) -> tuple[Disturbance, ...]:
