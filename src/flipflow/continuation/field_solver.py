@@ -106,7 +106,7 @@ class FieldSolver(ExactSolver):
         return point.formulation.solver().depth(point, spring, side)
 
     def return_map(self, point: Point) -> Real:
-        return point.return_map
+        return point.formulation.solver().return_map(point)
 
     def _point(self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None) -> Point:
         size = 2 * self.system.size

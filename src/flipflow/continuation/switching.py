@@ -89,7 +89,10 @@ def meeting(parent: Solver, u: Real, omega: float) -> Point | None:
         guess = last[-1]
         point = None if guess is None else parent.solve(guess.u, w)
         last.append(point)
-        return math.nan if point is None else float(determinant_plus(parent.return_map(point)))
+        try:
+            return math.nan if point is None else float(determinant_plus(parent.return_map(point)))
+        except IncompleteError:  # the flow does not end: the secants end, too
+            return math.nan
 
     answer = root_scalar(
         value, method="secant", x0=omega, x1=omega + SECANT * size, xtol=1e-12 * size,
