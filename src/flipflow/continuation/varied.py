@@ -219,12 +219,15 @@ def determinant(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
     code = shooting_residual(problem.shooting, work.shooting, work.z, omega, work.r, work.J)
     if code != status.OK:
         return code, math.nan
-    product = 1.0
+    product, total = 1.0, 0.0
     for i in range(size):
         for k in range(size):
             work.square[i, k] = work.J[i, k]
-    if not lu_factor(work.square, work.pivot):
+            total += abs(work.J[i, k])
+    if not math.isfinite(total):
         return status.NOT_FINITE, math.nan
+    if not lu_factor(work.square, work.pivot):
+        return status.OK, 0.0  # singular to the last digit: a fold
     for k in range(size):
         product *= work.square[k, k] if work.pivot[k] == k else -work.square[k, k]
     return code, product
