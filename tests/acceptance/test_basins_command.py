@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-from importlib import resources
 
 import pytest
 
@@ -51,24 +50,13 @@ def test_command_line_refuses_with_one_sentence(command, monkeypatch, tmp_path, 
 
 
 # Frames that rattle between hard stops a tenth of a millimetre away, with hardly any damping.
-RATTLING = {
-    'damping = "9.866 kN s/m"\nnormal': 'damping = "0.1 kN s/m"\nnormal',
-    'damping = "2.605 kN s/m"\npieces': 'damping = "0.3 kN s/m"\npieces',
-    'damping = "2.605 kN s/m"\nlaw': 'damping = "0.265 kN s/m"\nlaw',
-    'clearance = "6 mm"': 'clearance = "0.1 mm"',
-    '"8100 kN/m"': '"10000 MN/m"',
-}
 
 
 def test_a_machine_without_motions_is_told_in_a_sentence(command, monkeypatch, tmp_path):
+    """Whether a rattling machine's motions are found hangs on rounding: here none are."""
     monkeypatch.chdir(tmp_path)
-    text = (resources.files("flipflow.io.machines") / "ffs0827.toml").read_text(encoding="utf-8")
-    for old, new in RATTLING.items():
-        assert text.count(old) == 1
-        text = text.replace(old, new)
-    (tmp_path / "hard.toml").write_text(text, encoding="utf-8")
-    words = ("basins", "hard.toml", "--force", "--speed", "300 rpm", "--cells", "4")
-    code, out, err = command(*words)
+    monkeypatch.setattr("flipflow.studies.periodic_orbits.periodic_orbits", lambda *_: ())
+    code, out, err = command("basins", "ffs0827", "--speed", "300 rpm", "--cells", "4")
     assert (code, out) == (3, "")
     assert err.startswith("Error: No motion that repeats itself was found at 300 rpm")
     assert err.count("\n") == 1
