@@ -81,8 +81,10 @@ def orient(problem: Any, scratch: Any, work: Corrector, contacts: int, step: flo
     """
     n = work.r.shape[0]
     for multiple in ROUND:
-        ahead = contacts_beside(problem, scratch, work, multiple * step) == contacts
-        behind = contacts_beside(problem, scratch, work, -multiple * step) == contacts
+        length = multiple * step
+        here, along = work.w, work.tangent
+        ahead = contacts_beside(problem, scratch, work, here, along, length) == contacts
+        behind = contacts_beside(problem, scratch, work, here, along, -length) == contacts
         if ahead != behind:
             if behind:
                 work.side[0] = -work.side[0]
@@ -93,12 +95,17 @@ def orient(problem: Any, scratch: Any, work: Corrector, contacts: int, step: flo
 
 
 @kernel
-def contacts_beside(problem: Any, scratch: Any, work: Corrector, step: float) -> int:
-    """Contacts a step along work.tangent from the corrected point; -1: none known."""
+def contacts_beside(
+    problem: Any, scratch: Any, work: Corrector, point: Real, direction: Real, step: float
+) -> int:
+    """Contacts a step along a direction from a point; -1: none known.
+
+    The Jacobian there is left in work.J, the place in work.guess.
+    """
     n = work.r.shape[0]
     for k in range(n + 1):
-        work.b[k] = work.w[k] + step * work.tangent[k] * work.scale[k]
-    code = residual(problem, scratch, work.b, float(work.b[n]), work.r, work.J)
+        work.guess[k] = point[k] + step * direction[k] * work.scale[k]
+    code = residual(problem, scratch, work.guess, float(work.guess[n]), work.r, work.J)
     return signature(problem, scratch) if code == status.OK else -1
 
 
@@ -133,18 +140,19 @@ def go_round(
     A little beyond, the other contacts tell the Jacobian of the other side; its tangent is followed
     to where those contacts are.
     """
-    n = work.r.shape[0]
-    code = residual(sought, scratch, work.behind, float(work.behind[n]), work.r, work.J)
-    came_from = signature(sought, scratch) if code == status.OK else -1
-    before = look_ahead(sought, scratch, work, 0.0, True)
-    contacts = look_ahead(sought, scratch, work, step, True)
+    here, along = work.here, work.tangent
+    came_from = contacts_beside(sought, scratch, work, work.behind, work.before, 0.0)
+    before = contacts_beside(sought, scratch, work, here, work.before, 0.0)
+    contacts = contacts_beside(sought, scratch, work, here, work.before, step)
+    for k in range(work.border.shape[0]):
+        work.border[k] = work.before[k]
     if contacts < 0 or contacts == before or not bordered(work):
         return 0.0
     new_tangent(work)
     for multiple in ROUND:
         length = multiple * step
-        ahead = look_ahead(sought, scratch, work, length, False) == contacts
-        behind = look_ahead(sought, scratch, work, -length, False) == contacts
+        ahead = contacts_beside(sought, scratch, work, here, along, length) == contacts
+        behind = contacts_beside(sought, scratch, work, here, along, -length) == contacts
         if ahead != behind:
             way = length if ahead else -length
             turned_back = behind and contacts == came_from
@@ -152,21 +160,6 @@ def go_round(
                 return 0.0
             return length if confirm(problem, scratch, work, depth, length) else 0.0
     return 0.0
-
-
-@kernel
-def look_ahead(problem: Any, scratch: Any, work: Corrector, step: float, along: bool) -> int:
-    """Contacts a step from the last point, along its tangent or along work.tangent; -1: none known.
-
-    The Jacobian there is left in work.J.
-    """
-    n = work.r.shape[0]
-    for k in range(n + 1):
-        direction = work.before[k] if along else work.tangent[k]
-        work.guess[k] = work.here[k] + step * direction * work.scale[k]
-        work.border[k] = direction
-    code = residual(problem, scratch, work.guess, float(work.guess[n]), work.r, work.J)
-    return signature(problem, scratch) if code == status.OK else -1
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Corrections in the loop over frequency: Newton in a plane, tangents, and the points behind.
+"""Corrections in the loop: Newton in a plane, tangents, and the points behind.
 
 Unknowns w = (u, omega) are measured in steps: each unknown by its own size times ``u_step``,
 omega by ``omega_step``, so that a step of length one is the longest that is wanted in each.
@@ -52,7 +52,7 @@ class Corrector(NamedTuple):
     home: Real  # (n + 1,) a point at section 0
     home_tangent: Real  # (n + 1,)
     phase: Real  # (1,) the section
-    uneven: Real  # (m,) difference of both gaps, 0 where a stop is the same on both sides
+    uneven: Real  # (m,) 1 where a stop's gaps differ, 0 where it is the same on both sides
     w: Real  # (n + 1,)
     guess: Real  # (n + 1,)
     border: Real  # (n + 1,) normal of the plane to solve in

@@ -1,4 +1,4 @@
-"""What every problem offers to the arc-length loop: residual, signature, depth, scale.
+"""What every problem offers to the arc-length loop: residual, signature, depth, scale, section.
 
 Dispatch is by problem type at compile time. A compiled function handed over as an argument would
 be compiled anew in every process. The plain functions serve where compiling is switched off.
@@ -6,9 +6,7 @@ be compiled anew in every process. The plain functions serve where compiling is 
 
 from __future__ import annotations
 
-from typing import Any
-
-from numba.core.types import NamedTuple as NamedTupleType
+from typing import Any, NamedTuple
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
@@ -34,30 +32,18 @@ from flipflow.periodic.shooting import (
     state_scale,
 )
 
-_RESIDUAL: dict[type, Any] = {
-    Varied: varied.varied_residual,
-    Shooting: shooting_residual,
-    Balance: balance_residual,
-    Sampled: sampled_residual,
-}
-_SIGNATURE: dict[type, Any] = {
-    Varied: varied.varied_crossings,
-    Shooting: crossings,
-    Balance: contact_count,
-    Sampled: passages,
-}
-_DEPTHS: dict[type, Any] = {
-    Varied: varied.varied_depths,
-    Shooting: flow_depths,
-    Balance: series_depths,
-    Sampled: sampled_depths,
-}
-_SCALE: dict[type, Any] = {
-    Varied: varied.varied_scale,
-    Shooting: state_scale,
-    Balance: series_scale,
-    Sampled: sampled_scale,
-}
+
+class Operations(NamedTuple):
+    """The kernels of one kind of problem, by the names of the functions below."""
+
+    residual: Any
+    signature: Any
+    depths: Any
+    unknown_scale: Any
+    better_section: Any
+    carried: Any
+    set_section: Any
+    mirrored: Any
 
 
 @kernel
@@ -80,65 +66,59 @@ def _itself(problem: Any) -> Any:
     return problem
 
 
-_MIRRORED: dict[type, Any] = {
-    Varied: varied.varied_mirrored,
-    Shooting: mirrored_shooting,
-    Balance: _itself,
-    Sampled: _itself,
-}
-_BETTER: dict[type, Any] = {
-    Varied: varied.varied_better,
-    Shooting: section.better_section,
-    Balance: _no_better,
-    Sampled: _no_better,
-}
-_CARRIED: dict[type, Any] = {
-    Varied: varied.varied_carried,
-    Shooting: section.carried,
-    Balance: _stays,
-    Sampled: _stays,
-}
-_SET: dict[type, Any] = {
-    Varied: varied.varied_section,
-    Shooting: section.set_section,
-    Balance: _no_section,
-    Sampled: _no_section,
-}
+_WITHOUT_SECTION = _no_better, _stays, _no_section, _itself
+OPERATIONS: dict[type, Operations] = {
+    Shooting: Operations(
+        shooting_residual, crossings, flow_depths, state_scale,
+        section.better_section, section.carried, section.set_section, mirrored_shooting,
+    ),
+    Varied: Operations(
+        varied.varied_residual, varied.varied_crossings, varied.varied_depths,
+        varied.varied_scale, varied.varied_better, varied.varied_carried,
+        varied.varied_section, varied.varied_mirrored,
+    ),
+    Balance: Operations(
+        balance_residual, contact_count, series_depths, series_scale, *_WITHOUT_SECTION
+    ),
+    Sampled: Operations(
+        sampled_residual, passages, sampled_depths, sampled_scale, *_WITHOUT_SECTION
+    ),
+}  # fmt: skip
 
 
 def residual(problem: Any, scratch: Any, u: Real, omega: float, r: Real, J: Real) -> int:
     """Write the residual r(u, omega) and J = [dr/du, dr/d omega]; return a status."""
-    return int(_RESIDUAL[type(problem)](problem, scratch, u, omega, r, J))
+    return int(OPERATIONS[type(problem)].residual(problem, scratch, u, omega, r, J))
 
 
 def signature(problem: Any, scratch: Any) -> int:
     """A number that changes when the contacts of the last residual's motion change."""
-    return int(_SIGNATURE[type(problem)](problem, scratch))
+    return int(OPERATIONS[type(problem)].signature(problem, scratch))
 
 
 def depths(problem: Any, scratch: Any, omega: float, depth: Real) -> None:
     """Write the greatest depth in m beyond each gap, (m, 2), of the last residual's motion."""
-    _DEPTHS[type(problem)](problem, scratch, omega, depth)
+    OPERATIONS[type(problem)].depths(problem, scratch, omega, depth)
 
 
 def unknown_scale(problem: Any, u: Real, omega: float, scale: Real) -> None:
     """Write the size of each unknown."""
-    _SCALE[type(problem)](problem, u, omega, scale)
+    OPERATIONS[type(problem)].unknown_scale(problem, u, omega, scale)
 
 
 def better_section(problem: Any, scratch: Any, omega: float) -> float:
     """Phase to which the section had better move for the motion of the last residual."""
-    return float(_BETTER[type(problem)](problem, scratch, omega))
+    return float(OPERATIONS[type(problem)].better_section(problem, scratch, omega))
 
 
 def carried(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> int:
     """Carry unknowns w = (u, omega) and a tangent dw from the section to another; a status."""
-    return int(_CARRIED[type(problem)](problem, scratch, w, tangent, end))
+    return int(OPERATIONS[type(problem)].carried(problem, scratch, w, tangent, end))
 
 
 def set_section(problem: Any, scratch: Any, phase: float, anew: bool) -> None:
     """Let the unknowns stand at a phase of the force; ``anew`` forgets how good the last was."""
-    _SET[type(problem)](problem, scratch, phase, anew)
+    OPERATIONS[type(problem)].set_section(problem, scratch, phase, anew)
 
 
 def mirrored(problem: Any) -> Any:
@@ -146,88 +126,23 @@ def mirrored(problem: Any) -> Any:
 
     The problem itself where it is that already, and where there is none, as of a series.
     """
-    return _MIRRORED[type(problem)](problem)
+    return OPERATIONS[type(problem)].mirrored(problem)
 
 
-def _kind(problem: Any) -> Any:
-    return problem.instance_class if isinstance(problem, NamedTupleType) else None
+def _choose(operation: Any) -> None:
+    """Let kernels call an operation: of the problem's own kind, chosen when they are compiled."""
+
+    @chosen_by_type(operation)
+    def choose(problem: Any, *rest: Any) -> Any:
+        chosen = getattr(OPERATIONS[problem.instance_class], operation.__name__)
+
+        def run(problem: Any, *rest: Any) -> Any:
+            return chosen(problem, *rest)
+
+        return run
 
 
-@chosen_by_type(residual)
-def _residual(problem: Any, scratch: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
-    chosen = _RESIDUAL[_kind(problem)]
-
-    def run(problem: Any, scratch: Any, u: Any, omega: Any, r: Any, J: Any) -> Any:
-        return chosen(problem, scratch, u, omega, r, J)
-
-    return run
-
-
-@chosen_by_type(signature)
-def _signature(problem: Any, scratch: Any) -> Any:
-    chosen = _SIGNATURE[_kind(problem)]
-
-    def run(problem: Any, scratch: Any) -> Any:
-        return chosen(problem, scratch)
-
-    return run
-
-
-@chosen_by_type(depths)
-def _depths(problem: Any, scratch: Any, omega: Any, depth: Any) -> Any:
-    chosen = _DEPTHS[_kind(problem)]
-
-    def run(problem: Any, scratch: Any, omega: Any, depth: Any) -> Any:
-        return chosen(problem, scratch, omega, depth)
-
-    return run
-
-
-@chosen_by_type(unknown_scale)
-def _unknown_scale(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
-    chosen = _SCALE[_kind(problem)]
-
-    def run(problem: Any, u: Any, omega: Any, scale: Any) -> Any:
-        return chosen(problem, u, omega, scale)
-
-    return run
-
-
-@chosen_by_type(better_section)
-def _better_section(problem: Any, scratch: Any, omega: Any) -> Any:
-    chosen = _BETTER[_kind(problem)]
-
-    def run(problem: Any, scratch: Any, omega: Any) -> Any:
-        return chosen(problem, scratch, omega)
-
-    return run
-
-
-@chosen_by_type(carried)
-def _carried(problem: Any, scratch: Any, w: Any, tangent: Any, end: Any) -> Any:
-    chosen = _CARRIED[_kind(problem)]
-
-    def run(problem: Any, scratch: Any, w: Any, tangent: Any, end: Any) -> Any:
-        return chosen(problem, scratch, w, tangent, end)
-
-    return run
-
-
-@chosen_by_type(set_section)
-def _set_section(problem: Any, scratch: Any, phase: Any, anew: Any) -> Any:
-    chosen = _SET[_kind(problem)]
-
-    def run(problem: Any, scratch: Any, phase: Any, anew: Any) -> Any:
-        return chosen(problem, scratch, phase, anew)
-
-    return run
-
-
-@chosen_by_type(mirrored)
-def _mirrored(problem: Any) -> Any:
-    chosen = _MIRRORED[_kind(problem)]
-
-    def run(problem: Any) -> Any:
-        return chosen(problem)
-
-    return run
+for _operation in (
+    residual, signature, depths, unknown_scale, better_section, carried, set_section, mirrored,
+):  # fmt: skip
+    _choose(_operation)

@@ -11,7 +11,8 @@ from flipflow.dynamics.law import Stops
 class MachineArrays(NamedTuple):
     """x'' = -stiffness x - damping x' - sum_j reach_j H_j + Re(push omega^power e^(i omega t)).
 
-    N degrees of freedom, m springs. Pure data: kernels write nothing here.
+    N degrees of freedom, m springs. Pure data: kernels write nothing here, but for ``set_machine``,
+    by which a series rewrites the machine that is its own.
     """
 
     stiffness: Real  # (N, N) M^-1 K

@@ -297,7 +297,7 @@ class Solver(ABC):
 
     @property
     def uneven(self) -> Real:
-        """Difference of both gaps of each spring in m, (m,): 0 where the branch may be even."""
+        """1 for each spring whose gaps differ, (m,): 0 where the branch may be even."""
         gaps = self.machine.stops.gap
         return np.where(gaps[:, 0] == gaps[:, 1], 0.0, 1.0)
 
