@@ -110,6 +110,21 @@ def first_orbit(machine, runs):
     return timed(first, 10 * runs) | {"target": 300e-6}
 
 
+def over_clearance(machine, runs):
+    """The large motion at 203 rad/s over the clearance, special points included."""
+    orbits = ff.frequency_response(machine, INTERVAL).orbits_at(203.0)
+    largest = max(orbits, key=lambda orbit: orbit.amplitude("relative"))
+    return timed(lambda: ff.continue_orbit(largest, "clearance", (2e-3, 9e-3)), runs) | {
+        "target": 0.3
+    }
+
+
+def fold_curve(machine, runs):
+    """A fold over the clearance, through the cusp to the other one."""
+    fold = ff.frequency_response(machine, INTERVAL).folds[0]
+    return timed(lambda: ff.continue_fold(fold, "clearance", (2e-3, 8e-3)), runs) | {"target": 1.0}
+
+
 def period_of_flow(machine, runs):
     """One period of settled motion, of many in one call."""
     solver = ExactSolver(machine.system(), half_turn=False)
@@ -179,6 +194,8 @@ def main():
     rows["first orbit"] = first_orbit(machine, options.runs)
     rows["orbit, cold"] = orbit(machine, options.runs)
     rows["period of flow"] = period_of_flow(machine, options.runs)
+    rows["over clearance"] = over_clearance(machine, options.runs)
+    rows["fold curve"] = fold_curve(machine, options.runs)
     peers = peer_runs(options.peers, rows) if options.peers else {}
     print_table(rows, peers)
     print(json.dumps({"machine": _machine(), "flipflow": rows, "peers": peers}, indent=1))
