@@ -40,8 +40,9 @@ _HOME = {
     "reproduce": "flipflow.paper.reproduce",
     "figure": "flipflow.plotting.dispatch",
     "ClearanceSpring": "flipflow.model.elements",
-    "HarmonicForce": "flipflow.model.elements",
-    "Unbalance": "flipflow.model.elements",
+    "HarmonicForce": "flipflow.model.excitation",
+    "MovingBase": "flipflow.model.excitation",
+    "Unbalance": "flipflow.model.excitation",
     "MechanicalSystem": "flipflow.model.system",
     "FlipFlowScreen": "flipflow.model.screen",
     "Impulse": "flipflow.model.disturbance",
@@ -81,8 +82,9 @@ if TYPE_CHECKING:
     from flipflow.model.drive import Motor as Motor
     from flipflow.model.drive import SpeedProfile as SpeedProfile
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
-    from flipflow.model.elements import HarmonicForce as HarmonicForce
-    from flipflow.model.elements import Unbalance as Unbalance
+    from flipflow.model.excitation import HarmonicForce as HarmonicForce
+    from flipflow.model.excitation import MovingBase as MovingBase
+    from flipflow.model.excitation import Unbalance as Unbalance
     from flipflow.model.limits import Limits as Limits
     from flipflow.model.project import Project as Project
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen

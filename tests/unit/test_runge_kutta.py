@@ -16,7 +16,8 @@ import flipflow as ff
 from flipflow.errors import InputError
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.drive import Drive, Motor, SpeedProfile
-from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.excitation import HarmonicForce, Unbalance
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4

@@ -148,14 +148,16 @@ def _with_springs(system: MechanicalSystem, kept: list[int]) -> MechanicalSystem
 
 def _parts(system: MechanicalSystem) -> dict[str, Real]:
     """Arrays of a system, by the names of a series."""
-    force, springs = system.excitation.vector, system.springs
+    springs = system.springs
+    force = np.array([vector for one in system.excitations for _, vector in one.terms])
     m, n = len(springs), system.size
     return {
         "inertia": system.M,
         "damping": system.C,
         "stiffness": system.K,
         "direction": np.array([spring.direction for spring in springs]).reshape(m, n),
-        "force": np.array([force.real, force.imag]),
+        "force": np.concatenate([force.real, force.imag]),
+        "static": system.constant_force[None],
         "stop": np.array([[s.stiffness for s in springs], [s.damping for s in springs]], float),
         "gap": np.array([spring.gaps for spring in springs], float).reshape(m, 2),
     }

@@ -17,7 +17,6 @@ from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import STABILITY_CHANGES, Found, find_special_points
 from flipflow.continuation.starts import found_motions
-from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.dynamics.contact_free_range import contact_free_up_to
 from flipflow.errors import IncompleteError, InputError, SampledContactWarning
 from flipflow.model.arguments import checked_interval
@@ -25,6 +24,7 @@ from flipflow.model.contact_law import pushes_whole
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.balance_solver import BalanceSolver, SampledSolver
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.one_state import contact_free_motion, state_of, touches_nothing
 from flipflow.periodic.options import (
     HarmonicBalance,
     Method,
@@ -32,7 +32,7 @@ from flipflow.periodic.options import (
     SampledHarmonicBalance,
     checked_method,
 )
-from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.orbit import Orbit, state_at_rest
 from flipflow.periodic.solver import POINTS_MOST, STEP_SHARE, Formulation, Solver, Traced
 from flipflow.periodic.stability import (
     UNDETERMINED,
@@ -197,8 +197,7 @@ def some_unknowns(solver: Solver, omega: float) -> Real:
 def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
     """State at ``omega`` on the branch that is without contact at a higher frequency."""
     for free in (omega * RATIO_UP ** np.arange(1, RATIOS_UP)).tolist():
-        X = solver.machine.direction @ complex_amplitude(solver.system, free)
-        if (np.abs(X) < solver.machine.stops.gap.min(axis=1)).all():
+        if touches_nothing(solver.system, *contact_free_motion(solver.system, free)):
             break
     else:
         return
@@ -230,23 +229,16 @@ def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
 
 def contact_free_unknowns(solver: Solver, omega: float) -> Real:
     """The solver's unknowns of the linear motion."""
-    X = complex_amplitude(solver.system, omega)
+    rest, X = contact_free_motion(solver.system, omega)
     if isinstance(solver, BalanceSolver):
-        u = np.zeros(solver.unknowns)
-        at = int(np.flatnonzero(solver.harmonics == 1)[0])
-        D = solver.machine.direction
-        m = D.shape[0]
-        begin = 2 * m * at if solver.harmonics[0] != 0 else m + 2 * m * (at - 1)
-        A = D @ X
-        u[begin : begin + 2 * m] = np.stack([A.real, A.imag], axis=1).ravel()
-        return u
-    return np.concatenate([X.real, (1j * omega * X).real])
+        return solver.unknowns_of(solver.system.orders, rest, X)
+    return state_of(solver.system, rest, X, omega)
 
 
 def settled_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion into which the machine settles from rest, or the best guess of it."""
     exact = _exact(solver, half_turn=False)
-    z = exact.settled(np.zeros(exact.unknowns), omega, SETTLING_TURNS)
+    z = exact.settled(state_at_rest(exact.system), omega, SETTLING_TURNS)
     point = None if exact is solver else exact.solve(z, omega)
     return _unknowns_of(solver, exact, z if point is None else point.u, omega)
 

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from flipflow.compiled.arrays import Real
-from flipflow.dynamics.contact_free import complex_amplitude
 from flipflow.errors import IncompleteError
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.periodic.one_state import one_state_motions
+from flipflow.periodic.one_state import contact_free_motion, one_state_motions
 from flipflow.periodic.two_event import TwoEventProblem
 
 STARTS = 64  # states of a cloud
@@ -22,9 +21,9 @@ SETTLING_TURNS = 60  # forcing periods that each is run before a motion is solve
 def cloud(solver: ExactSolver, omega: float, rng: np.random.Generator) -> Real:
     """A low-discrepancy cloud of states as large as the linear motion or the gaps, (K, 2 N)."""
     n = solver.system.size
-    X = np.abs(complex_amplitude(solver.system, omega))
-    gaps = [g for spring in solver.springs for g in spring.gaps if math.isfinite(g)]
-    size = np.maximum(2.0 * X, 3.0 * max(gaps, default=0.0))
+    rest, X = contact_free_motion(solver.system, omega)
+    gaps = [abs(g) for spring in solver.springs for g in spring.gaps if math.isfinite(g)]
+    size = np.maximum(2.0 * np.abs(X).sum(axis=0) + np.abs(rest), 3.0 * max(gaps, default=0.0))
     box = np.concatenate([size, omega * size])
     spread = _spread(STARTS if solver.springs else 0, 2 * n, rng)
     return np.asarray((2.0 * spread - 1.0) * box)

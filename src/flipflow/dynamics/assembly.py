@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
 from flipflow.errors import InputError
@@ -29,33 +30,58 @@ def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineA
     Raises
     ------
     InputError
-        Without a damping that is needed, and with a singular stiffness (nothing holds the machine).
+        Without a damping that is needed, and with a stiffness that is singular where nothing ever
+        holds the machine, or nothing damps it.
     """
     if damped:
         system.require_damping()
+    _require_hold(system)
     n, springs = system.size, system.springs
-    m, force = len(springs), system.excitation.vector
+    m = len(springs)
     D = np.array([spring.direction for spring in springs]).reshape(m, n)
-    parts = force.view(np.float64).reshape(n, 2)
+    terms = [(one.order, *term) for one in system.excitations for term in one.terms]
+    force = np.array([vector for _, _, vector in terms])
+    parts = np.concatenate([force.real, force.imag, [system.constant_force]]).T
     right = np.concatenate([system.K, system.C, D.T, parts], axis=1)
     solved = np.asarray(np.linalg.solve(system.M, right), np.float64)
-    held = [abs(value) for value in np.linalg.eigvalsh(system.K).tolist()]
-    if min(held) <= n * EPSILON * max(held):
-        raise InputError(
-            "K",
-            "singular",
-            "with all stops open nothing holds the machine in place; give every free motion a "
-            "spring",
-        )
+    real, imag = np.split(solved[:, 2 * n + m : -1].T, 2)
+    orders = system.orders
     return MachineArrays(
         stiffness=solved[:, :n].copy(),
         damping=solved[:, n : 2 * n].copy(),
         direction=D,
         reach=np.ascontiguousarray(solved[:, 2 * n : 2 * n + m].T),
-        push=solved[:, -2:].copy().view(np.complex128)[:, 0],
-        power=system.excitation.power,
+        static=solved[:, -1].copy(),
+        push=np.ascontiguousarray(real + 1j * imag),
+        power=np.array([power for _, power, _ in terms], np.int64),
+        wave=np.array([orders.index(order) for order, _, _ in terms], np.int64),
+        order=np.array(orders, np.int64),
         stops=stops_of(springs),
     )
+
+
+def _require_hold(system: MechanicalSystem) -> None:
+    """Refuse a machine with a free motion that no stop ever ends, or that nothing damps."""
+    free = _null_space(system.K)
+    if free.shape[1] == 0:
+        return
+    springs = [spring for spring in system.springs if spring.stiffness > 0.0]
+    D = np.array([spring.direction for spring in springs]).reshape(len(springs), system.size)
+    if _null_space(D @ free).shape[1]:
+        remedy = "nothing ever holds the machine; give every free motion a spring or a stop"
+        raise InputError("K", "singular", remedy)
+    if _null_space(system.C @ free).shape[1]:
+        remedy = "a motion that no spring holds between the stops needs damping there; give it some"
+        raise InputError("C", "singular", remedy)
+
+
+def _null_space(matrix: Real) -> Real:
+    """Columns that a matrix (n, k) takes to zero, (k, .), to rounding."""
+    if matrix.shape[0] == 0:
+        return np.eye(matrix.shape[1])
+    _, sizes, rows = np.linalg.svd(matrix)
+    rank = np.count_nonzero(sizes > max(matrix.shape) * EPSILON * sizes.max(initial=0.0))
+    return np.asarray(rows[rank:].T)
 
 
 def stops_of(springs: Sequence[ClearanceSpring]) -> Stops:

@@ -6,6 +6,8 @@ of freedom.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +25,7 @@ def contact_free(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) 
     Parameters
     ----------
     M, C, K
-        Mass, damping, stiffness in kg, N s/m, N/m, symmetric, (..., N, N).
+        Mass, damping, stiffness in kg, N s/m, N/m, (..., N, N).
     force
         F in N, (..., N); complex for a phase.
     omega
@@ -44,33 +46,50 @@ def contact_free(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) 
     return np.asarray(np.linalg.solve(Z, force[..., None])[..., 0])
 
 
-def complex_amplitudes(system: MechanicalSystem, omega: Real) -> Complex:
-    """X of a system without contact, (..., N), at frequencies in rad/s, (...)."""
-    force = system.excitation.vector * omega[..., None] ** system.excitation.power
-    return contact_free(system.M, system.C, system.K, force, omega)
+def complex_amplitudes(system: MechanicalSystem, omega: Real, order: int = 1) -> Complex:
+    """X of a system without contact, (..., N), at a multiple of frequencies in rad/s, (...)."""
+    force = system.force(omega, order)
+    return contact_free(system.M, system.C, system.K, force, order * omega)
 
 
-def complex_amplitude(system: MechanicalSystem, omega: float) -> Complex:
+def complex_amplitude(system: MechanicalSystem, omega: float, order: int = 1) -> Complex:
     """X at one frequency, (N,), in a third of the time; NaN where an undamped mode resonates."""
-    force = system.excitation.vector * omega**system.excitation.power
-    Z = system.K - omega**2 * system.M + 1j * omega * system.C
+    force, w = system.force(omega, order), order * omega
+    Z = system.K - w**2 * system.M + 1j * w * system.C
     try:
         return np.asarray(np.linalg.solve(Z, force))
     except np.linalg.LinAlgError:
         return np.full(force.shape, np.nan, np.complex128)
 
 
+def span(orders: Sequence[int], amplitudes: Complex) -> tuple[float, float]:
+    """Least and greatest value of Re sum_n a_n exp(i n theta) over a turn, n of ``orders``."""
+    if len(orders) == 1:
+        size = float(abs(amplitudes[0]))
+        return -size, size
+    # With z = exp(i theta) the slope is zero where sum_n i n (a_n z^n - conj(a_n) z^-n) is.
+    highest = max(orders)
+    slope = np.zeros(2 * highest + 1, np.complex128)
+    for order, amplitude in zip(orders, amplitudes, strict=True):
+        slope[highest - order] = order * amplitude
+        slope[highest + order] = -order * np.conj(amplitude)
+    theta = np.append(np.angle(np.roots(slope)), 0.0)
+    values = (np.exp(1j * np.outer(theta, orders)) @ amplitudes).real
+    return float(values.min()), float(values.max())
+
+
 def _of_two(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) -> Complex:
     """Two degrees of freedom by the adjugate: a sixth of the time that LAPACK's calls take."""
-    Z11, Z12, Z22 = (_impedance(M, C, K, omega, at) for at in ((0, 0), (0, 1), (1, 1)))
-    scale = 1.0 / (Z11 * Z22 - Z12 * Z12)
+    Z11, Z12, Z21, Z22 = (_impedance(M, C, K, omega, at) for at in ((0, 0), (0, 1), (1, 0), (1, 1)))
+    scale = 1.0 / (Z11 * Z22 - Z12 * Z21)
     Z11 *= scale
     Z12 *= scale
+    Z21 *= scale
     Z22 *= scale
     F1, F2 = force[..., 0], force[..., 1]
     X = np.empty((2, *np.broadcast_shapes(scale.shape, F1.shape)), np.complex128)
     np.multiply(Z22, F1, out=X[0])
-    np.multiply(Z12, -F1, out=X[1])
+    np.multiply(Z21, -F1, out=X[1])
     if np.any(F2):  # most machines are driven at one degree of freedom
         X[0] -= Z12 * F2
         X[1] += Z11 * F2

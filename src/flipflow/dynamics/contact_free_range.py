@@ -1,15 +1,17 @@
 r"""How far up in frequency a machine moves without meeting a stop, certified by its modes.
 
-At the gap j the motion without contact has the complex amplitude :math:`\omega^p S_j(\omega)` with
+At the gap j an excitation gives the motion without contact the complex amplitude
+:math:`\omega^p S_j(\omega)` with
 
-.. math:: S_j(\omega) = \sum_i \frac{a_{ij}}{i \omega - \lambda_i}
+.. math:: S_j(\omega) = \sum_i \frac{a_{ij}}{i n \omega - \lambda_i}
 
 over the modes of the open machine. Between two frequencies a distance h apart it is at most
 
 .. math:: |S_j| \le \max(|S_j(\text{low})|, |S_j(\text{high})|) + \frac{h^2}{8} \max |S_j''|, \qquad
-    |S_j''| \le \sum_i \frac{2 |a_{ij}|}{\min |i \omega - \lambda_i|^3}.
+    |S_j''| \le \sum_i \frac{2 n^2 |a_{ij}|}{\min |i n \omega - \lambda_i|^3}.
 
-The search takes steps as long as this bound stays below the gap.
+The search takes steps as long as the sum of these bounds over all excitations stays below what the
+rest leaves of the gap.
 """
 
 from __future__ import annotations
@@ -55,39 +57,49 @@ def _stays_below(
     machine: MachineArrays, modes: Modes, low: float, high: float, only_there: bool
 ) -> bool:
     """Whether motions between two frequencies stay below all gaps, or only that at the high one."""
-    scale = high**machine.power
     for j in range(machine.direction.shape[0]):
-        most = _size(modes, j, high)
-        if not only_there:
-            curved = _curvature(modes, j, low, high)
-            most = max(most, _size(modes, j, low)) + 0.125 * (high - low) ** 2 * curved
-        if not most * scale < min(machine.stops.gap[j, 0], machine.stops.gap[j, 1]):
+        reach, rest = 0.0, 0.0
+        for k in range(machine.direction.shape[1]):
+            if modes.drift[0, k] != 0.0:
+                return False
+            rest += machine.direction[j, k] * modes.static[0, k]
+        for e in range(machine.power.shape[0]):
+            most = _size(machine, modes, e, j, high)
+            if not only_there:
+                curved = _curvature(machine, modes, e, j, low, high)
+                most = max(most, _size(machine, modes, e, j, low))
+                most += 0.125 * (high - low) ** 2 * curved
+            reach += most * high ** machine.power[e]
+        if not reach < min(machine.stops.gap[j, 0] - rest, machine.stops.gap[j, 1] + rest):
             return False
     return True
 
 
 @kernel(inline=True)
-def _size(modes: Modes, j: int, omega: float) -> float:
-    """|S_j|."""
-    total = 0j
+def _size(machine: MachineArrays, modes: Modes, e: int, j: int, omega: float) -> float:
+    """|S_j| of excitation e."""
+    total, turning = 0j, 1j * (machine.order[machine.wave[e]] * omega)
     for i in range(modes.mode_count[0]):
         rate, shape = modes.rate[0, i], modes.gap_shape[0, j, i]
-        total += shape * modes.force[0, i] * reciprocal(1j * omega - rate)
+        total += shape * modes.force[0, e, i] * reciprocal(turning - rate)
         if modes.weight[0, i] == 2.0:
-            gap = reciprocal(1j * omega - rate.conjugate())
-            total += shape.conjugate() * modes.force_conj[0, i] * gap
+            gap = reciprocal(turning - rate.conjugate())
+            total += shape.conjugate() * modes.force_conj[0, e, i] * gap
     return modulus(total)
 
 
 @kernel(inline=True)
-def _curvature(modes: Modes, j: int, low: float, high: float) -> float:
-    """A bound on |S_j''| between two frequencies."""
-    total = 0.0
+def _curvature(
+    machine: MachineArrays, modes: Modes, e: int, j: int, low: float, high: float
+) -> float:
+    """A bound on |S_j''| of excitation e between two frequencies."""
+    total, order = 0.0, float(machine.order[machine.wave[e]])
     for i in range(modes.mode_count[0]):
         rate, shape = modes.rate[0, i], modulus(modes.gap_shape[0, j, i])
-        beside = max(low - rate.imag, rate.imag - high, 0.0)
-        total += 2.0 * shape * modulus(modes.force[0, i]) / math.hypot(rate.real, beside) ** 3
+        beside = max(order * low - rate.imag, rate.imag - order * high, 0.0)
+        near = math.hypot(rate.real, beside)
+        total += 2.0 * shape * modulus(modes.force[0, e, i]) / near**3
         if modes.weight[0, i] == 2.0:
-            away = math.hypot(rate.real, low + rate.imag)
-            total += 2.0 * shape * modulus(modes.force_conj[0, i]) / away**3
-    return total
+            away = math.hypot(rate.real, order * low + rate.imag)
+            total += 2.0 * shape * modulus(modes.force_conj[0, e, i]) / away**3
+    return order**2 * total

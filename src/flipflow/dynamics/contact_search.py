@@ -2,7 +2,7 @@
 
 Both a free flight of the exact flow and a truncated Fourier series are, at gap j,
 
-    y_j(t) = offset_j + Re sum_i amplitude_ji exp(rate_i t),
+    y_j(t) = offset_j + drift_j t + Re sum_i amplitude_ji exp(rate_i t),
 
 so one search serves both. Let a switching function have the value h > 0 and the slope h', and let
 |h''| <= B hold over the step. The function then cannot vanish before the positive root of
@@ -38,6 +38,8 @@ class GapMotion(NamedTuple):
     """Sum of exponentials at m gaps; the scratch in which a segment or series is written."""
 
     offset: Real  # (m,)
+    drift: Real  # (m,) of what nothing holds, under a constant force
+    time: Real  # (1,) t of the last ``exponentials``
     amplitude: Complex  # (m, r)
     rate: Complex  # (r,)
     factor: Complex  # (r,) exp(rate t), filled by ``exponentials``
@@ -103,6 +105,7 @@ def longest_step(motion: GapMotion, count: int, horizon: float) -> float:
 @kernel(inline=True)
 def exponentials(motion: GapMotion, count: int, t: float) -> None:
     """factor_i = exp(rate_i t) and its size, by powers where the rates are equally spaced."""
+    motion.time[0] = t
     if motion.spacing[0] > 0:
         motion.factor[0] = exponential(motion.rate[0] * t)
         motion.decay[0] = 1.0
@@ -121,8 +124,8 @@ def exponentials(motion: GapMotion, count: int, t: float) -> None:
 @kernel(inline=True)
 def gap_state(motion: GapMotion, count: int, j: int) -> tuple[float, float]:
     """y and y' at the time of the last ``exponentials``."""
-    y = motion.offset[j]
-    v = 0.0
+    v = motion.drift[j]
+    y = motion.offset[j] + v * motion.time[0]
     for i in range(count):
         term = motion.amplitude[j, i] * motion.factor[i]
         y += term.real
@@ -150,8 +153,9 @@ def switching_state(
     motion: GapMotion, count: int, j: int, gap: float, alpha: float, beta: float
 ) -> tuple[float, float, float, float, float]:
     """alpha (y - gap) + beta y': value, rate, curvature, bounds on second and third derivative."""
-    value = alpha * (motion.offset[j] - gap)
-    slope = 0.0
+    drift = motion.drift[j]
+    value = alpha * (motion.offset[j] + drift * motion.time[0] - gap) + beta * drift
+    slope = alpha * drift
     curvature = 0.0
     second = 0.0
     third = 0.0
@@ -304,7 +308,8 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
     low, high = math.inf, -math.inf
     v_before = 0.0
     for k in range(samples + 1):
-        y, v = motion.offset[j], 0.0
+        v = motion.drift[j]
+        y = motion.offset[j] + v * k * step
         for i in range(count):
             term = motion.turn[i]
             y += term.real
@@ -359,6 +364,7 @@ def observe_motion(
     start: Real,
     length: Real,
     offset: Real,
+    drift: Real,
     amplitude: Complex,
     rate: Complex,
     harmonic: Complex,
@@ -371,7 +377,8 @@ def observe_motion(
 ) -> None:
     """Extremes of G coordinates over all pieces, and int y exp(-i omega t) dt.
 
-    Offsets are (G, E), amplitudes (G, E, R) and harmonics (G, E, H) seen in the coordinates.
+    Offsets and drifts are (G, E), amplitudes (G, E, R), harmonics (G, E, H), as the coordinates see
+    them.
     """
     modes, count = rate.shape[1], rate.shape[1] + order.shape[0]
     for e in range(start.shape[0]):
@@ -380,7 +387,7 @@ def observe_motion(
         for h in range(order.shape[0]):
             motion.rate[modes + h] = 1j * (order[h] * omega)
         for g in range(low.shape[0]):
-            motion.offset[g] = offset[g, e]
+            motion.offset[g], motion.drift[g] = offset[g, e], drift[g, e]
             for i in range(modes):
                 motion.amplitude[g, i] = amplitude[g, e, i]
             for h in range(order.shape[0]):
@@ -400,6 +407,11 @@ def first_harmonic(
     """int y exp(-i omega t) dt over one piece, in closed form."""
     turn = exponential(-1j * omega * start)
     total = motion.offset[g] * _integral_of_exponential(-1j * omega, length)
+    if motion.drift[g] != 0.0:
+        # By parts: int t exp(-i omega t) dt.
+        still = _integral_of_exponential(-1j * omega, length)
+        moved = length * exponential(-1j * omega * length)
+        total += motion.drift[g] * (still - moved) / (1j * omega)
     for i in range(count):
         amplitude = motion.amplitude[g, i]
         total += 0.5 * amplitude * _integral_of_exponential(motion.rate[i] - 1j * omega, length)
@@ -421,6 +433,8 @@ def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:
     shape = (gaps, rates.size)
     return GapMotion(
         offset=np.zeros(gaps),
+        drift=np.zeros(gaps),
+        time=np.zeros(1),
         amplitude=np.zeros(shape, np.complex128),
         rate=rates.copy(),
         factor=np.zeros(rates.size, np.complex128),

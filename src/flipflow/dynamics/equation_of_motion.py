@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.dynamics.law import Stops
 
 
 class MachineArrays(NamedTuple):
-    """x'' = -stiffness x - damping x' - sum_j reach_j H_j + Re(push omega^power e^(i omega t)).
+    """x'' = static - stiffness x - damping x' - sum_j reach_j H_j + sum_e Re(F_e e^(i n omega t)).
 
-    N degrees of freedom, m springs. Pure data: kernels write nothing here, but for ``set_machine``,
-    by which a series rewrites the machine that is its own.
+    F_e = push_e omega^power_e turns n = order[wave_e] times as fast as omega. N degrees of freedom,
+    m springs, E excitations at W multiples of omega. Pure data: kernels write nothing here, but for
+    ``set_machine``, by which a series rewrites the machine that is its own.
     """
 
     stiffness: Real  # (N, N) M^-1 K
     damping: Real  # (N, N) M^-1 C
     direction: Real  # (m, N) d_j
     reach: Real  # (m, N) M^-1 d_j
-    push: Complex  # (N,) M^-1 f
-    power: int  # the force grows with omega to this power: 2 unbalance, 0 constant
+    static: Real  # (N,) M^-1 f_0
+    push: Complex  # (E, N) M^-1 f
+    power: Int  # (E,) the force grows with omega to this power: 2 unbalance, 0 constant
+    wave: Int  # (E,) place of its multiple in ``order``
+    order: Int  # (W,) multiples of omega, rising
     stops: Stops

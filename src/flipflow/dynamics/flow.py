@@ -2,9 +2,11 @@
 
 In one contact state the machine's state z = (x, x') follows
 
-    z(t) = rest + Re(drive exp(i omega t)) + Re sum_i weight_i v_i q_i exp(rate_i (t - t_s)),
+    z(t) = rest + drift (t - t_s) + sum_w Re(drive_w exp(i n_w omega t))
+           + Re sum_i weight_i v_i q_i exp(rate_i (t - t_s)),
 
-with drive the particular answer to the excitation. A flow is recorded segment by segment; the
+with drive the particular answer to the excitation at its multiples n_w of omega, and drift that of
+what nothing holds to a constant force. A flow is recorded segment by segment; the
 tangent is then carried over the record.
 """
 
@@ -41,8 +43,8 @@ class Flow(NamedTuple):
     """Modes, scratch, and the record of one flow of up to E segments."""
 
     modes: Modes
-    drive: Complex  # (S, 2 N) particular answer of each contact state
-    drive_slope: Complex  # (S, 2 N) its derivative with respect to omega
+    drive: Complex  # (S, W, 2 N) particular answer of each contact state at each multiple of omega
+    drive_slope: Complex  # (S, W, 2 N) its derivative with respect to omega
     driven_at: Real  # (S,) omega for which ``drive`` holds, NaN: none
     motion: GapMotion
     regime: Int  # (m,) running regime of each spring
@@ -63,13 +65,13 @@ def new_flow(machine: MachineArrays) -> Flow:
     modes = new_modes(machine)
     states, rates = modes.rate.shape
     m, n = machine.direction.shape
-    e = MOST_SEGMENTS
+    e, waves = MOST_SEGMENTS, machine.order.shape[0]
     return Flow(
         modes=modes,
-        drive=np.zeros((states, 2 * n), np.complex128),
-        drive_slope=np.zeros((states, 2 * n), np.complex128),
+        drive=np.zeros((states, waves, 2 * n), np.complex128),
+        drive_slope=np.zeros((states, waves, 2 * n), np.complex128),
         driven_at=np.full(states, np.nan),
-        motion=new_gap_motion(m, np.zeros(rates + 1, np.complex128)),
+        motion=new_gap_motion(m, np.zeros(rates + waves, np.complex128)),
         regime=np.zeros(m, np.int64),
         z=np.zeros(2 * n),
         segments=np.zeros(1, np.int64),
@@ -99,43 +101,54 @@ def set_regimes(machine: MachineArrays, flow: Flow) -> None:
 
 @kernel(inline=True)
 def prepare_drive(machine: MachineArrays, flow: Flow, slot: int, omega: float) -> None:
-    """drive = (i omega - A)^-1 (0, M^-1 F(omega)) by modes, and its derivative in omega.
+    """drive = (i n omega - A)^-1 (0, M^-1 F(omega)) by modes, and its derivative in omega.
 
-    Only displacements are summed; the velocities are i omega times them.
+    Only displacements are summed; the velocities are i n omega times them.
     """
     if flow.driven_at[slot] == omega:
         return
-    modes, n = flow.modes, machine.direction.shape[1]
-    power = machine.power
+    n = machine.direction.shape[1]
+    for w in range(machine.order.shape[0]):
+        for k in range(n):
+            flow.drive[slot, w, k] = 0.0
+            flow.drive_slope[slot, w, k] = 0.0
+    for e in range(machine.power.shape[0]):
+        _add_drive(machine, flow, slot, omega, e)
+    for w in range(machine.order.shape[0]):
+        turning = 1j * machine.order[w]
+        for k in range(n):
+            x, slope = flow.drive[slot, w, k], flow.drive_slope[slot, w, k]
+            flow.drive[slot, w, n + k] = turning * omega * x
+            flow.drive_slope[slot, w, n + k] = turning * (x + omega * slope)
+    flow.driven_at[slot] = omega
+
+
+@kernel(inline=True)
+def _add_drive(machine: MachineArrays, flow: Flow, slot: int, omega: float, e: int) -> None:
+    """Displacements that one excitation gives, added to those of its multiple of omega."""
+    modes, w, power = flow.modes, machine.wave[e], machine.power[e]
+    turning = 1j * machine.order[w]
     scale = omega**power
     scale_slope = power * omega ** (power - 1) if power > 0 else 0.0
-    for k in range(n):
-        flow.drive[slot, k] = 0.0
-        flow.drive_slope[slot, k] = 0.0
     for i in range(modes.mode_count[slot]):
-        if modes.force[slot, i] == 0.0 and modes.force_conj[slot, i] == 0.0:
+        if modes.force[slot, e, i] == 0.0 and modes.force_conj[slot, e, i] == 0.0:
             continue  # at rest, even in resonance without damping
-        gap = reciprocal(1j * omega - modes.rate[slot, i])
-        plain = modes.force[slot, i] * gap
-        plain_slope = plain * (scale_slope - 1j * scale * gap)
+        gap = reciprocal(turning * omega - modes.rate[slot, i])
+        plain = modes.force[slot, e, i] * gap
+        plain_slope = plain * (scale_slope - turning * scale * gap)
         plain *= scale
-        gap = reciprocal(1j * omega - modes.rate[slot, i].conjugate())
-        conj = modes.force_conj[slot, i] * gap
-        conj_slope = conj * (scale_slope - 1j * scale * gap)
+        gap = reciprocal(turning * omega - modes.rate[slot, i].conjugate())
+        conj = modes.force_conj[slot, e, i] * gap
+        conj_slope = conj * (scale_slope - turning * scale * gap)
         conj *= scale
         pair = modes.weight[slot, i] == 2.0
-        for k in range(n):
+        for k in range(machine.direction.shape[1]):
             v = modes.right[slot, k, i]
-            flow.drive[slot, k] += v * plain
-            flow.drive_slope[slot, k] += v * plain_slope
+            flow.drive[slot, w, k] += v * plain
+            flow.drive_slope[slot, w, k] += v * plain_slope
             if pair:
-                flow.drive[slot, k] += v.conjugate() * conj
-                flow.drive_slope[slot, k] += v.conjugate() * conj_slope
-    for k in range(n):
-        x, slope = flow.drive[slot, k], flow.drive_slope[slot, k]
-        flow.drive[slot, n + k] = 1j * omega * x
-        flow.drive_slope[slot, n + k] = 1j * (x + omega * slope)
-    flow.driven_at[slot] = omega
+                flow.drive[slot, w, k] += v.conjugate() * conj
+                flow.drive_slope[slot, w, k] += v.conjugate() * conj_slope
 
 
 @kernel(inline=True)
@@ -146,43 +159,56 @@ def begin_segment(
     modes = flow.modes
     size = flow.z.shape[0]
     n = size // 2
-    count = modes.mode_count[slot]
-    turn = exponential(1j * (omega * t))
+    count, waves = modes.mode_count[slot], machine.order.shape[0]
     flow.slot[e] = slot
     flow.start[e] = t
     set_rest(machine, flow, e, slot)
+    for w in range(waves):
+        flow.motion.factor[w] = exponential(1j * (machine.order[w] * omega * t))
     for i in range(count):
         flow.q[e, i] = 0.0
     for k in range(size):
-        drive = flow.drive[slot, k]
-        steady = drive.real * turn.real - drive.imag * turn.imag
-        if k < n:
-            steady += flow.rest[e, k]
-        free = flow.z[k] - steady
+        free = flow.z[k] - (flow.rest[e, k] if k < n else modes.drift[slot, k - n])
+        for w in range(waves):
+            drive, turn = flow.drive[slot, w, k], flow.motion.factor[w]
+            free -= drive.real * turn.real - drive.imag * turn.imag
         for i in range(count):
             flow.q[e, i] += modes.left[slot, i, k] * free
     for i in range(count):
         flow.motion.rate[i] = modes.rate[slot, i]
-    flow.motion.rate[count] = 1j * omega
+    for w in range(waves):
+        flow.motion.rate[count + w] = 1j * (machine.order[w] * omega)
     for j in range(flow.regime.shape[0]):
         flow.regimes[e, j] = flow.regime[j]
         for i in range(count):
             seen = modes.weight[slot, i] * modes.gap_shape[slot, j, i]
             flow.motion.amplitude[j, i] = seen * flow.q[e, i]
-        offset = 0.0
+        _set_steady(machine, flow, e, machine.direction, j, flow.motion)
+
+
+@kernel(inline=True)
+def _set_steady(
+    machine: MachineArrays, flow: Flow, e: int, coordinate: Real, g: int, motion: GapMotion
+) -> None:
+    """Offset, drift and drive of segment e in coordinate g; motion.factor holds the turns."""
+    slot, n = flow.slot[e], coordinate.shape[1]
+    count = flow.modes.mode_count[slot]
+    motion.offset[g], motion.drift[g] = 0.0, 0.0
+    for k in range(n):
+        motion.offset[g] += coordinate[g, k] * flow.rest[e, k]
+        motion.drift[g] += coordinate[g, k] * flow.modes.drift[slot, k]
+    for w in range(machine.order.shape[0]):
         driven = 0j
         for k in range(n):
-            offset += machine.direction[j, k] * flow.rest[e, k]
-            driven += machine.direction[j, k] * flow.drive[slot, k]
-        flow.motion.offset[j] = offset
-        flow.motion.amplitude[j, count] = driven * turn
+            driven += coordinate[g, k] * flow.drive[slot, w, k]
+        motion.amplitude[g, count + w] = driven * motion.factor[w]
 
 
 @kernel(inline=True)
 def set_rest(machine: MachineArrays, flow: Flow, e: int, slot: int) -> None:
     """Where segment e would stand still: held by the springs that are engaged, on their sides."""
     for k in range(flow.rest.shape[1]):
-        flow.rest[e, k] = 0.0
+        flow.rest[e, k] = flow.modes.static[slot, k]
     for j in range(flow.regime.shape[0]):
         if kind(machine.stops, j, flow.regime[j]) != 0:
             gap = signed_gap(machine.stops, j, flow.regime[j])
@@ -191,17 +217,23 @@ def set_rest(machine: MachineArrays, flow: Flow, e: int, slot: int) -> None:
 
 
 @kernel(inline=True)
-def segment_state(flow: Flow, e: int, omega: float, elapsed: float, z: Real, rate: Real) -> None:
+def segment_state(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, elapsed: float, z: Real, rate: Real
+) -> None:
     """State z and its time derivative, ``elapsed`` after the start of segment e."""
     modes, slot = flow.modes, flow.slot[e]
-    turn = exponential(1j * (omega * (flow.start[e] + elapsed)))
     n = z.shape[0] // 2
-    for k in range(z.shape[0]):
-        steady = flow.drive[slot, k] * turn
-        z[k] = steady.real
-        if k < n:
-            z[k] += flow.rest[e, k]
-        rate[k] = (1j * omega * steady).real
+    for k in range(n):
+        drift = modes.drift[slot, k]
+        z[k], z[n + k] = flow.rest[e, k] + drift * elapsed, drift
+        rate[k], rate[n + k] = drift, 0.0
+    for w in range(machine.order.shape[0]):
+        turning = machine.order[w] * omega
+        turn = exponential(1j * (turning * (flow.start[e] + elapsed)))
+        for k in range(z.shape[0]):
+            steady = flow.drive[slot, w, k] * turn
+            z[k] += steady.real
+            rate[k] -= turning * steady.imag
     for i in range(modes.mode_count[slot]):
         term = modes.weight[slot, i] * flow.q[e, i] * exponential(modes.rate[slot, i] * elapsed)
         slope = term * modes.rate[slot, i]
@@ -212,27 +244,30 @@ def segment_state(flow: Flow, e: int, omega: float, elapsed: float, z: Real, rat
 
 
 @kernel(inline=True)
-def segment_motion(flow: Flow, e: int, omega: float, coordinate: Real, motion: GapMotion) -> None:
-    """Segment e as sums of exponentials in given coordinates (G, N), the drive as the last term."""
+def segment_motion(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, coordinate: Real, motion: GapMotion
+) -> int:
+    """Segment e as sums of exponentials in given coordinates (G, N); the number of its terms.
+
+    The drive stands in the last ones.
+    """
     modes, slot = flow.modes, flow.slot[e]
-    count = modes.mode_count[slot]
+    count, waves = modes.mode_count[slot], machine.order.shape[0]
     n = coordinate.shape[1]
-    turn = exponential(1j * omega * flow.start[e])
-    motion.rate[count] = 1j * omega
+    for w in range(waves):
+        turning = machine.order[w] * omega
+        motion.factor[w] = exponential(1j * (turning * flow.start[e]))
+        motion.rate[count + w] = 1j * turning
     for i in range(count):
         motion.rate[i] = modes.rate[slot, i]
     for g in range(coordinate.shape[0]):
-        motion.offset[g] = 0.0
-        driven = 0j
-        for k in range(n):
-            motion.offset[g] += coordinate[g, k] * flow.rest[e, k]
-            driven += coordinate[g, k] * flow.drive[slot, k]
-        motion.amplitude[g, count] = driven * turn
+        _set_steady(machine, flow, e, coordinate, g, motion)
         for i in range(count):
             shape = 0j
             for k in range(n):
                 shape += coordinate[g, k] * modes.right[slot, k, i]
             motion.amplitude[g, i] = modes.weight[slot, i] * shape * flow.q[e, i]
+    return count + waves
 
 
 @kernel(shared=True)
@@ -251,15 +286,16 @@ def run_flow(
             return status.NO_MODES
         prepare_drive(machine, flow, slot, omega)
         begin_segment(machine, flow, e, slot, omega, t)
+        count = flow.modes.mode_count[slot] + machine.order.shape[0]
         length, spring, new = next_change(
-            flow.motion, machine.stops, flow.regime, flow.modes.mode_count[slot] + 1, end - t, fired
+            flow.motion, machine.stops, flow.regime, count, end - t, fired
         )
         if math.isnan(length):
             return status.SEARCH_NOT_ENDED
         flow.length[e] = length
         flow.spring[e] = spring
         flow.kick[e] = 0.0
-        segment_state(flow, e, omega, length, flow.z, rate)
+        segment_state(machine, flow, e, omega, length, flow.z, rate)
         if spring < 0:
             return status.OK
         flow.kick[e] = tangent_kick(machine.stops, spring, flow.regime[spring], new)
@@ -295,28 +331,32 @@ def carry_tangent(
 
     The last column moves with omega as well, d omega = ``slope``, at fixed time: it follows the
     same linear equation around the derivative of the driven motion,
-    slope Re((drive' + i t drive) exp(i omega t)). ``work`` is (R, columns).
+    slope Re((drive' + i n t drive) exp(i n omega t)). ``work`` is (R, columns).
     """
     size = U.shape[0]
     for e in range(flow.segments[0]):
         slot = flow.slot[e]
         length = flow.length[e]
         if slope != 0.0:
-            _add_driven_slope(flow, slot, omega, flow.start[e], -slope, U)
+            _add_driven_slope(machine, flow, slot, omega, flow.start[e], -slope, U)
         _carry_free(flow, slot, length, U, work)
         if slope != 0.0:
-            _add_driven_slope(flow, slot, omega, flow.start[e] + length, slope, U)
+            _add_driven_slope(machine, flow, slot, omega, flow.start[e] + length, slope, U)
         if flow.kick[e] != 0.0:
             saltation(machine, flow.spring[e], flow.kick[e], U, size)
 
 
 @kernel(inline=True)
-def _add_driven_slope(flow: Flow, slot: int, omega: float, t: float, share: float, U: Real) -> None:
-    turn = exponential(1j * (omega * t))
+def _add_driven_slope(
+    machine: MachineArrays, flow: Flow, slot: int, omega: float, t: float, share: float, U: Real
+) -> None:
     last = U.shape[1] - 1
-    for k in range(U.shape[0]):
-        slope = (flow.drive_slope[slot, k] + 1j * t * flow.drive[slot, k]) * turn
-        U[k, last] += share * slope.real
+    for w in range(machine.order.shape[0]):
+        order = machine.order[w]
+        turn = exponential(1j * (order * omega * t))
+        for k in range(U.shape[0]):
+            slope = flow.drive_slope[slot, w, k] + 1j * order * t * flow.drive[slot, w, k]
+            U[k, last] += share * (slope * turn).real
 
 
 @kernel(inline=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
-from flipflow.dynamics.contact_free import complex_amplitudes
+from flipflow.dynamics.contact_free import complex_amplitudes, span
 from flipflow.model.arguments import checked_speeds
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
@@ -45,15 +45,15 @@ class LinearResponse(Frozen):
 
     @cached_property
     def complex_amplitudes(self) -> NDArray[np.complex128]:
-        """X of x = Re(X exp(i omega t)) in m, (n, N)."""
+        """X of x = Re(X exp(i omega t)) in m, (n, N): the first harmonic."""
         return complex_amplitudes(self.system, self.omega)
 
     def amplitude(self, which: Coordinate) -> Real:
-        """Amplitude of a coordinate in m, (n,)."""
-        return np.abs(self.complex_amplitudes @ self.system.coordinate(which))
+        """Half peak-to-peak of a coordinate in m, (n,)."""
+        return _amplitude(self.system, self.omega, self.system.coordinate(which))
 
     def phase(self, which: Coordinate) -> Real:
-        """Phase of a coordinate against the force in rad, (n,); positive: it leads."""
+        """Phase of the first harmonic against the force in rad, (n,); positive: it leads."""
         return np.angle(self.complex_amplitudes @ self.system.coordinate(which))
 
     @cached_property
@@ -75,8 +75,7 @@ class LinearResponse(Frozen):
         grid = np.linspace(top / SCAN_POINTS, top, SCAN_POINTS)
 
         def amplitude(omega: ArrayLike) -> Real:
-            X = complex_amplitudes(self.system, np.atleast_1d(np.asarray(omega, float)))
-            return np.abs(X @ vector)
+            return _amplitude(self.system, np.atleast_1d(np.asarray(omega, float)), vector)
 
         values = amplitude(grid)
         inner = (values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:])
@@ -162,10 +161,19 @@ def bonded_natural_frequencies(machine: Machine) -> Real:
     for spring in system.springs:
         if spring.acts:
             K += spring.stiffness * np.outer(spring.direction, spring.direction)
-    squares = scipy.linalg.eigh(K, system.M, eigvals_only=True)
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+    return np.asarray(np.sqrt(np.maximum(_modes(replace(system, K=K))[0], 0.0)))
+
+
+def _amplitude(system: MechanicalSystem, omega: Real, vector: Real) -> Real:
+    """Half peak-to-peak along a vector, (n,)."""
+    harmonics = [complex_amplitudes(system, omega, order) @ vector for order in system.orders]
+    if len(harmonics) == 1:
+        return np.abs(harmonics[0])
+    spans = [span(system.orders, A) for A in np.array(harmonics).T]
+    return np.array([(high - low) / 2.0 for low, high in spans])
 
 
 def _modes(system: MechanicalSystem) -> tuple[Real, Real]:
-    squares, shapes = scipy.linalg.eigh(system.K, system.M)
+    """Squares of the natural frequencies, rising, and shapes, of the symmetric part of K."""
+    squares, shapes = scipy.linalg.eigh(0.5 * (system.K + system.K.T), system.M)
     return np.asarray(squares), np.asarray(shapes)

@@ -37,7 +37,8 @@ class MachineSeries(NamedTuple):
     damping: Real  # (T, N, N) C
     stiffness: Real  # (T, N, N) K
     direction: Real  # (T, m, N)
-    force: Real  # (T, 2, N) real and imaginary part
+    force: Real  # (T, 2 E, N) real parts, then imaginary ones
+    static: Real  # (T, 1, N)
     stop: Real  # (T, 2, m) stiffness and damping
     gap: Real  # (T, m, 2)
 
@@ -94,15 +95,21 @@ def solve_column(
 
 @kernel
 def set_push(series: MachineSeries, work: SeriesWork, value: float, machine: MachineArrays) -> None:
-    """M^-1 f, real and imaginary part."""
-    n = work.pivot.shape[0]
-    for part in range(2):
+    """M^-1 f of each excitation, and M^-1 f_0."""
+    count, n = machine.push.shape
+    for part in range(2 * count):
         for i in range(n):
             work.column[i] = term_sum(series, series.force, value, part, i)
         lu_solve(work.solved, work.pivot, work.column)
+        e = part % count
         for i in range(n):
-            x, push = work.column[i], machine.push[i]
-            machine.push[i] = complex(x, 0.0) if part == 0 else complex(push.real, x)
+            x, push = work.column[i], machine.push[e, i]
+            machine.push[e, i] = complex(x, 0.0) if part < count else complex(push.real, x)
+    for i in range(n):
+        work.column[i] = term_sum(series, series.static, value, 0, i)
+    lu_solve(work.solved, work.pivot, work.column)
+    for i in range(n):
+        machine.static[i] = work.column[i]
 
 
 @kernel

@@ -30,6 +30,8 @@ from flipflow.model.contact_law import FORCE, KIND, KINDS, MOST_PIECES
 NEARLY_DEFECTIVE = 1e6  # condition of the basis of eigenvectors from which it has lost six digits
 USELESS = 1e10  # condition from which it serves no more
 NUDGE = 1e-10  # relative change of damping that splits a double eigenvalue
+SINGULAR = 2e-16  # share of a stiffness below which a pivot is rounding
+ZERO = 1e-13  # share of the fastest rate below which one of a singular stiffness is zero
 MOST_NUDGES = 3  # such changes tried, each larger by one nudge
 MOST_STATES = 2**12  # contact states for which tables are kept
 MOST_BYTES = 2**32  # of tables, of which only what is met is ever touched
@@ -45,11 +47,13 @@ class Modes(NamedTuple):
     weight: Real  # (S, R)
     right: Complex  # (S, 2 N, R) v_i as columns
     left: Complex  # (S, R, 2 N) l_i as rows
-    force: Complex  # (S, R) l_i (0, M^-1 f) with f the force vector
-    force_conj: Complex  # (S, R) the same for the conjugate mode
+    force: Complex  # (S, E, R) l_i (0, M^-1 f) with f the force vector
+    force_conj: Complex  # (S, E, R) the same for the conjugate mode
     gap_shape: Complex  # (S, m, R) d_j phi_i: modes seen at the gaps
     gap_pick: Complex  # (S, R, m) l_i (0, M^-1 d_j)
     rest: Real  # (S, m, N) where spring j, engaged at a gap of 1 m, would hold the machine
+    static: Real  # (S, N) where the constant force would hold it
+    drift: Real  # (S, N) velocity to which it drives what nothing holds
     schur: Schur  # scratch
     held: Real  # (N, N) scratch
     basis: Real  # (2 N, 2 N) scratch
@@ -67,6 +71,7 @@ def new_modes(machine: MachineArrays) -> Modes:
         For more springs than contact states can be kept of.
     """
     m, n = machine.direction.shape
+    forces = machine.push.shape[0]
     place = [1]
     for law in machine.stops.law:
         place.append(place[-1] * int(KINDS[law]))
@@ -87,11 +92,13 @@ def new_modes(machine: MachineArrays) -> Modes:
         weight=np.zeros(table),
         right=np.zeros((states, modes, modes), np.complex128),
         left=np.zeros((states, modes, modes), np.complex128),
-        force=np.zeros(table, np.complex128),
-        force_conj=np.zeros(table, np.complex128),
+        force=np.zeros((states, forces, modes), np.complex128),
+        force_conj=np.zeros((states, forces, modes), np.complex128),
         gap_shape=np.zeros((states, m, modes), np.complex128),
         gap_pick=np.zeros((states, modes, m), np.complex128),
         rest=np.zeros((states, m, n)),
+        static=np.zeros((states, n)),
+        drift=np.zeros((states, n)),
         schur=new_schur(modes),
         held=np.zeros((n, n)),
         basis=np.zeros((modes, modes)),
@@ -137,12 +144,26 @@ def prepare(machine: MachineArrays, modes: Modes, number: int) -> None:
 
 @kernel
 def _basis(machine: MachineArrays, modes: Modes, number: int, nudge: int) -> float:
-    """Modes with the damping changed by some nudges; the condition of their basis."""
-    if not _state_matrix(machine, modes, number, 1.0 + nudge * NUDGE):
-        return math.inf
+    """Modes with the damping changed by some nudges, and rests; the condition of their basis.
+
+    Where the stiffness is singular to rounding, rates that are zero to rounding are.
+    """
+    _state_matrix(machine, modes, number, 1.0 + nudge * NUDGE)
+    held = _rests(machine, modes, number)
     if not real_schur(modes.schur, True):
         return math.inf
-    return _vectors(modes, number)
+    if held:
+        return _vectors(modes, number)
+    value, largest = modes.schur.value, 0.0
+    for k in range(value.shape[0]):
+        largest = max(largest, abs(value[k]))
+    for k in range(value.shape[0]):
+        if abs(value[k]) <= ZERO * largest:
+            value[k] = 0.0
+    condition = _vectors(modes, number)
+    if condition < USELESS:
+        _rests_by_modes(machine, modes, number)
+    return condition
 
 
 @kernel
@@ -158,11 +179,8 @@ def _shares(machine: MachineArrays, modes: Modes, number: int, j: int) -> tuple[
 
 
 @kernel
-def _state_matrix(machine: MachineArrays, modes: Modes, number: int, stretch: float) -> bool:
-    """A = [[0, I], [-M^-1 K, -M^-1 C]] of a contact state, and where it would stand still.
-
-    False when nothing holds it. ``stretch`` is a factor on the damping.
-    """
+def _state_matrix(machine: MachineArrays, modes: Modes, number: int, stretch: float) -> None:
+    """A = [[0, I], [-M^-1 K, -M^-1 C]] of a contact state; ``stretch`` is a factor on C."""
     m, n = machine.direction.shape
     T = modes.schur.T
     for r in range(n):
@@ -176,17 +194,75 @@ def _state_matrix(machine: MachineArrays, modes: Modes, number: int, stretch: fl
                 damping += c * machine.reach[j, r] * machine.direction[j, s]
             T[n + r, s] = -stiffness
             T[n + r, n + s] = -damping * stretch
-            modes.held[r, s] = stiffness
+
+
+@kernel
+def _rests(machine: MachineArrays, modes: Modes, number: int) -> bool:
+    """Where the contact state of the matrix would stand still, for gaps and the constant force.
+
+    False where its stiffness is singular to rounding: see :func:`_rests_by_modes`.
+    """
+    m, n = machine.direction.shape
+    largest = 0.0
+    for r in range(n):
+        modes.drift[number, r] = 0.0
+        for s in range(n):
+            modes.held[r, s] = -modes.schur.T[n + r, s]
+            largest = max(largest, abs(modes.held[r, s]))
     if not lu_factor(modes.held, modes.pivot):
         return False
-    for j in range(m):
-        k, _ = _shares(machine, modes, number, j)
+    for r in range(n):
+        if abs(modes.held[r, r]) <= n * SINGULAR * largest:
+            return False
+    for j in range(m + 1):
         for r in range(n):
-            modes.column[r] = k * machine.reach[j, r]
+            modes.column[r] = _steady_push(machine, modes, number, j, r)
         lu_solve(modes.held, modes.pivot, modes.column)
         for r in range(n):
-            modes.rest[number, j, r] = modes.column[r]
+            if j < m:
+                modes.rest[number, j, r] = modes.column[r]
+            else:
+                modes.static[number, r] = modes.column[r]
     return True
+
+
+@kernel
+def _steady_push(machine: MachineArrays, modes: Modes, number: int, j: int, r: int) -> float:
+    """Acceleration r by spring j engaged at a gap of 1 m; by the constant force for j beyond."""
+    if j == machine.direction.shape[0]:
+        return machine.static[r]
+    k, _ = _shares(machine, modes, number, j)
+    return k * machine.reach[j, r]
+
+
+@kernel
+def _rests_by_modes(machine: MachineArrays, modes: Modes, number: int) -> None:
+    """Where a contact state stands still in the modes that are held; how it drifts in the others.
+
+    A mode q' = rate q + g stands still at -g / rate. One whose rate is zero moves at g: only a
+    constant force drives it, since a spring that is engaged holds it.
+    """
+    m, n = machine.direction.shape
+    for j in range(m + 1):
+        for r in range(n):
+            if j < m:
+                modes.rest[number, j, r] = 0.0
+            else:
+                modes.static[number, r] = 0.0
+        for i in range(modes.mode_count[number]):
+            g = 0j
+            for r in range(n):
+                g += modes.left[number, i, n + r] * _steady_push(machine, modes, number, j, r)
+            rate, weight = modes.rate[number, i], modes.weight[number, i]
+            for r in range(n):
+                v = modes.right[number, r, i]
+                if j < m:
+                    if rate != 0.0:
+                        modes.rest[number, j, r] -= (weight * v * g / rate).real
+                elif rate != 0.0:
+                    modes.static[number, r] -= (weight * v * g / rate).real
+                else:
+                    modes.drift[number, r] += (weight * v * g).real
 
 
 @kernel
@@ -254,14 +330,15 @@ def _seen_from_outside(machine: MachineArrays, modes: Modes, number: int) -> Non
     """How the exciter and the gaps act on the modes, and how the modes move the gaps."""
     m, n = machine.direction.shape
     for i in range(modes.mode_count[number]):
-        force = 0j
-        force_conj = 0j
-        for r in range(n):
-            left = modes.left[number, i, n + r]
-            force += left * machine.push[r]
-            force_conj += left.conjugate() * machine.push[r]
-        modes.force[number, i] = force
-        modes.force_conj[number, i] = force_conj
+        for e in range(machine.push.shape[0]):
+            force = 0j
+            force_conj = 0j
+            for r in range(n):
+                left = modes.left[number, i, n + r]
+                force += left * machine.push[e, r]
+                force_conj += left.conjugate() * machine.push[e, r]
+            modes.force[number, e, i] = force
+            modes.force_conj[number, e, i] = force_conj
         for j in range(m):
             shape = 0j
             pick = 0j

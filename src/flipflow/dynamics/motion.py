@@ -39,7 +39,7 @@ class Motion:
 
     In piece e, from ``start[e]`` on,
 
-    .. math:: x(t) = o_e + \mathrm{Re} \sum_h X_{eh} e^{i n_h \omega t}
+    .. math:: x(t) = o_e + b_e (t - t_e) + \mathrm{Re} \sum_h X_{eh} e^{i n_h \omega t}
               + \mathrm{Re} \sum_i a_{ei} e^{\lambda_{ei} (t - t_e)}.
 
     A truncated Fourier series has no exponentials, and the same harmonics in every piece.
@@ -54,8 +54,10 @@ class Motion:
         Of the pieces in s, (E,).
     regime
         Regime of each spring during a piece, (E, m): 0 open, else piece and side of its law.
-    offset, amplitude, rate
-        o, a and lambda, (E, N), (E, N, R), (E, R).
+    offset, drift
+        o and b, (E, N) each.
+    amplitude, rate
+        a and lambda, (E, N, R), (E, R).
     harmonic, order
         X and n, (E, N, H), (H,).
     """
@@ -67,6 +69,7 @@ class Motion:
     length: Real
     regime: Int
     offset: Real
+    drift: Real
     amplitude: Complex
     rate: Complex
     harmonic: Complex
@@ -98,7 +101,9 @@ class Motion:
         wave = np.exp(turning * t[:, None]) * turning**order
         x = np.einsum("knh,kh->kn", self.harmonic[piece], wave).real
         if order == 0:
-            x = x + self.offset[piece]
+            x = x + self.offset[piece] + self.drift[piece] * (t - self.start[piece])[:, None]
+        if order == 1:
+            x = x + self.drift[piece]
         if self.rate.shape[1]:
             rate = self.rate[piece]
             term = np.exp(rate * (t - self.start[piece])[:, None]) * rate**order
@@ -133,8 +138,8 @@ class Motion:
             for part in (self.amplitude, self.harmonic)
         )
         observe_motion(
-            self.start, self.length, seen @ self.offset.T, amplitude, self.rate, harmonic,
-            self.order, self.omega, scratch, low, high, first,
+            self.start, self.length, seen @ self.offset.T, seen @ self.drift.T, amplitude,
+            self.rate, harmonic, self.order, self.omega, scratch, low, high, first,
         )  # fmt: skip
         return low, high, first * (2.0 / self.period)
 
@@ -171,10 +176,11 @@ def motion_of_flow(system: MechanicalSystem, flow: Flow, omega: float, period: f
         length=flow.length[:e].copy(),
         regime=flow.regimes[:e].copy(),
         offset=flow.rest[:e].copy(),
+        drift=modes.drift[slot],
         amplitude=shape * flow.q[:e, None, :],
         rate=modes.rate[slot],
-        harmonic=flow.drive[slot, :n][:, :, None],
-        order=np.ones(1),
+        harmonic=flow.drive[slot, :, :n].swapaxes(1, 2),
+        order=np.array(system.orders, float),
     )
 
 
@@ -195,6 +201,7 @@ def motion_of_series(
         length=flow.length[:e].copy(),
         regime=flow.regimes[:e].copy(),
         offset=np.zeros((e, n)),
+        drift=np.zeros((e, n)),
         amplitude=np.zeros((e, n, 0), np.complex128),
         rate=np.zeros((e, 0), np.complex128),
         harmonic=np.repeat(series.T[None], e, axis=0),

@@ -1,10 +1,10 @@
-"""Elements of a machine: the spring that acts beyond a clearance, and what excites it."""
+"""The spring that acts beyond a clearance."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,6 @@ from flipflow.model.arguments import (
     checked_at_least_zero,
     checked_number,
     checked_numbers,
-    checked_vector,
     checked_word,
     real,
 )
@@ -47,14 +46,16 @@ class ClearanceSpring:
     stiffness, damping
         k in N/m and c in N s/m of one engaged side.
     clearance, clearance_minus
-        e+ and e- in m; None means the same on both sides, infinity no stop on that side.
+        e+ and e- in m; None means the same on both sides, infinity no stop on that side. A stop
+        with a negative gap is preloaded: it touches at y = 0 already.
     law
         ``"paper"``, ``"compression-only"``, ``"undamped-rebound"`` or ``"elasto-gap"``.
 
     Raises
     ------
     InputError
-        For negative, non-finite or contradictory values.
+        For negative stiffness or damping, for values that are not finite, and for two sides that
+        would push at once, e+ + e- < 0.
     """
 
     direction: NDArray[np.float64]
@@ -79,6 +80,9 @@ class ClearanceSpring:
             raise InputError("direction", direction, remedy)
         gap = _checked_gap("clearance", clearance)
         minus = gap if clearance_minus is None else _checked_gap("clearance_minus", clearance_minus)
+        if gap + minus < 0.0:
+            remedy = "give clearance_minus = inf for a stop on one side; one spring for each of two"
+            raise InputError("clearance", clearance, f"both sides would push at once: {remedy}")
         object.__setattr__(self, "direction", vector)
         object.__setattr__(self, "stiffness", checked_at_least_zero("stiffness", stiffness))
         object.__setattr__(self, "damping", checked_at_least_zero("damping", damping))
@@ -117,53 +121,10 @@ class ClearanceSpring:
         return contact_law.force_in(*of, contact_law.regime_at(*of, y, v), y, v)
 
 
-@dataclass(frozen=True, eq=False)
-class Unbalance:
-    """Rotating unbalance: the force on the machine is ``Re(vector w^2 exp(i w t))``.
-
-    Parameters
-    ----------
-    vector
-        m0 r in kg m on each degree of freedom, shape (N,); complex for a phase.
-    """
-
-    vector: NDArray[np.complex128]
-
-    def __init__(self, vector: ArrayLike) -> None:
-        object.__setattr__(self, "vector", _force_vector(vector))
-
-    power: ClassVar[int] = 2
-
-
-@dataclass(frozen=True, eq=False)
-class HarmonicForce:
-    """Force of constant amplitude: ``Re(vector exp(i w t))``.
-
-    Parameters
-    ----------
-    vector
-        Force in N on each degree of freedom, shape (N,); complex for a phase.
-    """
-
-    vector: NDArray[np.complex128]
-
-    def __init__(self, vector: ArrayLike) -> None:
-        object.__setattr__(self, "vector", _force_vector(vector))
-
-    power: ClassVar[int] = 0
-
-
-def _force_vector(vector: ArrayLike) -> NDArray[np.complex128]:
-    remedy = "give a finite vector, one number per degree of freedom"
-    array = checked_vector("vector", vector, remedy).copy()
-    array.setflags(write=False)
-    return array
-
-
 def _checked_gap(name: str, value: object) -> float:
     gap = real(value)
-    if gap is None or not gap >= 0.0:
-        raise InputError(name, value, "give a gap of at least 0 m, or inf for no stop")
+    if gap is None or math.isnan(gap) or gap == -math.inf:
+        raise InputError(name, value, "give a gap in m, or inf for no stop")
     return gap if math.isinf(gap) else checked_number(name, gap)
 
 

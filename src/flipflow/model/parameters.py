@@ -16,7 +16,8 @@ from typing import Any
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_text
-from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.excitation import scaled
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
@@ -103,6 +104,5 @@ def _changed(spring: ClearanceSpring, part: str, value: float) -> ClearanceSprin
 
 def _forced(machine: MechanicalSystem, factor: float) -> MechanicalSystem:
     """The system with its excitation times a factor."""
-    excitation: Unbalance | HarmonicForce = machine.excitation
-    scaled = type(excitation)(factor * excitation.vector)
-    return dataclasses.replace(machine, excitation=scaled)
+    excitation = tuple(scaled(one, factor) for one in machine.excitations)
+    return dataclasses.replace(machine, excitation=excitation)

@@ -20,7 +20,8 @@ from flipflow.model.arguments import (
     checked_word,
 )
 from flipflow.model.contact_law import ContactLaw
-from flipflow.model.elements import ClearanceSpring, Unbalance
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.excitation import Unbalance
 from flipflow.model.fields import FIELDS
 from flipflow.model.system import MechanicalSystem
 

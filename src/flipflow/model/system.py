@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Protocol, cast, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,9 +22,12 @@ from flipflow.model.arguments import (
     checked_reals,
     takes,
 )
-from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance, frozen_array
+from flipflow.model.elements import ClearanceSpring, frozen_array
+from flipflow.model.excitation import Excitation, HarmonicForce, MovingBase, Unbalance
+from flipflow.model.static_rest import static_rest
 
 Coordinate = str | int
+SYMMETRIC = 1e-12  # deviation from it, relative to the largest entry, that is rounding
 
 
 def system_of(machine: object) -> MechanicalSystem:
@@ -58,36 +61,42 @@ class Machine(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class MechanicalSystem:
-    r"""N degrees of freedom, any number of clearance springs, one harmonic excitation.
+    r"""N degrees of freedom, any number of clearance springs, harmonic and constant forces.
 
     .. math:: M \ddot x + C \dot x + K x + \sum_j d_j H_j(d_j^T x, d_j^T \dot x)
-              = \mathrm{Re}(F(\omega) e^{i \omega t})
+              = f_0 + \sum_e \mathrm{Re}(F_e(\omega) e^{i n_e \omega t})
 
     Parameters
     ----------
     M, C, K
-        Mass (kg), damping (N s/m) and stiffness (N/m), shape (N, N), symmetric; M positive
-        definite.
+        Mass (kg), damping (N s/m) and stiffness (N/m), shape (N, N), as arrays or sparse
+        matrices. M is symmetric and positive definite; C and K need not be symmetric: gyroscopic
+        and cross-coupling terms are allowed.
     springs
         Clearance springs.
     excitation
-        :class:`Unbalance` or :class:`HarmonicForce`.
+        :class:`Unbalance`, :class:`HarmonicForce` or :class:`MovingBase`, or several of them in a
+        tuple, each with its own whole multiple of omega.
     coordinates
         Names for vectors of shape (N,): ``{"relative": (1, -1)}`` lets results be asked for
         ``amplitude("relative")``. An integer always means that degree of freedom.
+    static_force
+        f_0, constant forces in N, shape (N,); None for none. Coordinates and gaps count from the
+        unstressed springs.
 
     Raises
     ------
     InputError
-        When shapes disagree, M is not positive definite, or a matrix is not finite.
+        When shapes disagree, M is not symmetric and positive definite, or a number is not finite.
     """
 
     M: NDArray[np.float64]
     C: NDArray[np.float64]
     K: NDArray[np.float64]
     springs: tuple[ClearanceSpring, ...]
-    excitation: Unbalance | HarmonicForce
+    excitation: Excitation | tuple[Excitation, ...]
     coordinates: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    static_force: NDArray[np.float64] | None = None
 
     def __init__(
         self,
@@ -95,18 +104,16 @@ class MechanicalSystem:
         C: ArrayLike,
         K: ArrayLike,
         springs: Sequence[ClearanceSpring] = (),
-        excitation: Unbalance | HarmonicForce | None = None,
+        excitation: Excitation | Sequence[Excitation] | None = None,
         coordinates: Mapping[str, ArrayLike] | None = None,
+        static_force: ArrayLike | None = None,
     ) -> None:
         mass = _square("M", M, None)
         n = mass.shape[0]
+        if not _is_symmetric(mass):
+            raise InputError("M", "not symmetric", "give a symmetric matrix")
         if np.linalg.eigvalsh(mass)[0] <= 0.0:
             raise InputError("M", M, "the mass matrix must be positive definite")
-        remedy = "give ff.Unbalance(...) or ff.HarmonicForce(...)"
-        if not isinstance(excitation, (Unbalance, HarmonicForce)):
-            raise InputError("excitation", excitation, remedy)
-        if excitation.vector.shape != (n,):
-            raise InputError("excitation", excitation.vector, f"give {n} numbers, one per mass")
         remedy = "give a list of ff.ClearanceSpring, or none"
         springs = checked_all("springs", springs, ClearanceSpring, remedy)
         for spring in springs:
@@ -117,13 +124,14 @@ class MechanicalSystem:
         object.__setattr__(self, "C", _square("C", C, n))
         object.__setattr__(self, "K", _square("K", K, n))
         object.__setattr__(self, "springs", tuple(springs))
-        object.__setattr__(self, "excitation", excitation)
+        object.__setattr__(self, "excitation", _checked_excitation(excitation, n))
         object.__setattr__(self, "coordinates", MappingProxyType(named))
+        object.__setattr__(self, "static_force", _checked_force(static_force, n))
 
     def __reduce__(self) -> tuple[type[MechanicalSystem], tuple[object, ...]]:
         """Copies are made anew: a read-only mapping cannot be sent to another process."""
         parts = self.M, self.C, self.K, self.springs, self.excitation, dict(self.coordinates)
-        return type(self), parts
+        return type(self), (*parts, self.static_force)
 
     @property
     def size(self) -> int:
@@ -131,9 +139,53 @@ class MechanicalSystem:
         return int(self.M.shape[0])
 
     @property
+    def excitations(self) -> tuple[Excitation, ...]:
+        """What excites the machine, one or several."""
+        return self.excitation if isinstance(self.excitation, tuple) else (self.excitation,)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Multiples of omega at which the machine is excited, rising."""
+        return tuple(sorted({one.order for one in self.excitations}))
+
+    @property
+    def constant_force(self) -> NDArray[np.float64]:
+        """The static force, zeros where there is none, (N,)."""
+        return np.zeros(self.size) if self.static_force is None else self.static_force
+
+    @property
     def symmetric(self) -> bool:
-        """Whether the machine is its own mirror image: equal gaps on every spring."""
-        return all(spring.symmetric for spring in self.springs if spring.acts)
+        """Whether the machine is its own mirror image half a turn later.
+
+        It has equal gaps on every spring, no constant force, and is excited at odd multiples of
+        omega only.
+        """
+        even = all(spring.symmetric for spring in self.springs if spring.acts)
+        odd = all(order % 2 == 1 for order in self.orders)
+        return even and odd and not np.any(self.constant_force)
+
+    def force(self, omega: ArrayLike, order: int = 1) -> NDArray[np.complex128]:
+        """Amplitude in N of the excitation at a multiple of omega in rad/s (...), (..., N)."""
+        speed = np.asarray(omega, float)[..., None]
+        total = np.zeros((*speed.shape[:-1], self.size), np.complex128)
+        for one in self.excitations:
+            for power, vector in one.terms if one.order == order else ():
+                total += vector * speed**power
+        return total
+
+    def static_position(self) -> NDArray[np.float64]:
+        """Where the machine stands at rest under its static force, (N,), in m.
+
+        K x + sum_j d_j H_j(d_j^T x) = f_0, with the stops at rest. It counts from the unstressed
+        springs, and is zero without static force and preloaded stops. Where the machine can rest
+        in several places, it is one with the fewest stops engaged.
+
+        Raises
+        ------
+        InputError
+            Where nothing holds the machine against the force.
+        """
+        return static_rest(self.K, self.springs, self.constant_force)
 
     def system(self) -> MechanicalSystem:
         """Return itself, so that functions take screens and systems alike."""
@@ -176,7 +228,7 @@ class MechanicalSystem:
                 C, K = C + spring.damping * outer, K + spring.stiffness * outer
             elif spring.acts:
                 kept.append(spring)
-        return MechanicalSystem(self.M, C, K, kept, self.excitation, self.coordinates)
+        return replace(self, C=C, K=K, springs=tuple(kept))
 
 
 def _named(coordinates: object, n: int) -> dict[str, NDArray[np.float64]]:
@@ -193,16 +245,48 @@ def _named(coordinates: object, n: int) -> dict[str, NDArray[np.float64]]:
     return named
 
 
-def _square(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
-    array = frozen_array(checked_reals(name, values, "give a square matrix of numbers"))
+def _checked_excitation(given: object, n: int) -> Excitation | tuple[Excitation, ...]:
+    """One excitation, or some of them."""
+    kinds = (Unbalance, HarmonicForce, MovingBase)
+    remedy = "give ff.Unbalance(...), ff.HarmonicForce(...) or ff.MovingBase(...), or a tuple"
+    several = given if isinstance(given, (list, tuple)) else (given,)
+    if not several or not all(isinstance(one, kinds) for one in several):
+        raise InputError("excitation", given, remedy)
+    found = tuple(cast("Sequence[Excitation]", several))
+    for one in found:
+        if one.vector.shape != (n,):
+            raise InputError("excitation", one.vector, f"give {n} numbers, one per mass")
+    return found[0] if len(found) == 1 else found
+
+
+def _checked_force(given: object, n: int) -> NDArray[np.float64] | None:
+    """A constant force; None where there is none."""
+    if given is None:
+        return None
+    remedy = f"give {n} finite numbers in N, one per mass"
+    force = frozen_array(checked_numbers("static_force", given, remedy))
+    if force.shape != (n,):
+        raise InputError("static_force", given, remedy)
+    return force
+
+
+def _is_symmetric(array: NDArray[np.float64]) -> bool:
+    return bool(np.all(array == array.T))
+
+
+def _square(name: str, values: object, size: int | None) -> NDArray[np.float64]:
+    """A square matrix; one that is symmetric but for rounding is made so."""
+    dense = cast("Any", values).toarray() if takes(getattr(values, "toarray", None), 0) else values
+    array = np.array(checked_reals(name, dense, "give a square matrix of numbers"))
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] == 0:
         raise InputError(name, array.shape, "give a square matrix")
     if size is not None and array.shape[0] != size:
         raise InputError(name, array.shape, f"give a {size} x {size} matrix, as M is")
     if not np.all(np.isfinite(array)):
         raise InputError(name, "not finite", "give finite numbers")
-    if np.any(np.abs(array) > LARGEST):
-        raise InputError(name, float(np.abs(array).max()), TOO_LARGE)
-    if np.any(np.abs(array - array.T) > 1e-12 * np.abs(array)):
-        raise InputError(name, "not symmetric", "give a symmetric matrix")
-    return array
+    largest = float(np.abs(array).max())
+    if largest > LARGEST:
+        raise InputError(name, largest, TOO_LARGE)
+    if np.all(np.abs(array - array.T) <= SYMMETRIC * largest):
+        array = 0.5 * (array + array.T)
+    return frozen_array(array)

@@ -3,7 +3,7 @@ r"""Harmonic balance, exact at the contact and condensed to the motion at the ga
 With theta = omega t and y_j = Re sum_h A_hj exp(i h theta), the linear part of the machine answers
 the contact forces through its receptance G_h(omega), so that only the A_hj are unknown:
 
-    r_h = A_h + G_h Lambda_h(A) - delta_h1 A_linear.
+    r_h = A_h + G_h Lambda_h(A) - A_linear,h.
 
 Lambda_h are the Fourier coefficients of the contact force over its intervals of contact, whose
 limits are found by the certified search and never sampled. With the penetration p, zero at a
@@ -42,18 +42,13 @@ from flipflow.periodic.series import (
 def prepare_receptance(problem: Balance, work: BalanceWork, omega: float) -> int:
     """G_h = D (K - h^2 omega^2 M + i h omega C)^-1 D^T by modes, and its derivative in omega."""
     machine, modes = problem.machine, work.flow.modes
-    m, n = machine.direction.shape
+    m = machine.direction.shape[0]
     if modes.ready[0] == 0:
         prepare(machine, modes, 0)
     if modes.ready[0] < 0:
         return status.NO_MODES
     prepare_drive(machine, work.flow, 0, omega)
-    for j in range(m):
-        work.linear[j] = 0.0
-        work.linear_slope[j] = 0.0
-        for k in range(n):
-            work.linear[j] += machine.direction[j, k] * work.flow.drive[0, k]
-            work.linear_slope[j] += machine.direction[j, k] * work.flow.drive_slope[0, k]
+    _set_linear(problem, work)
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for j in range(m):
@@ -75,10 +70,41 @@ def prepare_receptance(problem: Balance, work: BalanceWork, omega: float) -> int
 
 
 @kernel(inline=True)
+def _set_linear(problem: Balance, work: BalanceWork) -> None:
+    """Harmonics of the motion without contact at the gaps, and their derivatives in omega."""
+    machine = problem.machine
+    m, n = machine.direction.shape
+    for a in range(problem.harmonics.shape[0]):
+        h = problem.harmonics[a]
+        for j in range(m):
+            work.linear[a, j] = 0.0
+            for k in range(n):
+                moved = contact_free_harmonic(problem, work, h, k)
+                work.linear[a, j] += machine.direction[j, k] * moved
+            work.linear_slope[a, j] = 0.0
+            for w in range(machine.order.shape[0]):
+                for k in range(n if machine.order[w] == h else 0):
+                    slope = work.flow.drive_slope[0, w, k]
+                    work.linear_slope[a, j] += machine.direction[j, k] * slope
+
+
+@kernel(inline=True)
+def contact_free_harmonic(problem: Balance, work: BalanceWork, h: int, k: int) -> complex:
+    """Harmonic h of displacement k of the motion without contact; h = 0 is its mean."""
+    if h == 0:
+        return work.flow.modes.static[0, k] + 0j
+    machine = problem.machine
+    for w in range(machine.order.shape[0]):
+        if machine.order[w] == h:
+            return work.flow.drive[0, w, k]
+    return 0j
+
+
+@kernel(inline=True)
 def contact_forces(problem: Balance, work: BalanceWork, omega: float) -> None:
     """Lambda_h and its derivative in omega at fixed A, from the integrals."""
     stops = problem.machine.stops
-    for j in range(work.linear.shape[0]):
+    for j in range(work.linear.shape[1]):
         for a in range(problem.harmonics.shape[0]):
             h = problem.harmonics[a]
             depth = -work.integral_gap[j, h].conjugate()
@@ -101,7 +127,7 @@ def contact_forces(problem: Balance, work: BalanceWork, omega: float) -> None:
 def balance_residual(
     problem: Balance, work: BalanceWork, u: Real, omega: float, r: Real, J: Real
 ) -> int:
-    """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
+    """r_h = A_h + G_h Lambda_h - A_linear,h and J = [dr/du, dr/d omega], all real."""
     set_series(problem, work, u)
     code = prepare_receptance(problem, work, omega) if omega > 0.0 else status.NO_CONVERGENCE
     if code == status.OK:
@@ -117,15 +143,12 @@ def balance_residual(
 @kernel(inline=True)
 def write_residual(problem: Balance, work: BalanceWork, r: Real, J: Real) -> int:
     """r and dr/d omega, the last column of J, from the forces of the series last set."""
-    m, size = work.linear.shape[0], r.shape[0]
+    m, size = work.linear.shape[1], r.shape[0]
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for j in range(m):
-            value = amplitude_of(problem, work, a, j)
-            slope = 0j
-            if h == 1:
-                value -= work.linear[j]
-                slope -= work.linear_slope[j]
+            value = amplitude_of(problem, work, a, j) - work.linear[a, j]
+            slope = -work.linear_slope[a, j]
             for c in range(m):
                 value += work.receptance[a, j, c] * work.force[a, c]
                 slope += work.receptance_slope[a, j, c] * work.force[a, c]
@@ -146,7 +169,7 @@ def write_residual(problem: Balance, work: BalanceWork, r: Real, J: Real) -> int
 def _jacobian(problem: Balance, work: BalanceWork, omega: float, J: Real) -> None:
     """dr = c1 dA + c2 conj(dA): Toeplitz (l - h) and Hankel (-l - h) parts of the integrals."""
     stops = problem.machine.stops
-    m = work.linear.shape[0]
+    m = work.linear.shape[1]
     middle = work.integral.shape[1] - 1
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from flipflow.compiled import status
@@ -9,6 +11,7 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion, motion_of_series
+from flipflow.errors import InputError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.readings import describe_balance, describe_sampled, observe_series
 from flipflow.periodic.sampled import Sampled, SampledWork, new_sampled, new_sampled_work
@@ -35,6 +38,12 @@ class BalanceSolver(Solver):
         self, system: MechanicalSystem, harmonics: int, *, half_turn: bool, turns: int = 1
     ) -> None:
         super().__init__(system, half_turn=half_turn, turns=turns)
+        if harmonics < system.orders[-1]:
+            remedy = f"the machine is excited at {system.orders[-1]} omega; give as many harmonics"
+            raise InputError("harmonics", harmonics, remedy)
+        if np.linalg.matrix_rank(system.K) < system.size:
+            remedy = "with a singular K the mean has no series: give PiecewiseExact()"
+            raise InputError("method", "harmonic balance", remedy)
         self.order = harmonics
         self.balance = new_balance(self.machine, harmonics, half_turn=half_turn, length=self.length)
         self.balance_work = new_balance_work(self.balance)
@@ -130,6 +139,18 @@ class BalanceSolver(Solver):
     def motion(self, u: Real, omega: float) -> Motion:
         series = self._read_off(u[None], np.array([omega]), whole_turn=True)
         return motion_of_series(self.system, self.flow, omega, self.harmonics, series[0])
+
+    def unknowns_of(self, orders: Sequence[int], mean: Real, X: Complex) -> Real:
+        """Unknowns of a motion of mean (N,) and harmonics (W, N) at multiples of omega."""
+        D = self.machine.direction
+        m, means = D.shape[0], int(self.harmonics[0] == 0)
+        u = np.zeros(self.unknowns)
+        u[: means * m] = (D @ mean)[: means * m]
+        for order, amplitude in zip(orders, X @ D.T, strict=True):
+            place = int(np.flatnonzero(self.harmonics == order)[0])
+            begin = means * m + 2 * m * (place - means)
+            u[begin : begin + 2 * m] = np.stack([amplitude.real, amplitude.imag], axis=1).ravel()
+        return u
 
     def unknowns_from(self, motion: Motion) -> Real:
         count = 16 * (self.order + 1)

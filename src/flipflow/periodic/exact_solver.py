@@ -141,7 +141,7 @@ class ExactSolver(Solver):
         low, high, first = np.empty(shape), np.empty(shape), np.empty(shape, np.complex128)
         code = np.zeros(omega.size, np.int64)
         problem = self.whole if whole_turn else self.problem
-        modes = self.flow.modes.rate.shape[1] + 1
+        modes = self.flow.modes.rate.shape[1] + self.machine.order.size
         scratch = new_gap_motion(count, np.zeros(modes, np.complex128))
         observe_flow(
             problem, self.scratch, states, omega, waiting, coordinates, scratch, low, high, first,

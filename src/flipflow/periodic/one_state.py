@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, islice, product
+from itertools import islice
 
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Real
+from flipflow.dynamics.contact_free import span
 from flipflow.model.contact_law import LAWS, OPEN, shares
 from flipflow.model.elements import ClearanceSpring
+from flipflow.model.static_rest import MOST_STATES, engaged_sides, rest_of, signed_gap_of
 from flipflow.model.system import MechanicalSystem
-
-MOST_STATES = 4096  # contact states that are tried, those with few springs engaged first
 
 
 def one_state_motions(system: MechanicalSystem, omega: float) -> list[Real]:
@@ -20,46 +20,58 @@ def one_state_motions(system: MechanicalSystem, omega: float) -> list[Real]:
 
     With all springs that are engaged on their sides s_j,
 
-    .. math:: x = x_0 + \mathrm{Re}(X e^{i \omega t}), \quad
-              (K + \sum_j k_j d_j d_j^T) x_0 = \sum_j s_j k_j e_j d_j,
+    .. math:: x = x_0 + \mathrm{Re} \sum_n X_n e^{i n \omega t}, \quad
+              (K + \sum_j k_j d_j d_j^T) x_0 = f_0 + \sum_j s_j k_j e_j d_j,
 
-    and X as of the linear machine. The motion holds where no switching function falls to zero over
-    the turn.
+    and X_n as of the linear machine. The motion holds where no switching function falls to zero
+    over the turn.
     """
     linear = system.with_bonded()
     found = []
     for regimes in islice(_contact_states(linear), MOST_STATES):
-        try:
-            rest, X = _linear_motion(linear, regimes, omega)
-        except np.linalg.LinAlgError:
+        motion = _linear_motion(linear, regimes, omega)
+        if motion is None:
             continue
-        if all(
-            _stays(
-                spring, regime, float(spring.direction @ rest), complex(spring.direction @ X), omega
-            )
-            for spring, regime in zip(linear.springs, regimes, strict=True)
-        ):
-            found.append(np.concatenate([rest + X.real, (1j * omega * X).real]))
+        rest, X = motion
+        if _holds(linear, regimes, rest, X, omega):
+            found.append(state_of(linear, rest, X, omega))
     return found
+
+
+def contact_free_motion(system: MechanicalSystem, omega: float) -> tuple[Real, Complex]:
+    """Mean (N,) and harmonics (W, N) of the motion with all springs open, touching or not.
+
+    What nothing holds against a constant force stands at zero; NaN where an undamped mode
+    resonates.
+    """
+    motion = _linear_motion(system, (OPEN,) * len(system.springs), omega)
+    if motion is not None:
+        return motion
+    return np.zeros(system.size), np.zeros((len(system.orders), system.size), np.complex128)
+
+
+def touches_nothing(system: MechanicalSystem, rest: Real, X: Complex) -> bool:
+    """Whether a motion of mean (N,) and harmonics (W, N) stays within all gaps."""
+    return _holds(system, (OPEN,) * len(system.springs), rest, X, 0.0)
+
+
+def state_of(system: MechanicalSystem, rest: Real, X: Complex, omega: float) -> Real:
+    """State (x, x') at t = 0 of a motion of mean (N,) and harmonics (W, N), (2 N,)."""
+    speed = 1j * omega * np.array(system.orders)
+    return np.concatenate([rest + X.sum(axis=0).real, (speed @ X).real])
 
 
 def _contact_states(system: MechanicalSystem) -> Iterator[tuple[int, ...]]:
     """Regimes (m,) of the springs: all open, then those with more and more of them engaged.
 
-    A stop pushes towards the middle. Where K alone does so too, no stop is engaged all the time.
+    A stop pushes towards the middle. Where K alone does so too, and no constant force or preload
+    pushes against it, no stop is engaged all the time.
     """
-    count = len(system.springs)
-    yield (OPEN,) * count
-    if np.linalg.eigvalsh(system.K)[0] > 0.0:
-        return
-    ways = [_engaged(spring) for spring in system.springs]
-    for engaged in range(1, count + 1):
-        for which in combinations(range(count), engaged):
-            for chosen in product(*(ways[j] for j in which)):
-                regimes = [OPEN] * count
-                for j, regime in zip(which, chosen, strict=True):
-                    regimes[j] = regime
-                yield tuple(regimes)
+    loose = all(min(spring.gaps) >= 0.0 for spring in system.springs)
+    unforced = not system.constant_force.any()
+    if loose and unforced and np.linalg.eigvalsh(system.K + system.K.T)[0] > 0.0:
+        return iter([(OPEN,) * len(system.springs)])
+    return engaged_sides(system.springs, [_engaged(spring) for spring in system.springs])
 
 
 def _engaged(spring: ClearanceSpring) -> list[int]:
@@ -71,39 +83,59 @@ def _engaged(spring: ClearanceSpring) -> list[int]:
 
 def _linear_motion(
     system: MechanicalSystem, regimes: tuple[int, ...], omega: float
-) -> tuple[Real, Complex]:
-    """x_0 and X of a contact state."""
-    K, C, push = system.K.copy(), system.C.copy(), np.zeros(system.size)
+) -> tuple[Real, Complex] | None:
+    """x_0 (N,) and X (W, N) of a contact state; None where nothing holds it, or in resonance."""
+    rest = rest_of(system.K, system.springs, regimes, system.constant_force)
+    if rest is None:
+        return None
+    K, C = system.K.copy(), system.C.copy()
     for spring, regime in zip(system.springs, regimes, strict=True):
-        if regime == OPEN:
-            continue
-        f_k, f_c = shares(spring.law, regime)
-        d = spring.direction
-        K += f_k * spring.stiffness * np.outer(d, d)
-        C += f_c * spring.damping * np.outer(d, d)
-        push += f_k * spring.stiffness * _gap(spring, regime) * np.sign(regime) * d
-    force = system.excitation.vector * omega**system.excitation.power
-    Z = K - omega**2 * system.M + 1j * omega * C
-    return np.asarray(np.linalg.solve(K, push)), np.asarray(np.linalg.solve(Z, force))
+        if regime != OPEN:
+            f_k, f_c = shares(spring.law, regime)
+            outer = np.outer(spring.direction, spring.direction)
+            K += f_k * spring.stiffness * outer
+            C += f_c * spring.damping * outer
+    found = []
+    for order in system.orders:
+        w, force = order * omega, system.force(omega, order)
+        try:
+            found.append(np.linalg.solve(K - w**2 * system.M + 1j * w * C, force))
+        except np.linalg.LinAlgError:
+            return None
+    return rest, np.array(found)
 
 
-def _gap(spring: ClearanceSpring, regime: int) -> float:
-    return spring.gaps[0] if regime > OPEN else spring.gaps[1]
+def _holds(
+    system: MechanicalSystem, regimes: tuple[int, ...], rest: Real, X: Complex, omega: float
+) -> bool:
+    """Whether no spring leaves its regime in a motion of mean (N,) and harmonics (W, N)."""
+    for spring, regime in zip(system.springs, regimes, strict=True):
+        y, A = float(spring.direction @ rest), X @ spring.direction
+        if not _stays(spring, regime, y, A, system.orders, omega):
+            return False
+    return True
 
 
 def _stays(
-    spring: ClearanceSpring, regime: int, rest: float, amplitude: complex, omega: float
+    spring: ClearanceSpring,
+    regime: int,
+    rest: float,
+    A: Complex,
+    orders: tuple[int, ...],
+    omega: float,
 ) -> bool:
-    """Whether a spring at rest + Re(amplitude exp(i omega t)) never leaves its regime."""
+    """Whether a spring at rest + Re sum_n A_n exp(i n omega t) never leaves its regime."""
+    low, high = span(orders, A)
     if regime == OPEN:
-        size = abs(amplitude)
-        return rest + size <= spring.gaps[0] and rest - size >= -spring.gaps[1]
-    depth = abs(rest) - _gap(spring, regime)
-    if rest * regime <= 0.0 or depth < abs(amplitude):
+        return rest + high <= spring.gaps[0] and rest + low >= -spring.gaps[1]
+    side = 1.0 if regime > OPEN else -1.0
+    depth = side * (rest - signed_gap_of(spring, regime))
+    if depth + span(orders, side * A)[0] < 0.0:
         return False
+    turning = 1j * omega * np.array(orders)
     for way in LAWS[spring.law][abs(regime) - 1].exits:
         alpha = way.a + way.a_k * spring.stiffness
         beta = way.b + way.b_c * spring.damping
-        if alpha * depth < abs(amplitude) * abs(alpha + 1j * omega * beta):
+        if alpha * depth + span(orders, side * A * (alpha + beta * turning))[0] < 0.0:
             return False
     return True

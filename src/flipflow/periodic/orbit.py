@@ -233,11 +233,16 @@ class Orbit(Frozen):
         return self._mean(power)
 
     def input_power(self) -> float:
-        """Mean power that the excitation feeds in, W: only the first harmonic takes part in it."""
-        force = self.system.excitation
-        F = force.vector * self.omega**force.power
-        _, _, first = self.motion.extremes(np.eye(self.system.size))
-        return float(0.5 * (F.conj() @ (1j * self.omega * first)).real)
+        """Mean power that the excitation feeds in, W."""
+        speeds = [1j * order * self.omega for order in self.system.orders]
+        forces = [self.system.force(self.omega, order) for order in self.system.orders]
+
+        def power(t: Real, piece: NDArray[np.intp]) -> Real:
+            turns = np.exp(np.outer(t, speeds))
+            rate = self.motion.piece_derivative(t, piece, 1)
+            return np.asarray(np.sum((turns @ forces).real * rate, axis=1))
+
+        return self._mean(power)
 
     def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
@@ -314,8 +319,14 @@ def checked_orbit(name: str, orbit: object) -> Orbit:
     return checked_kind(name, orbit, Orbit, remedy)
 
 
-def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
+def state_at_rest(system: MechanicalSystem) -> Real:
+    """State (x, x') of the machine standing still, (2 N,)."""
+    return np.concatenate([system.static_position(), np.zeros(system.size)])
+
+
+def initial_state(system: MechanicalSystem, initial: str | Orbit | ArrayLike) -> Real:
     """State (x, x') from "rest", an orbit or numbers, (2 N,)."""
+    size = system.size
     remedy = f"give {2 * size} finite numbers, (x, x')"
     if isinstance(initial, Orbit):
         if initial.state.size != 2 * size:
@@ -324,7 +335,7 @@ def initial_state(size: int, initial: str | Orbit | ArrayLike) -> Real:
     if isinstance(initial, str):
         if initial != "rest":
             raise InputError("initial", initial, 'give "rest", an orbit, or a state (x, x\')')
-        return np.zeros(2 * size)
+        return state_at_rest(system)
     state = checked_numbers("initial", initial, remedy)
     if state.shape != (2 * size,):
         raise InputError("initial", initial, remedy)

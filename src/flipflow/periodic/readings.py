@@ -16,7 +16,11 @@ from flipflow.dynamics.contact_search import (
     prepare_search,
 )
 from flipflow.dynamics.flow import run_flow, segment_motion, segment_state
-from flipflow.periodic.balance import contact_forces, prepare_receptance
+from flipflow.periodic.balance import (
+    contact_forces,
+    contact_free_harmonic,
+    prepare_receptance,
+)
 from flipflow.periodic.sampled import Sampled, SampledWork, sampled_forces
 from flipflow.periodic.series import (
     Balance,
@@ -59,8 +63,7 @@ def observe_flow(
         for g in range(coordinate.shape[0]):
             low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
         for e in range(flow.segments[0]):
-            segment_motion(flow, e, omega[p], coordinate, motion)
-            count = flow.modes.mode_count[flow.slot[e]] + 1
+            count = segment_motion(problem.machine, flow, e, omega[p], coordinate, motion)
             prepare_search(motion, count)
             for g in range(coordinate.shape[0]):
                 smallest, largest = extremes(motion, count, g, flow.length[e])
@@ -133,13 +136,13 @@ def describe_sampled(
 
 @kernel(inline=True)
 def _displacements(problem: Balance, work: BalanceWork, omega: float, series: Complex) -> None:
-    """X_h = delta_h1 X_linear - (K - h^2 omega^2 M + i h omega C)^-1 D^T Lambda_h by modes."""
+    """X_h = X_h without contact - (K - h^2 omega^2 M + i h omega C)^-1 D^T Lambda_h by modes."""
     modes = work.flow.modes
     n = series.shape[1]
     for a in range(problem.harmonics.shape[0]):
         h = problem.harmonics[a]
         for k in range(n):
-            series[a, k] = work.flow.drive[0, k] if h == 1 else 0.0
+            series[a, k] = contact_free_harmonic(problem, work, h, k)
         for i in range(modes.mode_count[0]):
             push = 0j
             push_conj = 0j
@@ -274,7 +277,7 @@ def _distance(
         samples = 2 + int(128.0 * flow.length[e] / turn)
         for s in range(samples):
             elapsed = flow.length[e] * s / samples
-            segment_state(flow, e, omega, elapsed, flow.z, work.rate)
+            segment_state(problem.machine, flow, e, omega, elapsed, flow.z, work.rate)
             for k in range(n):
                 value = flow.z[k]
                 for a in range(harmonics.shape[0]):

@@ -84,7 +84,7 @@ def sampled_forces(problem: Sampled, work: SampledWork, omega: float) -> None:
     """Lambda_h, its derivative in omega at fixed A, and the sums the Jacobian needs."""
     balance, scratch = problem.balance, work.balance
     kinds = balance.harmonics.shape[0]
-    for j in range(scratch.linear.shape[0]):
+    for j in range(scratch.linear.shape[1]):
         for q in range(work.stiffness.shape[1]):
             work.stiffness[j, q] = 0.0
             work.damping[j, q] = 0.0
@@ -149,7 +149,7 @@ def _sum(sums: Complex, j: int, q: int) -> complex:
 def sampled_residual(
     problem: Sampled, work: SampledWork, u: Real, omega: float, r: Real, J: Real
 ) -> int:
-    """r_h = A_h + G_h Lambda_h - delta_h1 A_linear and J = [dr/du, dr/d omega], all real."""
+    """r_h = A_h + G_h Lambda_h - A_linear,h and J = [dr/du, dr/d omega], all real."""
     set_series(problem.balance, work.balance, u)
     if not omega > 0.0:
         return status.NO_CONVERGENCE
@@ -165,7 +165,7 @@ def sampled_residual(
 def _jacobian(problem: Sampled, work: SampledWork, omega: float, J: Real) -> None:
     """dr = c1 dA + c2 conj(dA), with dy = Re dA exp(i l theta), dv = omega Re i l dA exp(...)."""
     balance, scratch = problem.balance, work.balance
-    m = scratch.linear.shape[0]
+    m = scratch.linear.shape[1]
     for a in range(balance.harmonics.shape[0]):
         h = balance.harmonics[a]
         half = 0.5 * _share(problem, a)

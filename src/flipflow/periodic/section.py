@@ -72,7 +72,7 @@ def better_section(problem: Shooting, work: ShootingWork, omega: float) -> float
     flow, machine, stands = work.flow, problem.machine, float(work.section[0])
     if machine.direction.shape[0] == 0:
         return stands
-    segment_state(flow, 0, omega, 0.0, work.start, work.first_rate)
+    segment_state(machine, flow, 0, omega, 0.0, work.start, work.first_rate)
     here = margin(machine, flow, 0, work.start, omega)
     if here > min(NEAR, WORN * work.section[1]):
         return stands
@@ -83,7 +83,7 @@ def better_section(problem: Shooting, work: ShootingWork, omega: float) -> float
         t = flow.start[0] + i * angle / (count * omega)
         while e < flow.segments[0] - 1 and flow.start[e + 1] < t:
             e += 1
-        segment_state(flow, e, omega, t - flow.start[e], work.start, work.first_rate)
+        segment_state(machine, flow, e, omega, t - flow.start[e], work.start, work.first_rate)
         there = margin(machine, flow, e, work.start, omega)
         if there > best:
             best, chosen = there, i * angle / count
@@ -114,7 +114,7 @@ def carried(problem: Shooting, work: ShootingWork, w: Real, tangent: Real, end: 
     if code != status.OK:
         return code
     # The column is carried at fixed times; both ends of the flow move with omega as well.
-    segment_state(flow, 0, omega, 0.0, work.start, work.first_rate)
+    segment_state(problem.machine, flow, 0, omega, 0.0, work.start, work.first_rate)
     for k in range(size):
         column[k, 0] = tangent[k] + work.first_rate[k] * slope * begin / omega
     carry_tangent(problem.machine, flow, omega, column, slope, work.columns)

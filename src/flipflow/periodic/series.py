@@ -55,8 +55,8 @@ class BalanceWork(NamedTuple):
     motion: GapMotion  # the series itself
     receptance: Complex  # (n_h, m, m) G_h
     receptance_slope: Complex  # (n_h, m, m) dG_h / d omega
-    linear: Complex  # (m,) A_linear
-    linear_slope: Complex  # (m,)
+    linear: Complex  # (n_h, m) A_linear, of the motion without contact
+    linear_slope: Complex  # (n_h, m)
     integral: Complex  # (m, 2 H + 1) int exp(i k theta) over the contacts, k = 0 ... 2 H
     integral_gap: Complex  # (m, 2 H + 1) the same times the signed gap
     edge: Complex  # (m, 4 H + 1) sum +-exp(i k theta) at clipped limits, k = -2 H ... 2 H
@@ -85,8 +85,8 @@ def new_balance_work(problem: Balance) -> BalanceWork:
         motion=new_gap_motion(m, rates, spacing),
         receptance=np.zeros((kept.size, m, m), np.complex128),
         receptance_slope=np.zeros((kept.size, m, m), np.complex128),
-        linear=np.zeros(m, np.complex128),
-        linear_slope=np.zeros(m, np.complex128),
+        linear=np.zeros((kept.size, m), np.complex128),
+        linear_slope=np.zeros((kept.size, m), np.complex128),
         integral=np.zeros((m, most), np.complex128),
         integral_gap=np.zeros((m, most), np.complex128),
         edge=np.zeros((m, 2 * most - 1), np.complex128),
@@ -108,7 +108,7 @@ def place(problem: Balance, a: int, j: int) -> int:
 @kernel(inline=True)
 def set_series(problem: Balance, work: BalanceWork, u: Real) -> None:
     """The unknowns as offsets and amplitudes at the gaps."""
-    m = work.linear.shape[0]
+    m = work.linear.shape[1]
     mean = 1 if problem.harmonics[0] == 0 else 0
     for j in range(m):
         work.motion.offset[j] = u[j] if mean == 1 else 0.0
@@ -130,7 +130,7 @@ def set_series_regimes(work: BalanceWork) -> None:
     """Regime of each spring at theta = 0."""
     count = work.motion.rate.shape[0]
     exponentials(work.motion, count, 0.0)
-    for j in range(work.linear.shape[0]):
+    for j in range(work.linear.shape[1]):
         y, v = gap_state(work.motion, count, j)
         work.flow.regime[j] = regime_at(work.stops, j, y, v)
 
@@ -139,7 +139,7 @@ def set_series_regimes(work: BalanceWork) -> None:
 def record_contacts(problem: Balance, work: BalanceWork, omega: float) -> int:
     """Walk along the series and record who touches when, as a flow does (times in s)."""
     flow = work.flow
-    for j in range(work.linear.shape[0]):
+    for j in range(work.linear.shape[1]):
         work.stops.damping[j] = problem.machine.stops.damping[j] * omega
     set_series_regimes(work)
     rest = problem.walk

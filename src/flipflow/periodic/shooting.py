@@ -125,7 +125,7 @@ def shooting_residual(
     begin = work.section[0] / omega
     end = begin + problem.fraction * 2.0 * math.pi / omega
     if begin != 0.0:
-        segment_state(work.flow, 0, omega, 0.0, work.start, work.first_rate)
+        segment_state(problem.machine, work.flow, 0, omega, 0.0, work.start, work.first_rate)
     for k in range(size):
         slope = U[k, size] - work.rate[k] * end / omega
         if begin != 0.0:
@@ -164,8 +164,7 @@ def flow_depths(problem: Shooting, work: ShootingWork, omega: float, depth: Real
     for j in range(depth.shape[0]):
         depth[j, 0], depth[j, 1] = -math.inf, -math.inf
     for e in range(flow.segments[0]):
-        segment_motion(flow, e, omega, machine.direction, motion)
-        count = flow.modes.mode_count[flow.slot[e]] + 1
+        count = segment_motion(machine, flow, e, omega, machine.direction, motion)
         prepare_search(motion, count)
         for j in range(depth.shape[0]):
             low, high = extremes(motion, count, j, flow.length[e])

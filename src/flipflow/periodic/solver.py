@@ -435,10 +435,13 @@ class Solver(ABC):
 
 def characteristic_length(system: MechanicalSystem, machine: MachineArrays) -> float:
     """The smallest gap in m that is not zero, else the stroke that the force alone would give."""
-    gaps = [gap for spring in system.springs for gap in spring.gaps if 0.0 < gap < math.inf]
-    if gaps:
-        return min(gaps)
-    push = np.abs(machine.push).max()
-    if machine.power == 0:
-        push = np.abs(np.linalg.solve(system.K, system.excitation.vector)).max()
-    return float(push) or 1.0
+    gaps = [abs(gap) for spring in system.springs for gap in spring.gaps]
+    known = [gap for gap in gaps if 0.0 < gap < math.inf]
+    if known:
+        return min(known)
+    unbalances = machine.push[machine.power == 2]
+    if unbalances.size:
+        return float(np.abs(unbalances).max()) or 1.0
+    forces = [np.abs(one.vector) for one in system.excitations]
+    held = np.linalg.lstsq(system.K, np.sum([*forces, np.abs(system.constant_force)], axis=0))[0]
+    return float(np.abs(held).max()) or 1.0

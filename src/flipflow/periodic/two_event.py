@@ -105,12 +105,12 @@ def _end_of_touch(machine: MachineArrays, work: TwoEvent, turn: complex) -> None
     size = work.z.shape[0]
     n, gap = size // 2, machine.stops.gap[0, 0]
     for r in range(size):
-        drive = flow.drive[PLUS_SLOT, r] * turn
+        drive = flow.drive[PLUS_SLOT, 0, r] * turn
         constant, real, imag = 0.0, drive.real, -drive.imag
         if r < n:
             constant = gap * flow.modes.rest[PLUS_SLOT, 0, r]
         for c in range(size):
-            before = flow.drive[PLUS_SLOT, c]
+            before = flow.drive[PLUS_SLOT, 0, c]
             if c < n:
                 constant -= work.engaged[r, c] * gap * flow.modes.rest[PLUS_SLOT, 0, c]
             real -= work.engaged[r, c] * before.real
@@ -125,10 +125,10 @@ def _solve_begin(work: TwoEvent, turn: complex, part: int) -> None:
     size = work.z.shape[0]
     for r in range(size):
         # At the end of the half turn the drive has the opposite sign.
-        drive = flow.drive[OPEN_SLOT, r]
+        drive = flow.drive[OPEN_SLOT, 0, r]
         total = 0.0 if part == 0 else drive.real if part == 1 else -drive.imag
         for c in range(size):
-            before = flow.drive[OPEN_SLOT, c] * turn
+            before = flow.drive[OPEN_SLOT, 0, c] * turn
             driven = 0.0 if part == 0 else before.real if part == 1 else -before.imag
             total -= work.open[r, c] * (work.end[c, part] - driven)
         work.column[r] = total
@@ -242,9 +242,14 @@ class TwoEventProblem:
 
     @staticmethod
     def applies(system: MechanicalSystem) -> bool:
-        """Whether the machine has one stop, the same on both sides, with the paper's law."""
+        """Whether the machine has one stop, the same on both sides, with the paper's law.
+
+        It is excited once a turn, and nothing pulls it to one side.
+        """
         springs = system.springs
-        return len(springs) == 1 and springs[0].symmetric and springs[0].law == "paper"
+        if len(springs) != 1 or springs[0].law != "paper":
+            return False
+        return system.symmetric and system.orders == (1,)
 
     def states(self, omega: float) -> tuple[Real, Real]:
         """States at t = 0, (k, 2 N), and contact shares, (k,), of the candidates at ``omega``."""

@@ -208,6 +208,11 @@ def _number(document: Json) -> float:
     return document  # type: ignore[no-any-return]
 
 
+def _complex(document: Json) -> complex:
+    real, imaginary = map(_number, _list(document))
+    return complex(real, imaginary)
+
+
 def _whole(document: Json) -> int:
     if abs(_count(document)) > MOST_WHOLE:
         raise ValueError("a whole number is too large")
@@ -307,6 +312,7 @@ OWN: Mapping[Any, Form] = {
     int: Form(exact, _whole),
     str: Form(exact, _text),
     float: Form(exact, _number),
+    complex: Form(exact, _complex),
     Path: Form(str, lambda document: Path(_text(document))),
 }
 MAKERS: Mapping[Any, Callable[[Codec, tuple[Any, ...]], Form]] = {

@@ -11,7 +11,8 @@ from flipflow.compiled.workers import compile_parts, work
 from flipflow.continuation import correction
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.model.drive import SpeedProfile
-from flipflow.model.elements import ClearanceSpring, Unbalance
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.excitation import Unbalance
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE

@@ -30,7 +30,8 @@ from flipflow.model.arguments import (
     checked_speeds,
 )
 from flipflow.model.contact_law import ContactLaw
-from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.excitation import Excitation, HarmonicForce, MovingBase, Unbalance
 from flipflow.model.parameters import parameter_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -322,13 +323,28 @@ def _by_name(*kinds: type) -> dict[str, type]:
     return {kind.__name__: kind for kind in kinds}
 
 
+def excitation_document(given: Excitation | tuple[Excitation, ...]) -> object:
+    """One excitation as an object, several as a list of them."""
+    if isinstance(given, tuple):
+        return [EXCITATION.write(one) for one in given]
+    return EXCITATION.write(given)
+
+
+def excitation_from(document: object) -> Excitation | tuple[Excitation, ...]:
+    """What :func:`excitation_document` wrote."""
+    if isinstance(document, list):
+        return tuple(EXCITATION.read(one) for one in document)
+    return EXCITATION.read(document)  # type: ignore[no-any-return]
+
+
+EXCITATION = CODEC.tagged("kind", _by_name(Unbalance, HarmonicForce, MovingBase))
 METHODS = CODEC.tagged("name", _by_name(PiecewiseExact, HarmonicBalance, SampledHarmonicBalance))
 SCREENS, SYSTEMS = {"screen": FlipFlowScreen}, {"system": MechanicalSystem}
 MACHINES = CODEC.tagged("kind", SCREENS | SYSTEMS)
 CODEC.learn(
     {
         ClearanceSpring: Form(SPRING.write, spring_from),
-        Unbalance | HarmonicForce: CODEC.tagged("kind", _by_name(Unbalance, HarmonicForce)),
+        Excitation | tuple[Excitation, ...]: Form(excitation_document, excitation_from),
         Machine: Form(machine_document, MACHINES.read),
         FlipFlowScreen: CODEC.tagged("kind", SCREENS),
         MechanicalSystem: CODEC.tagged("kind", SYSTEMS),

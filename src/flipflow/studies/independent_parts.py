@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from flipflow.compiled.arrays import Real
-from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
+from flipflow.model.elements import ClearanceSpring
+from flipflow.model.excitation import restricted
 from flipflow.model.system import MechanicalSystem
 
 
@@ -51,7 +52,7 @@ def _part(system: MechanicalSystem, freedoms: NDArray[np.int64]) -> IndependentP
         for one in system.springs
         if one.direction[freedoms].any()
     ]
-    vector = system.excitation.vector[freedoms]
-    constant = isinstance(system.excitation, HarmonicForce)
-    force = HarmonicForce(vector) if constant else Unbalance(vector)
-    return IndependentPart(MechanicalSystem(M, C, K, springs, force), freedoms)
+    forces = [restricted(one, freedoms) for one in system.excitations]
+    static = system.constant_force[freedoms]
+    part = MechanicalSystem(M, C, K, springs, forces, static_force=static)
+    return IndependentPart(part, freedoms)

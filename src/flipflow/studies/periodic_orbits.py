@@ -25,7 +25,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.one_state import one_state_motions
-from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.orbit import Orbit, state_at_rest
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.two_event import TwoEventProblem
 from flipflow.studies.independent_parts import IndependentPart, independent_parts, joined_state
@@ -146,7 +146,7 @@ class _Search:
         solver = self.settling.solver
         stepped = (self._stepped(ratio) for ratio in (1.0 / SWEEP_RATIO, SWEEP_RATIO))
         return [
-            np.zeros(2 * solver.system.size),
+            state_at_rest(solver.system),
             first_unknowns(solver, self.omega),
             *(z for ratio in BRANCH_RATIOS for z in _on_branch(solver.system, self.omega, ratio)),
             *cloud(solver, self.omega, rng),
@@ -219,7 +219,7 @@ class _Search:
 
     def _stepped(self, ratio: float) -> Real | None:
         """Where the machine settles from rest while the speed is stepped to the one asked for."""
-        z: Real | None = np.zeros(2 * self.settling.solver.system.size)
+        z: Real | None = state_at_rest(self.settling.solver.system)
         for speed in np.geomspace(ratio * self.omega, self.omega, SWEEP_STEPS):
             z = None if z is None else self._flown(z, float(speed))
         return z

@@ -115,7 +115,7 @@ def poincare_section(
     turns = checked_count("turns", turns, MOST_TURNS)
     skip = checked_count("skip", skip, MOST_TURNS, least=0)
     solver = ExactSolver(system_of(machine), half_turn=False)
-    z = initial_state(solver.system.size, initial)
+    z = initial_state(solver.system, initial)
     if skip:
         z = solver.section(z, speed, skip)[-1]
     return Section(solver.system, speed, solver.section(z, speed, turns))

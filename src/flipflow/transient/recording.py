@@ -65,9 +65,14 @@ class Recording:
         work = new_shooting_work(machine)
         node, weight = np.polynomial.legendre.leggauss(GAUSS_NODES)
         budget = Budget(
-            linear.C.copy(), linear.excitation.vector.astype(np.complex128),
-            node, weight, np.zeros(3),
-        )  # fmt: skip
+            damping=linear.C.copy(),
+            circulation=0.5 * (linear.K - linear.K.T),
+            vector=np.array([v for one in linear.excitations for _, v in one.terms]),
+            static=linear.constant_force.copy(),
+            node=node,
+            weight=weight,
+            work=np.zeros(3),
+        )
         turn = 2.0 * np.pi / omega
         stretch = TURNS_A_CALL * turn
         t = begin

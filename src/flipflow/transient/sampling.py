@@ -40,7 +40,9 @@ class Budget(NamedTuple):
     """What the energies are summed from and into."""
 
     damping: Real  # (N, N) C of the open machine
-    vector: Complex  # (N,) the exciting force is Re(vector exp(i omega t)) omega^power
+    circulation: Real  # (N, N) the part of its K that is not symmetric: it has no energy
+    vector: Complex  # (E, N) the exciting forces are Re(vector exp(i n omega t)) omega^power
+    static: Real  # (N,) constant force
     node: Real  # (Q,) Gauss-Legendre on [-1, 1]
     weight: Real  # (Q,)
     work: Real  # (3,) J: done by the exciter, taken by dampers, taken by stops
@@ -83,7 +85,7 @@ def sample_motion(
             if e > 0:
                 note_change(flow, e, changes)
         e = flow.segments[0] - 1
-        segment_state(flow, e, omega, flow.length[e], flow.z, work.rate)
+        segment_state(problem.machine, flow, e, omega, flow.length[e], flow.z, work.rate)
         t += duration
     return status.OK, row
 
@@ -106,7 +108,7 @@ def sample(
     """Row of the table from segment e."""
     flow = work.flow
     n = table.x.shape[1]
-    segment_state(flow, e, omega, table.t[row] - flow.start[e], flow.z, work.rate)
+    segment_state(problem.machine, flow, e, omega, table.t[row] - flow.start[e], flow.z, work.rate)
     for k in range(n):
         table.x[row, k] = flow.z[k]
         table.v[row, k] = flow.z[n + k]
@@ -137,20 +139,24 @@ def add_work(problem: Shooting, work: ShootingWork, e: int, omega: float, budget
         fastest = max(fastest, abs(modes.rate[slot, i]))
     panels = 1 + int(fastest * flow.length[e] / PANEL)
     half = 0.5 * flow.length[e] / panels
-    scale = omega**machine.power
     for p in range(panels):
         for q in range(budget.node.shape[0]):
             elapsed = half * (2 * p + 1 + budget.node[q])
             share = half * budget.weight[q]
-            segment_state(flow, e, omega, elapsed, flow.z, work.rate)
-            angle = omega * (flow.start[e] + elapsed)
+            segment_state(problem.machine, flow, e, omega, elapsed, flow.z, work.rate)
+            for f in range(machine.power.shape[0]):
+                angle = machine.order[machine.wave[f]] * omega * (flow.start[e] + elapsed)
+                scale = share * omega ** machine.power[f]
+                for k in range(n):
+                    push = budget.vector[f, k].real * math.cos(angle)
+                    push -= budget.vector[f, k].imag * math.sin(angle)
+                    budget.work[0] += scale * push * flow.z[n + k]
             for k in range(n):
                 v = flow.z[n + k]
-                push = budget.vector[k].real * math.cos(angle)
-                push -= budget.vector[k].imag * math.sin(angle)
-                budget.work[0] += share * scale * push * v
+                budget.work[0] += share * budget.static[k] * v
                 for c in range(n):
                     budget.work[1] += share * v * budget.damping[k, c] * flow.z[n + c]
+                    budget.work[1] += share * v * budget.circulation[k, c] * flow.z[c]
             for j in range(flow.regime.shape[0]):
                 rate = 0.0
                 for k in range(n):

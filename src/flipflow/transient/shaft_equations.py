@@ -23,6 +23,7 @@ from flipflow.dynamics.law import (
 )
 from flipflow.model.contact_law import NO_EXIT, OPEN
 
+UNBALANCE = 2  # power of omega with which its force grows
 SHAFT_STATES = 5  # of the shaft: phi, phi', work put in, work dissipated, work of friction
 
 
@@ -50,8 +51,11 @@ class Equations(NamedTuple):
     stiffness: Real  # (N, N)
     direction: Real  # (m, N)
     stops: Stops
-    vector: Complex  # (N,) unbalance in kg m, or force in N
-    unbalance: int  # 1: an unbalance, which reacts on the shaft; 0: a force of constant size
+    static: Real  # (N,) constant force
+    circulation: Real  # (N, N) the part of the stiffness that is not symmetric: it has no energy
+    vector: Complex  # (E, N) the excitation is Re(vector exp(i n phi)) phi'^power
+    order: Int  # (E,) n
+    power: Int  # (E,) 2 is an unbalance, which reacts on the shaft
     shaft: Shaft
     pull: Real  # (N,) scratch: exciting force at no angular acceleration
     lever: Real  # (N,) scratch: exciting force for one unit of it
@@ -79,10 +83,11 @@ def friction_torque(shaft: Shaft, speed: float) -> float:
 def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> None:
     """Write ds/dt at ``point`` to ``rows[row]``, with the springs in their regimes.
 
-    M a + C v + K x + sum d H = p phi'^2 + q phi'' with p + i q = vector exp(i phi), and
-    J phi'' - q a = T - T_friction: phi'' follows after eliminating a.
+    M a + C v + K x + sum d H = f_0 + sum p phi'^power + q phi'' with p = Re(vector exp(i n phi)),
+    q = Im(vector exp(i n phi)) / n of an unbalance, and J phi'' - q a = T - T_friction: phi''
+    follows after eliminating a.
     """
-    n = eq.vector.shape[0]
+    n = eq.static.shape[0]
     speed = point[2 * n + 1]
     _excite(eq, point)
     dissipated = _carry(eq, point) + _press(eq, regime, point)
@@ -119,20 +124,26 @@ def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> Non
 @kernel(inline=True)
 def _excite(eq: Equations, point: Real) -> None:
     """Write the exciting force without angular acceleration, and for one unit of it."""
-    n = eq.vector.shape[0]
+    n = eq.static.shape[0]
     angle, speed = point[2 * n], point[2 * n + 1]
-    cos, sin = math.cos(angle), math.sin(angle)
     for i in range(n):
-        p = eq.vector[i].real * cos - eq.vector[i].imag * sin
-        q = eq.vector[i].real * sin + eq.vector[i].imag * cos
-        eq.pull[i] = p * speed * speed if eq.unbalance == 1 else p
-        eq.lever[i] = q if eq.unbalance == 1 else 0.0
+        eq.pull[i] = eq.static[i]
+        eq.lever[i] = 0.0
+    for e in range(eq.power.shape[0]):
+        order, power = eq.order[e], eq.power[e]
+        cos, sin = math.cos(order * angle), math.sin(order * angle)
+        scale = speed**power
+        for i in range(n):
+            part = eq.vector[e, i]
+            eq.pull[i] += (part.real * cos - part.imag * sin) * scale
+            if power == UNBALANCE:
+                eq.lever[i] += (part.real * sin + part.imag * cos) / order
 
 
 @kernel(inline=True)
 def _carry(eq: Equations, point: Real) -> float:
     """Write the force of exciter, springs and dampers to ``eq.push``; the dampers' power."""
-    n = eq.vector.shape[0]
+    n = eq.static.shape[0]
     power = 0.0
     for i in range(n):
         drag = 0.0
@@ -140,6 +151,7 @@ def _carry(eq: Equations, point: Real) -> float:
         for k in range(n):
             drag += eq.damping[i, k] * point[n + k]
             spring += eq.stiffness[i, k] * point[k]
+            power += eq.circulation[i, k] * point[k] * point[n + i]
         power += drag * point[n + i]
         eq.push[i] = eq.pull[i] - drag - spring
     return power
@@ -148,7 +160,7 @@ def _carry(eq: Equations, point: Real) -> float:
 @kernel(inline=True)
 def gap_motion(eq: Equations, point: Real, j: int) -> tuple[float, float]:
     """Position and rate at spring j."""
-    n = eq.vector.shape[0]
+    n = eq.static.shape[0]
     y = 0.0
     v = 0.0
     for i in range(n):
@@ -175,7 +187,7 @@ def _press(eq: Equations, regime: Int, point: Real) -> float:
         y, v = gap_motion(eq, point, j)
         H = force(eq.stops, j, regime[j], y, v)
         power += (H - spring_force(eq.stops, j, regime[j], y)) * v
-        for i in range(eq.vector.shape[0]):
+        for i in range(eq.static.shape[0]):
             eq.push[i] -= eq.direction[j, i] * H
     return power
 
@@ -189,7 +201,7 @@ def switching(
     Each spring has as many as its law has exits, or sides to enter; j beyond the springs names
     the shaft, whose speed may end the run.
     """
-    n = eq.vector.shape[0]
+    n = eq.static.shape[0]
     if j == regime.shape[0]:
         speed, alpha = point[2 * n + 1], rows[row, 2 * n + 1]
         if which == 0:
@@ -216,7 +228,7 @@ def switch(eq: Equations, regime: Int, point: Real, j: int, which: int) -> None:
     A stop that lets go while compressed gives up what its spring holds, and gets it back if it
     takes hold again.
     """
-    n = eq.vector.shape[0]
+    n = eq.static.shape[0]
     before = regime[j]
     if before == OPEN:
         piece = entered(eq.stops, j)

@@ -20,7 +20,7 @@ from flipflow.model.arguments import (
 )
 from flipflow.model.contact_law import WHOLE, engaged_side, force_in, regime_at, stored_energy
 from flipflow.model.disturbance import Disturbance, Impulse, LoadStep, Lump
-from flipflow.model.elements import Unbalance
+from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Machine, MechanicalSystem, system_of
@@ -96,7 +96,7 @@ def simulate(
     blows = sorted(_checked_blows(disturbances), key=lambda one: one.t)
     if blows and blows[-1].t >= end:
         raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
-    z = initial_state(system.size, initial)
+    z = initial_state(system, initial)
     run = _Run(machine, system_of, speed, end, say)
     run.carry(Recording(times, system.size, len(run.kept)), z, blows)
     distance, near = _settled(system_of(run.machine), run.z, speed)

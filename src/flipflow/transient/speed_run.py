@@ -67,8 +67,10 @@ def movable(machine: Machine) -> MechanicalSystem:
 
 def at_rest(machine: Machine) -> Start:
     """Everything at rest, the unbalance along +x."""
-    count = system_of(machine).size + (normal_direction(machine) is not None)
-    return Start(np.zeros(2 * count), 0.0, 0.0)
+    x = system_of(machine).static_position()
+    if normal_direction(machine) is not None:
+        x = np.append(x, 0.0)
+    return Start(np.concatenate([x, np.zeros(x.size)]), 0.0, 0.0)
 
 
 def run_history(

@@ -16,7 +16,7 @@ from flipflow.errors import InputError
 from flipflow.model.arguments import checked_monitor, checked_positive, checked_speed
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
-from flipflow.model.elements import Unbalance
+from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
@@ -490,8 +490,8 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
 
 def _gravity(machine: Machine, drive: Drive) -> list[str]:
     """What the weight of the unbalance, which the equations leave out, would change."""
-    excitation = machine.system().excitation
-    moment = float(np.abs(excitation.vector).max()) if isinstance(excitation, Unbalance) else 0.0
+    forces = machine.system().excitations
+    moment = sum(float(np.abs(f.vector).max()) for f in forces if isinstance(f, Unbalance))
     torque = moment * GRAVITY
     if torque == 0.0:
         return []

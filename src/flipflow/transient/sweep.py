@@ -200,7 +200,7 @@ def sweep(
     most_turns = checked_count("most_turns", most_turns, 10_000_000)
     say = checked_monitor(monitor)
     settling = Settling(system_of(machine), max_periods)
-    z = initial_state(settling.solver.system.size, initial)
+    z = initial_state(settling.solver.system, initial)
     rows: list[Settled] = []
     jumps: list[Jump] = []
     for k, speed in enumerate(speeds):

@@ -16,11 +16,11 @@ from flipflow.errors import InputError
 from flipflow.model.arguments import checked_number, checked_positive, checked_word
 from flipflow.model.contact_law import stored_energy
 from flipflow.model.drive import Drive, SpeedProfile
-from flipflow.model.elements import Unbalance
+from flipflow.model.excitation import Unbalance
 from flipflow.model.system import MechanicalSystem
 from flipflow.transient import runge_kutta
 from flipflow.transient.runge_kutta import Walk
-from flipflow.transient.shaft_equations import SHAFT_STATES, Equations, Shaft
+from flipflow.transient.shaft_equations import SHAFT_STATES, UNBALANCE, Equations, Shaft
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4, Tableau
 
 Real = NDArray[np.float64]
@@ -120,21 +120,24 @@ class Stepper:
         self.method = method or RungeKutta()
         self.profile = shaft if isinstance(shaft, SpeedProfile) else None
         linear = system.with_bonded()
-        self.M, C, K, vector = extended(linear, normal)
+        self.M, C, K, vector, static = extended(linear, normal)
         self.size = self.M.shape[0]
         self.springs = linear.springs
         drive = shaft if isinstance(shaft, Drive) else None
-        unbalance = isinstance(system.excitation, Unbalance)
         inverse = np.asarray(np.linalg.inv(self.M), dtype=np.float64)
+        terms = [(one, power) for one in linear.excitations for power, _ in one.terms]
+        self.order = np.array([one.order for one, _ in terms], np.int64)
+        self.power = np.array([power for _, power in terms], np.int64)
         if drive is not None:
-            _check_drive(drive, inverse, vector, unbalance=unbalance)
-        self.vector, self.unbalance, self.drive = vector, unbalance, drive
-        self.K = K
+            _check_drive(drive, inverse, vector, self.order, linear)
+        self.vector, self.drive = vector, drive
+        self.K, self.static = K, static
         self._acceleration = np.zeros(1)
         self.equations = Equations(
             inverse_mass=inverse, damping=C, stiffness=K,
-            direction=self._directions(), stops=stops_of(linear.springs), vector=vector,
-            unbalance=int(unbalance), shaft=_shaft(drive, end_speeds, self._acceleration),
+            direction=self._directions(), stops=stops_of(linear.springs), static=static,
+            circulation=0.5 * (K - K.T), vector=vector, order=self.order, power=self.power,
+            shaft=_shaft(drive, end_speeds, self._acceleration),
             pull=np.zeros(self.size), lever=np.zeros(self.size), push=np.zeros(self.size),
             answer=np.zeros(self.size),
         )  # fmt: skip
@@ -194,7 +197,8 @@ class Stepper:
             held = stored_energy(spring.law, spring.stiffness, spring.gaps, np.asarray(regime), y)
             energy += float(held)
         if self.drive is not None:
-            lever = (self.vector * np.exp(1j * angle)).imag if self.unbalance else np.zeros(n)
+            turns = np.exp(1j * self.order * angle) / self.order
+            lever = (turns @ self.vector).imag
             energy += 0.5 * self.drive.inertia * speed**2 - speed * float(lever @ v)
         return energy
 
@@ -249,9 +253,10 @@ class Stepper:
     def _absolute(self, s: Real, fastest: float) -> Real:
         """Absolute tolerances: the size of the motion, its speed, the shaft; works not watched."""
         n = self.size
-        reach = np.abs(self.equations.inverse_mass @ np.abs(self.vector))
-        length = max(float(reach.max()) if self.unbalance else 0.0, float(np.abs(s[:n]).max()))
-        gaps = [gap for spring in self.springs for gap in spring.gaps if 0.0 < gap < math.inf]
+        reach = np.abs(self.vector) @ np.abs(self.equations.inverse_mass).T
+        thrown = float(reach[self.power == UNBALANCE].max(initial=0.0))
+        length = max(thrown, float(np.abs(s[:n]).max()))
+        gaps = [abs(gap) for spring in self.springs for gap in spring.gaps if math.isfinite(gap)]
         length = max([length, *gaps]) or float(reach.max()) / fastest**2 or 1.0
         sizes = [*[length] * n, *[length * fastest] * n, 1.0, fastest, *[math.inf] * 3]
         return self.method.tolerance * np.array(sizes)
@@ -259,18 +264,20 @@ class Stepper:
 
 def extended(
     system: MechanicalSystem, normal: NormalDirection | None
-) -> tuple[Real, Real, Real, NDArray[np.complex128]]:
-    """M, C, K and the exciter's vector with the normal direction as one more degree of freedom.
+) -> tuple[Real, Real, Real, NDArray[np.complex128], Real]:
+    """M, C, K, vectors of the exciting terms (E, N) and constant force, with the normal direction.
 
-    Normal to the surface the unbalance acts a quarter of a turn later: its component is -i times
-    that along the surface.
+    It is one more degree of freedom. Normal to the surface the unbalance acts a quarter of a turn
+    later: its component is -i times that along the surface.
     """
-    vector = np.array(system.excitation.vector)
+    vector = np.array([vector for one in system.excitations for _, vector in one.terms])
+    static = np.array(system.constant_force)
     if normal is None:
-        return np.array(system.M), np.array(system.C), np.array(system.K), vector
+        return np.array(system.M), np.array(system.C), np.array(system.K), vector, static
     pairs = ((system.M, normal.mass), (system.C, normal.damping), (system.K, normal.stiffness))
     M, C, K = (np.block([[A, np.zeros((len(A), 1))], [np.zeros(len(A)), b]]) for A, b in pairs)
-    return M, C, K, np.append(vector, -1j * vector.sum())
+    across = -1j * vector.sum(axis=1, keepdims=True)
+    return M, C, K, np.concatenate([vector, across], axis=1), np.append(static, 0.0)
 
 
 def _longest_step(M: Real, K: Real, fastest: float) -> float:
@@ -297,15 +304,20 @@ def _shaft(drive: Drive | None, end_speeds: tuple[float, float], acceleration: R
 
 
 def _check_drive(
-    drive: Drive, inverse: Real, vector: NDArray[np.complex128], *, unbalance: bool
+    drive: Drive,
+    inverse: Real,
+    vector: NDArray[np.complex128],
+    order: NDArray[np.int64],
+    system: MechanicalSystem,
 ) -> None:
-    """Refuse a force that no shaft makes, and an inertia less than that of the unbalance."""
-    if not unbalance:
-        raise InputError(
-            "excitation", "HarmonicForce", "a motor turns an Unbalance; give a SpeedProfile"
-        )
-    parts = np.array([vector.real, vector.imag])
-    least = float(np.linalg.eigvalsh(parts @ inverse @ parts.T)[-1])
+    """Refuse a force that no shaft makes, and an inertia less than that of the unbalances."""
+    for one in system.excitations:
+        if not isinstance(one, Unbalance):
+            remedy = "a motor turns an Unbalance; give a SpeedProfile"
+            raise InputError("excitation", type(one).__name__, remedy)
+    levers = vector / order[:, None]
+    parts = [np.array([lever.real, lever.imag]) for lever in levers]
+    least = sum(math.sqrt(np.linalg.eigvalsh(one @ inverse @ one.T)[-1]) for one in parts) ** 2
     if drive.inertia <= least:
         raise InputError(
             "inertia", drive.inertia,
