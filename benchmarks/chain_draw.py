@@ -6,20 +6,21 @@ import numpy as np
 
 import flipflow as ff
 
-LAWS = ("paper", "compression-only")
+LAWS = ("paper", "compression-only", "undamped-rebound", "elasto-gap")
 MOST_MASSES, MOST_STOPS = 6, 4
 UNBALANCED = 0.3  # share of machines driven by an unbalance
 BETWEEN = 0.6  # share of stops between two masses, where there are two
 ONE_SIDED, EQUAL = 0.4, 0.3  # shares of stops on one side, and with equal gaps
+PULLED = 1 / 3  # share of machines under a constant force
 
 
 def draw(seed, number, *, law=None, ratio=None):
     """Machine ``number`` of ``seed``, and the interval of speeds to look at.
 
     A chain of one to six masses with springs between them and to the ground, damped in proportion,
-    under a force of any phase or an unbalance. One to four stops act between neighbours or against
-    the ground, each with a gap that is a share of the largest linear amplitude there, so that
-    nearly all are met. ``law`` and the damping ``ratio`` of the stops are drawn where not given.
+    under a force of any phase or an unbalance, a third of them under a constant force as well. One
+    to four stops act between neighbours or against the ground, each with a gap that is a share of
+    the largest linear amplitude there, so that nearly all are met. ``law`` and the damping ``ratio`` of the stops are drawn where not given.
     """
     rng = np.random.default_rng([seed, number])
     n = int(rng.integers(1, MOST_MASSES + 1))
@@ -39,7 +40,10 @@ def draw(seed, number, *, law=None, ratio=None):
         _stop(rng, M, X, law or LAWS[int(rng.integers(len(LAWS)))], ratio)
         for _ in range(int(rng.integers(1, MOST_STOPS + 1)))
     ]
-    return ff.MechanicalSystem(M, C, K, tuple(stops), force), interval
+    static = None
+    if rng.uniform() < PULLED:
+        static = K @ rng.uniform(-0.5, 0.5, n) * np.abs(X).max()
+    return ff.MechanicalSystem(M, C, K, tuple(stops), force, static_force=static), interval
 
 
 def _stop(rng, M, X, law, ratio):

@@ -1,4 +1,4 @@
-"""Event-located integration of M x'' + C x' + K x + sum d H = Re(F exp(i w t)) by DOP853.
+"""Event-located integration of M x'' + C x' + K x + sum d H = f + sum Re(F exp(i n w t)) by DOP853.
 
 Between contacts the machine is linear, but nothing here makes use of that: every smooth piece is
 handed to scipy, which stops at the first event. The contact of a stop is a state machine, with p
@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from flipflow.model.excitation import Excitation, MovingBase, Unbalance
 from flipflow.model.system import MechanicalSystem
 
 OPEN, ENGAGED, RELEASED = "open", "engaged", "released"
@@ -98,14 +99,14 @@ class Stop:
 
 @dataclass(frozen=True)
 class Machine:
-    """Matrices, one-sided stops, force vector and the power of omega it grows with."""
+    """Matrices, one-sided stops, what excites it, and a constant force."""
 
     M: np.ndarray
     C: np.ndarray
     K: np.ndarray
     stops: tuple[Stop, ...]
-    force: np.ndarray
-    power: int
+    excitations: tuple[Excitation, ...]
+    static: np.ndarray
 
     @classmethod
     def of(cls, system: MechanicalSystem) -> Machine:
@@ -116,8 +117,25 @@ class Machine:
             for side, gap in zip((1, -1), s.gaps, strict=True)
             if np.isfinite(gap)
         )
-        force = system.excitation
-        return cls(system.M, system.C, system.K, stops, force.vector, force.power)
+        given = system.excitation
+        excitations = given if isinstance(given, tuple) else (given,)
+        static = np.zeros(system.size) if system.static_force is None else system.static_force
+        return cls(system.M, system.C, system.K, stops, excitations, static)
+
+    def force(self, omega: float, t: float) -> np.ndarray:
+        """All that acts from outside at time t."""
+        total = self.static.copy()
+        for one in self.excitations:
+            speed = one.order * omega
+            turn = np.exp(1j * speed * t)
+            if isinstance(one, MovingBase):
+                place = (one.displacement * turn).real
+                rate = (1j * speed * one.displacement * turn).real
+                total += one.stiffness * place + one.damping * rate
+            else:
+                grown = speed**2 if isinstance(one, Unbalance) else 1.0
+                total += (one.vector * turn).real * grown
+        return total
 
 
 @dataclass(frozen=True)
@@ -142,16 +160,17 @@ def flow(
     n = machine.M.shape[0]
     z = np.array(z, float)
     states = [stop.state_at(z[:n], z[n:]) for stop in machine.stops]
-    size = max((stop.gap for stop in machine.stops), default=0.0) or np.abs(z).max()
+    size = max((abs(stop.gap) for stop in machine.stops), default=0.0) or np.abs(z).max()
     atol = ATOL_SHARE * size * np.repeat([1.0, omega], n)
     ends, pieces, history = [], [], []
+    highest = max(one.order for one in machine.excitations)
     t = start
     for _ in range(MOST_PIECES):
         events, targets = _events(machine, states)
         solution = solve_ivp(
             right_side(machine, states, omega), (t, end), z, method="DOP853", events=events,
             rtol=rtol, atol=atol, dense_output=True, first_step=min(end - t, 1e-3 / omega),
-            max_step=2.0 * np.pi / omega / STEPS_PER_TURN,
+            max_step=2.0 * np.pi / omega / STEPS_PER_TURN / highest,
         )  # fmt: skip
         assert solution.success, solution.message
         t, z = float(solution.t[-1]), solution.y[:, -1]
@@ -215,11 +234,10 @@ def right_side(
     n = machine.M.shape[0]
     touched = [pair for pair in zip(machine.stops, states, strict=True) if pair[1] != OPEN]
     inverse = np.linalg.inv(machine.M)
-    force = machine.force * omega**machine.power
 
     def rate(t: float, z: np.ndarray) -> np.ndarray:
         x, v = z[:n], z[n:]
-        total = (force * np.exp(1j * omega * t)).real - machine.C @ v - machine.K @ x
+        total = machine.force(omega, t) - machine.C @ v - machine.K @ x
         for stop, state in touched:
             total = total - stop.side * stop.force_in(state, x, v) * stop.direction
         return np.concatenate([v, inverse @ total])

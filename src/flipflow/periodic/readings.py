@@ -146,7 +146,7 @@ def _displacements(problem: Balance, work: BalanceWork, omega: float, series: Co
         for i in range(modes.mode_count[0]):
             push = 0j
             push_conj = 0j
-            for j in range(work.linear.shape[0]):
+            for j in range(work.linear.shape[1]):
                 push += modes.gap_pick[0, i, j] * work.force[a, j]
                 push_conj += modes.gap_pick[0, i, j].conjugate() * work.force[a, j]
             push /= 1j * h * omega - modes.rate[0, i]
