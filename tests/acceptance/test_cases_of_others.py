@@ -247,8 +247,8 @@ def test_bilinear_period_doublings(bilinear_branch) -> None:
         close(f"at {point.omega}", largest_multiplier(point.orbit), -1.0 + 0j, abs=1e-5)
 
 
-# A cantilever of 20 Euler-Bernoulli elements whose tip strikes a stop, as Moon and Shaw (1983) drove
-# one; EI = rho A = L = 1, the roots of the continuous beam from any textbook.
+# A cantilever of 20 Euler-Bernoulli elements whose tip strikes a stop, as Moon and Shaw (1983)
+# drove one; EI = rho A = L = 1, the roots of the continuous beam from any textbook.
 ELEMENTS = 20
 ROOTS = (1.875104069, 4.694091133, 7.854757438)  # of 1 + cos x cosh x = 0
 
@@ -325,8 +325,8 @@ def test_beam_amplitudes(beam_branch, omega: float) -> None:
         close("back", path.final[:ELEMENTS], orbit.state[:ELEMENTS], abs=1e-8 * expected)
 
 
-# A rotor within a polygon of stops, in place of the round stator of von Groll and Ewins (The harmonic
-# balance method with arc-length continuation in rotor/stator contact problems, J. Sound Vib.).
+# A rotor within a polygon of stops, in place of the round stator of von Groll and Ewins, The
+# harmonic balance method with arc-length continuation in rotor/stator contact problems.
 
 
 def rotor(stops: int, *, both_sides: bool = False) -> ff.MechanicalSystem:
