@@ -43,7 +43,8 @@ class SpecialPoint:
     ----------
     kind
         "fold" (a saddle-node: the amplitude jumps here), "contact begin", "contact end",
-        "symmetry breaking", "period doubling" or "Neimark-Sacker".
+        "symmetry breaking", "period doubling", "Neimark-Sacker" or "branch point" (another branch
+        crosses, as where a rotor loses the symmetry of its stops).
     orbit
         The motion at the point.
     position

@@ -51,7 +51,7 @@ SHORTEST = 1e-10  # length below which the branch is given up
 FAR = 2.0  # from this many chords on, the tangent predicts a step, not the cubic
 ASTRAY_MOST = 0.05  # largest distance of the corrected point from the guess, as a share of the step
 ASTRAY_AT_CORNER = 0.3  # the same for a step up to SHORT_STEP
-AWAY = 3.0  # distance from its first point that a branch must reach before it can close
+AWAY = 3.0  # steps like the last one that a branch must have gone before it can close
 BACK = 1.0  # share of a step within which it may then have come back to that point
 MET = 1e-3  # distance from that point of a branch that has
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
@@ -348,9 +348,9 @@ def trace(
         code = advance(problem, scratch, work, branch, p, course)
         if code != status.OK:
             return code, p
-        distance = from_start(work, branch, p)
-        travelled = max(travelled, distance)
-        near = travelled > AWAY and distance < BACK * step
+        # Counted in steps, for a closed branch may be smaller than the longest one.
+        travelled += step
+        near = travelled > AWAY * step and from_start(work, branch, p) < BACK * step
         closed = near and passes_start(problem, scratch, work, branch, p, course)
         ended = arrival(branch, course, p, ends, closed)
         p += 1

@@ -4,7 +4,8 @@ Every test function is a smooth number along the branch: the tangent's share in 
 det(I + map) (loss of symmetry or period doubling), prod (1 - lambda_i lambda_j) (Neimark-Sacker),
 and the depth of each contact. A zero is refined on corrected points of the branch, never
 interpolated. Two zeros within one step leave a dip without a change of sign: every dip is followed
-to its bottom. Folds and contacts are refined by :mod:`flipflow.continuation.refinement`.
+to its bottom. Folds and contacts are refined by :mod:`flipflow.continuation.refinement`. Where
+another branch crosses, Newton's method fails; the loop's own points stand close enough there.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from flipflow.compiled.arrays import Real
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
 from flipflow.continuation.exact_check import ExactBeside, unconfirmed_note
 from flipflow.continuation.refinement import FOLD as OF_FOLD
-from flipflow.continuation.refinement import SHARE_TOLERANCE
+from flipflow.continuation.refinement import JUMP, SHARE_TOLERANCE
 from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
+from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.periodic.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
 
@@ -35,10 +37,10 @@ LOW = 1e-3  # that point lies below this share of the largest value along the br
 BOTTOM_STEPS = 15  # evaluations in the search for the bottom of a dip
 QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a step at which a suspected dip is looked for
 
-FOLD = "fold"
+FOLD, BRANCH_POINT = "fold", "branch point"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
 SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Neimark-Sacker"
-STABILITY_CHANGES = (FOLD, SYMMETRY, DOUBLING, NEIMARK_SACKER)
+STABILITY_CHANGES = (FOLD, BRANCH_POINT, SYMMETRY, DOUBLING, NEIMARK_SACKER)
 
 
 class Follower(Protocol):
@@ -91,6 +93,10 @@ def find_special_points(
     if isinstance(solver, BalanceSolver) and solver.confirmed:
         side = saddle_side(traced.tangent[:, -1], eigenvalues)
         return _confirmed(ExactBeside(solver, traced), found, notes, side)
+    if isinstance(solver, ExactSolver):
+        # The multipliers of a series cross +1 a little beside its folds.
+        found += _branch_points(solver, traced, eigenvalues)
+        found.sort(key=lambda one: (one.index, one.share))
     return found, notes
 
 
@@ -248,6 +254,30 @@ def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> tuple[int
     over = (first * last > 0.0) & ((ahead * first < 0.0) | (behind * last < 0.0))
     touches = (signature[1:-2] != 0) | (signature[2:-1] != 0)
     return tuple(int(p) + 1 for p in np.flatnonzero(over & touches))
+
+
+def _branch_points(
+    solver: Solver, traced: Traced, eigenvalues: NDArray[np.complex128]
+) -> list[Found]:
+    """Where an eigenvalue passes +1 and the branch does not turn: another branch crosses.
+
+    So it does where a machine is like itself in more ways than by its mirror image. The loop passes
+    such a point by a tiny step; of its two ends the one nearer to it is taken.
+    """
+    rises = traced.tangent[:, -1] / traced.course.omega_step
+    real = eigenvalues.imag == 0.0
+    side = np.prod(np.sign(eigenvalues.real - 1.0), axis=1, where=real) * np.sign(rises)
+    turns = (rises[1:] * rises[:-1] < 0.0) | (np.abs(rises[1:]) < JUMP)
+    # At a corner the map jumps.
+    smooth = traced.signature[1:] == traced.signature[:-1]
+    away = np.where(real, np.abs(eigenvalues - 1.0), np.inf).min(axis=1)
+    found = []
+    for p in map(int, np.flatnonzero((side[1:] * side[:-1] < 0.0) & ~turns & smooth)):
+        share = int(away[p + 1] < away[p])
+        u, omega = traced.u[p + share].copy(), float(traced.omega[p + share])
+        point = Point(solver.formulation, u, omega, float(rises[p + share]))
+        found.append(Found(BRANCH_POINT, p, float(share), point))
+    return found
 
 
 def _arc(traced: Traced) -> Real:
