@@ -365,20 +365,22 @@ def _carry_free(flow: Flow, slot: int, length: float, U: Real, work: Complex) ->
     modes = flow.modes
     size, columns = U.shape
     count = modes.mode_count[slot]
+    # Columns are innermost: they lie side by side in memory.
     for i in range(count):
         factor = modes.weight[slot, i] * exponential(modes.rate[slot, i] * length)
         for c in range(columns):
-            q = 0j
-            for k in range(size):
-                q += modes.left[slot, i, k] * U[k, c]
-            work[i, c] = factor * q
+            work[i, c] = 0.0
+        for k in range(size):
+            left = factor * modes.left[slot, i, k]
+            for c in range(columns):
+                work[i, c] += complex(left.real * U[k, c], left.imag * U[k, c])
     for k in range(size):
         for c in range(columns):
-            total = 0.0
-            for i in range(count):
-                v = modes.right[slot, k, i]
-                total += v.real * work[i, c].real - v.imag * work[i, c].imag
-            U[k, c] = total
+            U[k, c] = 0.0
+        for i in range(count):
+            v = modes.right[slot, k, i]
+            for c in range(columns):
+                U[k, c] += v.real * work[i, c].real - v.imag * work[i, c].imag
 
 
 @kernel(inline=True)
