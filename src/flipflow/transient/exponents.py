@@ -10,7 +10,6 @@ the mean alone wanders off as a random walk does.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -19,14 +18,17 @@ from flipflow.compiled.arrays import Real
 from flipflow.errors import IncompleteError
 from flipflow.model.monitor import Monitor
 from flipflow.periodic.exact_solver import ExactSolver
-from flipflow.transient.settling import RECENT, Settled, Settling
+from flipflow.transient.settling import (
+    CHAOTIC,
+    PERIODIC,
+    QUASI_PERIODIC,
+    RECENT,
+    UNDECIDED,
+    Settled,
+    Settling,
+    Word,
+)
 from flipflow.transient.tangent_growth import grow
-
-Word = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
-PERIODIC: Word = "periodic"
-QUASI_PERIODIC: Word = "quasi-periodic"
-CHAOTIC: Word = "chaotic"
-UNDECIDED: Word = "undecided"
 
 BATCHES = 32  # whose means tell the standard error
 CERTAIN = 4.0  # standard errors beyond which an exponent is not 0
