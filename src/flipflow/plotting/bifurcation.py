@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from flipflow.plotting.branches import field_axis
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Band, Panel, Trace
@@ -23,7 +21,9 @@ def bifurcation_figure(diagram: BifurcationDiagram) -> Figure:
         axis, scale = speed_axis(diagram.values), RPM
     else:
         axis, scale = field_axis(diagram.parameter, diagram.values)
-    bands = tuple(Band("x", low * scale, high * scale) for low, high in diagram.hysteresis)
+    bands = tuple(
+        Band("x", low * scale, high * scale, "contact minus") for low, high in diagram.hysteresis
+    )
     panels = []
     for row, which in enumerate(coordinates(diagram.system)):
         traces = []
@@ -37,9 +37,9 @@ def bifurcation_figure(diagram: BifurcationDiagram) -> Figure:
                 )  # fmt: skip
         panels.append(Panel(axis, Axis(label(which), "mm"), tuple(traces), bands=bands))
     caption = (
-        "Points: displacement whenever the unbalance points along +x, of the motion settled to, each "
-        "value reached from the one before. One point: the motion repeats after one turn; n points: "
-        "after n turns; many: it does not repeat. Shaded: the two directions meet different motions."
+        "Points: displacement whenever the unbalance points along +x, of the motion settled to, "
+        "each value reached from the one before. One point: the motion repeats after one turn; n "
+        "points: after n turns; many: it does not repeat. Shaded: the two directions meet "
+        "different motions."
     )
-    height = 40 + 260 * int(np.ceil(len(panels)))
-    return Figure("Bifurcation diagram", caption, tuple(panels), height=height)
+    return Figure("Bifurcation diagram", caption, tuple(panels), height=40 + 260 * len(panels))

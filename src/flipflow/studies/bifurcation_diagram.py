@@ -307,9 +307,7 @@ class _OverOmega(_Passing):
 class _OverField(_Passing):
     """A machine at one frequency with one value of a parameter after the other."""
 
-    def __init__(
-        self, parameter: Parameter, values: Real, omega: float, max_periods: int
-    ) -> None:
+    def __init__(self, parameter: Parameter, values: Real, omega: float, max_periods: int) -> None:
         super().__init__(parameter.name, values, omega)
         self.parameter, self.speed, self.max_periods = parameter, omega, max_periods
         for value in values.tolist():  # what it cannot have is told before anything is run
@@ -381,4 +379,3 @@ def _points(step: Step, row: Settled, points: int) -> Real:
         return step.settling.solver.section(row.state, step.omega, points)
     except IncompleteError:
         return row.recent.copy()
-

@@ -80,8 +80,8 @@ def lyapunov_exponents(
 ) -> LyapunovExponents:
     r"""Lyapunov exponents of the motion that a machine comes to, and what that motion is.
 
-    A frame of 2 N tangents is carried along the exact flow, saltation at every contact included, and
-    made orthonormal by a QR decomposition at least once a forcing period T (Benettin et al.,
+    A frame of 2 N tangents is carried along the exact flow, saltation at every contact included,
+    and made orthonormal by a QR decomposition at least once a forcing period T (Benettin et al.,
     Meccanica 15 (1980) 9-20):
 
     .. math:: \lambda_i = \frac{1}{P T} \sum_{p=1}^{P} \ln R_{ii}^{(p)} .
@@ -92,10 +92,11 @@ def lyapunov_exponents(
 
     The motion is called
 
-    - "periodic" where it repeats after up to 12 periods, or where the largest exponent lies more than
-      four standard errors below 0: it comes to a motion that repeats, if after more periods;
-    - "quasi-periodic" where the growth of the leading tangent keeps within bounds: over the whole run
-      it ranges no more than twice as far as over a sixteenth of it;
+    - "periodic" where it repeats after up to 12 periods, or where the largest exponent lies more
+      than four standard errors below 0, or where it has come closer by half to a stable periodic
+      motion: it comes to a motion that repeats, if later or after more periods;
+    - "quasi-periodic" where the growth of the leading tangent keeps within bounds: over the whole
+      run it ranges no more than twice as far as over a sixteenth of it;
     - "chaotic" where the largest exponent lies more than four standard errors above 0;
     - "undecided" otherwise: ask for more periods.
 
@@ -135,9 +136,7 @@ def lyapunov_exponents(
     say = checked_monitor(monitor)
     system = system_of(machine)
     settling = Settling(system, MAX_PERIODS)
-    found = grown(
-        settling.solver, initial_state(system.size, initial), speed, periods, skip, say
-    )
+    found = grown(settling.solver, initial_state(system.size, initial), speed, periods, skip, say)
     order = np.argsort(-found.exponents, kind="stable")
     # The flow knows only springs that can open and close.
     share = np.array([1.0 if spring.bonded else 0.0 for spring in system.springs])

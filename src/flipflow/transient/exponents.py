@@ -18,6 +18,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.errors import IncompleteError
 from flipflow.model.monitor import Monitor
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.solver import Point
 from flipflow.transient.settling import (
     CHAOTIC,
     PERIODIC,
@@ -51,14 +52,15 @@ class Growth:
         Logarithm of the growth in each forcing period, (P, 2 N), the leading direction first.
     contact_share
         Share of the time for which each spring carried a force, (m,).
-    recent
-        States after the last periods, (up to 64, 2 N).
+    first, recent
+        State at the beginning, (2 N,), and those after the last periods, (up to 64, 2 N).
     omega
         Frequency in rad/s.
     """
 
     growth: Real
     contact_share: Real
+    first: Real
     recent: Real
     omega: float
 
@@ -82,14 +84,17 @@ class Growth:
         """What the motion is."""
         if self._repeats(settling):
             return PERIODIC
-        if self._within_bounds():
-            # Close to a periodic motion that spirals in slowly growth seems to stay within bounds.
-            near = settling.approached(self.recent, self.omega)
-            return QUASI_PERIODIC if near is None else UNDECIDED
         largest, error = self.exponents[0], CERTAIN * self.standard_error[0]
-        if largest > error:
+        bounded = self._within_bounds()
+        if largest > error and not bounded:
             return CHAOTIC
-        return PERIODIC if largest < -error else UNDECIDED
+        near = settling.approached(self.recent, self.omega)
+        # Growth seems to stay within bounds, too, where a periodic motion is come to slowly.
+        if bounded and near is None:
+            return QUASI_PERIODIC
+        if largest < -error or (near is not None and self._comes_closer(settling, near)):
+            return PERIODIC
+        return UNDECIDED
 
     def _repeats(self, settling: Settling) -> bool:
         """Whether the last states repeat after a number of periods that is looked for."""
@@ -100,6 +105,14 @@ class Growth:
             settling.distance(recent[count:], recent[:-count], self.omega) <= same
             for count in counts
         )
+
+    def _comes_closer(self, settling: Settling, near: Point) -> bool:
+        """Whether the way to a periodic motion has at least halved."""
+        first, last = (
+            min(settling.distance(z, phase, self.omega) for phase in settling.phases(near))
+            for z in (self.first, self.recent[-1])
+        )
+        return last < 0.5 * first
 
     def _within_bounds(self) -> bool:
         """Whether the leading growth keeps within the bounds that a short stretch of it shows."""
@@ -124,13 +137,14 @@ def grown(
         for part in np.array_split(np.arange(skip), BATCHES):
             frame.carry(part.size)
             monitor("transient", 0.0)
+    first = frame.z.copy()
     frame.touched[:] = 0.0
     batches = []
     for k, size in enumerate(sizes, 1):
         batches.append(frame.carry(size))
         monitor(f"{sum(sizes[:k])} forcing periods of {periods}", k / BATCHES)
     duration = periods * 2.0 * np.pi / omega
-    return Growth(np.concatenate(batches), frame.touched / duration, frame.recent, omega)
+    return Growth(np.concatenate(batches), frame.touched / duration, first, frame.recent, omega)
 
 
 def with_word(settling: Settling, row: Settled, omega: float) -> Settled:

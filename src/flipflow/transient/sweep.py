@@ -176,8 +176,9 @@ def sweep(
     The speed changes when the unbalance points along +x. At each frequency the exact flow runs
     until the periodic motion it approaches is closer than 1e-9 of the motion's size. That motion
     is solved for, so that lingering just past a fold is not taken for settling; its leading
-    multiplier says how many turns are still to go. Where none is approached, Lyapunov exponents over
-    2048 further periods tell what the motion is, as in :func:`~flipflow.lyapunov_exponents`.
+    multiplier says how many turns are still to go. Where none is approached, Lyapunov exponents
+    over 2048 further periods tell what the motion is, as in
+    :func:`~flipflow.lyapunov_exponents`.
 
     Parameters
     ----------
