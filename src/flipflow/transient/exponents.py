@@ -148,11 +148,9 @@ def grown(
 
 
 def with_word(settling: Settling, row: Settled, omega: float) -> Settled:
-    """A row with the word for its motion; only one that repeats after no few periods costs time."""
+    """A row with the word for its motion; only one that has not settled costs time."""
     if row.settled:
         return replace(row, word=PERIODIC)
-    if row.point is not None:
-        return row  # a periodic motion is near, but it takes more turns to come to it
     try:
         found = grown(settling.solver, row.state, omega, PERIODS, ALIGNING, lambda *_: None)
     except IncompleteError:
