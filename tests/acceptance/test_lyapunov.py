@@ -220,6 +220,12 @@ def test_sweeps_and_sections_say_what_moves(chain, screen):
     assert ff.poincare_section(chain, 0.612, 20).word == "chaotic"
 
 
+def test_the_figure_of_a_sweep_says_what_moves(chain):
+    drawn = ff.figure(ff.sweep(chain, [0.612, 0.635], most_turns=500))
+    names = [trace.name for trace in drawn.panels[0].traces]
+    assert names == ["speed rising, chaotic", "speed rising"]
+
+
 def test_a_motion_that_settles_too_slowly_is_periodic_all_the_same(chain):
     """Just below the period doubling the multiplier is close to -1: 4000 turns are not enough."""
     near = DOUBLING - 3e-5
