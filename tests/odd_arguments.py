@@ -38,8 +38,10 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins, GridAxis
+from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
+from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
@@ -236,6 +238,10 @@ def functions() -> tuple[Call, ...]:
              {"machine": tiny(), "omega": OMEGA, "displacement": {"main": [0.0, 1e-3]},
               "velocity": {"main": 0.0}, "most_turns": 50, "rng": 0, "threads": 1,
               "monitor": None}, (Basins,)),
+        Call("bifurcation_diagram", ff.bifurcation_diagram,
+             {"machine": tiny(), "parameter": "omega", "values": [99.0, OMEGA], "omega": None,
+              "initial": "rest", "points": 3, "max_periods": 1, "most_turns": 50,
+              "monitor": None}, (BifurcationDiagram,)),
         Call("coast_down", ff.coast_down,
              {"machine": tiny(), "speed": OMEGA, "drive": profile(), "duration": 0.1,
               "method": None, "monitor": None}, (RunUp,)),
@@ -258,6 +264,9 @@ def functions() -> tuple[Call, ...]:
              (ff.Project,)),
         Call("loading", ff.loading,
              {"screen": plain(), "load": ff.Load(stiffness_factor=1.1), **near}, (Loading,), whole),
+        Call("lyapunov_exponents", ff.lyapunov_exponents,
+             {"machine": tiny(), "omega": OMEGA, "initial": "rest", "periods": 32, "skip": 2,
+              "monitor": None}, (LyapunovExponents,)),
         Call("open_result", ff.open_result, {"path": folder() / "kept.json"}, (Orbit,)),
         Call("operating_region", ff.operating_region,
              {"screen": plain(), "limits": ff.Limits(), "load_cases": [ff.Load()],
@@ -354,6 +363,7 @@ def methods() -> tuple[Call, ...]:
     which = {"which": "main"}
     response = ff.linear_response(tiny(), OMEGA)
     sweep = ff.sweep(tiny(), [OMEGA], most_turns=50)
+    diagram = ff.bifurcation_diagram(tiny(), "omega", [OMEGA], most_turns=50)
     section = ff.poincare_section(tiny(), OMEGA, 2, skip=0)
     basins = ff.basins(tiny(), OMEGA, {"main": [0.0]}, most_turns=50)
     ramp = ff.ramp(tiny(), (95.0, 105.0), 100.0)
@@ -390,6 +400,7 @@ def methods() -> tuple[Call, ...]:
         (history(), "stop_force", {"spring": 0}, array),
         (sweep, "amplitude", which, array),
         (sweep, "extremes", which, (tuple,)),
+        (diagram, "points", {"which": "main", "direction": "up"}, (tuple,)),
         (ramp, "amplitude", which, (tuple,)),
         *((section, name, which, array) for name in ("displacement", "velocity")),
         *((response, name, which, array) for name in ("amplitude", "phase")),

@@ -33,6 +33,8 @@ _HOME = {
     "ramp": "flipflow.studies.ramp",
     "poincare_section": "flipflow.studies.poincare",
     "spectrum": "flipflow.studies.poincare",
+    "lyapunov_exponents": "flipflow.studies.lyapunov",
+    "bifurcation_diagram": "flipflow.studies.bifurcation_diagram",
     "sensitivity": "flipflow.studies.sensitivity",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
@@ -99,8 +101,10 @@ if TYPE_CHECKING:
     from flipflow.plotting.dispatch import figure as figure
     from flipflow.studies.assessment import assess as assess
     from flipflow.studies.basins import basins as basins
+    from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
     from flipflow.studies.jump_risk import jump_risk as jump_risk
     from flipflow.studies.loading import loading as loading
+    from flipflow.studies.lyapunov import lyapunov_exponents as lyapunov_exponents
     from flipflow.studies.operating_region import operating_region as operating_region
     from flipflow.studies.periodic_orbits import periodic_orbits as periodic_orbits
     from flipflow.studies.poincare import poincare_section as poincare_section

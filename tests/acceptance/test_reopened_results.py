@@ -27,8 +27,10 @@ from flipflow.periodic.solver import Point, Traced
 from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
+from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
@@ -107,6 +109,15 @@ MADE: dict[type, list[Callable[[], object]]] = {
     ],
     Ramp: [lambda: ff.ramp(screen(), (204.0, 208.0), 8.0)],
     Section: [lambda: ff.poincare_section(chain(), 0.8, 7, skip=3)],
+    LyapunovExponents: [
+        lambda: ff.lyapunov_exponents(screen(), 120.0, periods=64, skip=10),
+        lambda: ff.lyapunov_exponents(chain(), 0.8, periods=64, skip=0),
+    ],
+    BifurcationDiagram: [
+        lambda: ff.bifurcation_diagram(screen(), "omega", [198.0, 203.0, 207.0]),
+        lambda: ff.bifurcation_diagram(screen(), "clearance", [5e-3, 6e-3], omega=203.0),
+        lambda: ff.bifurcation_diagram(chain(), "forcing", [1.0, 1.1], omega=0.8, most_turns=3),
+    ],
     Spectrum: [lambda: ff.spectrum(response().orbit(0), "relative")],
     LinearResponse: [lambda: ff.linear_response(screen(), [10.0, 20.0])],
     OperatingRegion: [

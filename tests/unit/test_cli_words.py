@@ -37,7 +37,7 @@ def test_the_list_of_commands_is_cut_off_nowhere(command):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("orbits", "ffs0827", "--max-periods", "7"), f"from 1 to {MOST_PERIODS}"),
+        (("orbits", "ffs0827", "--max-periods", "13"), f"from 1 to {MOST_PERIODS}"),
         (("sensitivity", "ffs0827", "--n", "1e9"), f"from 2 to {N_MOST}"),
         (("analyze", "ffs0827", "--harmonics", "two"), "from 1 to 200"),
         (("startup", "ffs0827", "--duration", "-1 s"), f"up to {MOST_SECONDS:.0f} s"),

@@ -21,7 +21,7 @@ def orbits(
     file: File,
     speed: Speed = None,
     max_periods: Annotated[
-        int, whole("--max-periods", "N", 1, 6, "Turns after which one may repeat.")
+        int, whole("--max-periods", "N", 1, 12, "Turns after which one may repeat.")
     ] = 6,
     output: Output = None,
     json: Json = None,

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from flipflow.transient.sweep import Sweep
 
 LONGEST_GLIDE = 600.0  # s
+SEEN = {
+    "periodic": "periodic, of more turns or settling later",
+    "quasi-periodic": "quasi-periodic",
+    "chaotic": "chaotic",
+    "undecided": "undecided",
+}
 
 
 @dataclass(frozen=True)
@@ -219,7 +225,12 @@ def _show_sweep(word: str, swept: Sweep, steps: int, out: Console) -> None:
         out.print(f"  stopped after {swept.omega.size} of {steps} speeds")
     lingering = int((~swept.settled).sum())
     if lingering:
-        out.print(f"  {lingering} speeds without a periodic motion of up to 6 turns")
+        out.print(
+            f"  {lingering} speeds without a periodic motion of up to {swept.max_periods} turns"
+        )
+        words = [word for word, row in zip(swept.words, swept.settled, strict=True) if not row]
+        for seen in sorted(set(words)):
+            out.print(f"    {words.count(seen)} {SEEN[seen]}")
     several = sorted({int(n) for n in swept.periods if n > 1})
     if several:
         out.print(f"  motions that repeat after {', '.join(map(str, several))} turns")

@@ -22,9 +22,11 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.results.store import json_text, write_file
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.documents import CODEC
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
+from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
@@ -48,6 +50,8 @@ SCHEMAS: dict[type, str] = {
     Ramp: "flipflow/ramp/1",
     Section: "flipflow/section/1",
     Spectrum: "flipflow/spectrum/1",
+    LyapunovExponents: "flipflow/lyapunov-exponents/1",
+    BifurcationDiagram: "flipflow/bifurcation-diagram/1",
     LinearResponse: "flipflow/linear-response/1",
     OperatingRegion: "flipflow/operating-region/1",
     Loading: "flipflow/loading/1",

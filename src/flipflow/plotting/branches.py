@@ -96,11 +96,9 @@ def field_branch_figure(branch: FieldBranch) -> Figure:
     """Relative amplitude over a field; of a curve of folds the jump speed, too."""
     if not branch.orbits:
         raise InputError("result", "a branch without points", branch.status.value)
-    field, words = FIELD.get(branch.field), branch.field.replace("_", " ")
-    # Lengths are read in mm; every other field is drawn in SI, that of another machine as it is.
-    scale, unit = (MM, "mm") if field and field.unit == "m" else (1.0, field.unit if field else "")
+    words = branch.field.replace("_", " ")
+    axis, scale = field_axis(branch.field, branch.values)
     x = branch.values * scale
-    axis = Axis(f"{words} ({field.symbol})" if field else words, unit, _with_margin(x))
     named = "relative" in branch.machine.system().coordinates
     which: Coordinate = "relative" if named else 0
     amplitude = branch.amplitude(which)
@@ -128,6 +126,17 @@ def field_branch_figure(branch: FieldBranch) -> Figure:
         panels.append(Panel(axis, Axis("shaft speed", "rpm"), traces=(speed,)))
     caption = f"Half the peak-to-peak motion as {words} is changed."
     return Figure(f"Motions over {words}", caption, tuple(panels))
+
+
+def field_axis(name: str, values: Real) -> tuple[Axis, float]:
+    """Axis of a field over all of its values, and the factor from SI to its unit.
+
+    Lengths are read in mm; every other field is drawn in SI, that of another machine as it is.
+    """
+    field, words = FIELD.get(name), name.replace("_", " ")
+    scale, unit = (MM, "mm") if field and field.unit == "m" else (1.0, field.unit if field else "")
+    label = f"{words} ({field.symbol})" if field else words
+    return Axis(label, unit, _with_margin(values * scale)), scale
 
 
 def _with_margin(x: Real) -> tuple[float, float]:

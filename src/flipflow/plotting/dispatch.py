@@ -12,11 +12,13 @@ from flipflow.errors import InputError
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
+from flipflow.plotting.bifurcation import bifurcation_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.history import history_figure
 from flipflow.plotting.loading import loading_figure
+from flipflow.plotting.lyapunov import lyapunov_figure
 from flipflow.plotting.motion import orbit_figure
 from flipflow.plotting.response import branch_figure, cases_figure, linear_figure
 from flipflow.plotting.section import section_figure, spectrum_figure
@@ -25,7 +27,9 @@ from flipflow.plotting.sweep import sweep_figure
 from flipflow.plotting.transient import run_up_figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.loading import Loading
+from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.response_family import ResponseFamily
@@ -144,3 +148,13 @@ def _(result: Section) -> Figure:
 @_figure.register
 def _(result: Spectrum) -> Figure:
     return spectrum_figure(result)
+
+
+@_figure.register
+def _(result: LyapunovExponents) -> Figure:
+    return lyapunov_figure(result)
+
+
+@_figure.register
+def _(result: BifurcationDiagram) -> Figure:
+    return bifurcation_figure(result)

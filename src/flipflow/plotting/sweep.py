@@ -19,6 +19,12 @@ from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.transient.sweep import Sweep
 
 SYMBOLS = ("circle-open", "square-open", "cross", "diamond", "triangle")
+NOT_SETTLED = {
+    "periodic": "not settled, periodic",
+    "quasi-periodic": "quasi-periodic",
+    "chaotic": "chaotic",
+    "undecided": "not settled",
+}
 Real = NDArray[np.float64]
 
 
@@ -67,16 +73,19 @@ def sweep_figure(
 
 
 def _swept(sweep: Sweep, which: Coordinate, k: int) -> Iterator[Trace]:
-    """One cloud of points for each period met."""
+    """One cloud of points for each period met, and for each word of what has not settled."""
     way = "rising" if sweep.omega[-1] >= sweep.omega[0] else "falling"
     periods = sweep.periods
     amplitude = sweep.amplitude(which) * MM
-    for count in np.unique(periods):
-        rows = periods == count
-        word = {0: "not periodic", 1: ""}.get(int(count), f"{count} periods")
+    words = [
+        NOT_SETTLED[word] if count == 0 else "" if count == 1 else f"{count} periods"
+        for count, word in zip(periods.tolist(), sweep.words, strict=True)
+    ]
+    for count, word in sorted(set(zip(periods.tolist(), words, strict=True))):
+        rows = np.array([one == word for one in words])
         omega = sweep.omega[rows]
         yield Trace(
             f"speed {way}" + (f", {word}" if word else ""), omega * RPM, amplitude[rows], "point",
-            case_colour(k), symbol=SYMBOLS[(2 * (k - 1) + max(int(count) - 1, 0)) % len(SYMBOLS)],
+            case_colour(k), symbol=SYMBOLS[(2 * (k - 1) + max(count - 1, 0)) % len(SYMBOLS)],
             x_also=(("Hz", omega * HZ), ("rad/s", omega)),
         )  # fmt: skip

@@ -151,7 +151,7 @@ def basins(
 
     Every state is run by the exact flow, turn after turn, until it enters a neighbourhood of a
     stable motion from which nothing leaves (see :doc:`/methods/basins`). States that settle on none
-    of the motions known beforehand are searched for further ones, of up to six forcing periods.
+    of the motions known beforehand are searched for further ones, of up to twelve forcing periods.
 
     Parameters
     ----------

@@ -46,7 +46,8 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.results.codec import Codec, Form, array, plain
 from flipflow.studies.sensitivity import Sensitivity
-from flipflow.transient.settling import Settled
+from flipflow.transient.settling import PERIODIC, UNDECIDED, Settled
+from flipflow.transient.settling import Word as Moving
 from flipflow.transient.sweep import Jump, Sweep
 
 Document = Mapping[str, Any]
@@ -278,6 +279,7 @@ def sweep_document(sweep: Sweep) -> dict[str, Any]:
         "periods": plain(sweep.periods),
         "distance": plain(sweep.distance),
         "complete": sweep.complete,
+        "words": list(sweep.words),
         "states": [plain(row.recent) for row in sweep.rows],
         "points": [None if point is None else POINT.write(point) for point in points],
         **SWEEP.write(sweep),
@@ -290,12 +292,15 @@ def sweep_from(document: Document) -> Sweep:
     motions = Motions(read["machine"], PiecewiseExact())
     columns = [document[name] for name in ("omega", "states", "points", "distance")]
     columns += [read.pop("turns").tolist(), read.pop("settled").tolist()]
+    # Files of the time when a sweep said no word for what does not settle have none.
+    known = [PERIODIC if settled else UNDECIDED for settled in columns[-1]]
+    columns.append(CODEC.form(tuple[Moving, ...]).read(document.get("words", known)))
     rows = []
-    for _, states, one, distance, turns, settled in zip(*columns, strict=True):
+    for _, states, one, distance, turns, settled, word in zip(*columns, strict=True):
         recent = array(states).reshape(-1, motions.states)
         point = None if one is None else motions.point(one, Point)
         away = np.inf if point is None else CODEC.form(float).read(distance)
-        rows.append(Settled(recent[-1].copy(), turns, point, away, settled, recent))
+        rows.append(Settled(recent[-1].copy(), turns, point, away, settled, recent, word))
     checked_speeds(read["omega"])
     complete = CODEC.form(bool).read(document.get("complete", True))
     formulation = motions.solver(half_turn=False, turns=1).formulation

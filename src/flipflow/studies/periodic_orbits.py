@@ -31,7 +31,7 @@ from flipflow.periodic.two_event import TwoEventProblem
 from flipflow.studies.independent_parts import IndependentPart, independent_parts, joined_state
 from flipflow.transient.settling import Settling
 
-MOST_PERIODS = 6  # longest period that may be looked for, in forcing periods
+MOST_PERIODS = 12  # longest period that may be looked for, in forcing periods
 SWEEP_RATIO = 1.3  # speed at which a stepped start begins, over the one asked for or under it
 SWEEP_STEPS = 12  # speeds on the way
 BRANCH_RATIOS = (1.15, 2.5)  # ends of the branch from below over the speed asked for, and under it
@@ -70,7 +70,7 @@ def periodic_orbits(
     omega
         Forcing frequency in rad/s.
     max_periods
-        Most forcing periods after which a motion may repeat, 1 to 6.
+        Most forcing periods after which a motion may repeat, 1 to 12.
     rng
         Seed or generator for the cloud of starts.
     monitor
@@ -86,7 +86,7 @@ def periodic_orbits(
     Raises
     ------
     InputError
-        For a frequency that is not finite or not above 0, periods outside 1 to 6, or no seed.
+        For a frequency that is not finite or not above 0, periods outside 1 to 12, or no seed.
     IncompleteError
         When no start at all could be followed.
     """

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_kind, checked_speed
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
-from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.transient.exponents import with_word
 from flipflow.transient.history import History
+from flipflow.transient.settling import MAX_PERIODS, UNDECIDED, Settling, Word
 
 Real = NDArray[np.float64]
 
@@ -30,14 +31,22 @@ class Section:
         Forcing frequency in rad/s.
     states
         (x, x') in m and m/s, one row a period, (T, 2 N).
+    periods
+        Forcing periods after which the motion repeats once it has settled; 0 where it does not
+        within 12.
+    word
+        What the motion is once it has settled: "periodic", "quasi-periodic", "chaotic", or
+        "undecided". Sections of files that earlier versions wrote have 0 periods and are undecided.
     """
 
     system: MechanicalSystem
     omega: float
     states: Real
+    periods: int = 0
+    word: Word = UNDECIDED
 
     def __repr__(self) -> str:
-        return f"Section({self.states.shape[0]} turns at {self.omega:.6g} rad/s)"
+        return f"Section({self.states.shape[0]} turns at {self.omega:.6g} rad/s, {self.word})"
 
     def displacement(self, which: Coordinate) -> Real:
         """Displacement of a coordinate in m, (T,)."""
@@ -75,6 +84,7 @@ class Spectrum:
 
 
 MOST_TURNS = 10_000_000  # forcing periods that may be asked for
+WAITED = 1024  # turns after the last point, in which the motion may still settle
 SAMPLES_A_TURN = 512  # times in each forcing period of an orbit whose spectrum is taken
 UNEVEN = 1e-9  # difference of two steps in time, over the whole time, that is rounding
 
@@ -89,7 +99,9 @@ def poincare_section(
 ) -> Section:
     """States of a motion at the beginning of each forcing period, by the exact flow.
 
-    A periodic motion of n periods shows n points, a quasi-periodic one closed curves.
+    A periodic motion of n periods shows n points, a quasi-periodic one closed curves. The motion is
+    run on from the last point until it settles, at most 1024 turns; where it does not, Lyapunov
+    exponents tell what it is, as in :func:`~flipflow.lyapunov_exponents`.
 
     Parameters
     ----------
@@ -114,11 +126,15 @@ def poincare_section(
     speed = checked_speed(omega)
     turns = checked_count("turns", turns, MOST_TURNS)
     skip = checked_count("skip", skip, MOST_TURNS, least=0)
-    solver = ExactSolver(system_of(machine), half_turn=False)
+    settling = Settling(system_of(machine), MAX_PERIODS)
+    solver = settling.solver
     z = initial_state(solver.system, initial)
     if skip:
         z = solver.section(z, speed, skip)[-1]
-    return Section(solver.system, speed, solver.section(z, speed, turns))
+    states = solver.section(z, speed, turns)
+    end = with_word(settling, settling.settle(states[-1], speed, WAITED), speed)
+    periods = end.point.formulation.turns if end.point is not None and end.settled else 0
+    return Section(solver.system, speed, states, periods, end.word)
 
 
 def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = None) -> Spectrum:

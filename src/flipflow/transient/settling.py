@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,13 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE, Point
 from flipflow.periodic.stability import STABLE, stability_words
 
+Word = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
+PERIODIC: Word = "periodic"
+QUASI_PERIODIC: Word = "quasi-periodic"
+CHAOTIC: Word = "chaotic"
+UNDECIDED: Word = "undecided"
+
+MAX_PERIODS = 12  # longest period looked for, in forcing periods, unless told otherwise
 MOST_TURNS = 4000  # forcing periods waited unless told otherwise
 TOLERANCE = 1e-9  # distance from the periodic motion, relative to it, within which it has settled
 FIRST_CHUNK = 16  # turns; twice as many are run before anything is looked at
@@ -51,6 +59,8 @@ class Settled:
         Whether the distance is below the tolerance.
     recent
         States of the last turns, (up to 64, 2 N).
+    word
+        What the motion is: "periodic", "quasi-periodic", "chaotic", or "undecided".
     """
 
     state: Real
@@ -59,6 +69,7 @@ class Settled:
     distance: float
     settled: bool
     recent: Real
+    word: Word = UNDECIDED
 
 
 class Settling:

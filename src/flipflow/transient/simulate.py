@@ -27,8 +27,7 @@ from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.transient.history import ContactChange, History
 from flipflow.transient.recording import Recording
-from flipflow.transient.settling import Settling
-from flipflow.transient.sweep import MAX_PERIODS
+from flipflow.transient.settling import MAX_PERIODS, Settling
 
 Real = NDArray[np.float64]
 SAMPLES_A_TURN = 128  # default times in each forcing period

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +16,10 @@ from flipflow.model.arguments import checked_count, checked_monitor, checked_spe
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
-from flipflow.periodic.solver import Formulation
+from flipflow.periodic.solver import Formulation, Point
 from flipflow.results.frozen import Frozen
-from flipflow.transient.settling import MOST_TURNS, Settled, Settling
+from flipflow.transient.exponents import with_word
+from flipflow.transient.settling import MAX_PERIODS, MOST_TURNS, Settled, Settling, Word
 
 Real = NDArray[np.float64]
 
@@ -103,6 +105,16 @@ class Sweep(Frozen):
         )  # fmt: skip
 
     @property
+    def words(self) -> tuple[Word, ...]:
+        """What the motion at each step is.
+
+        "periodic", "quasi-periodic", "chaotic", or "undecided" where no time was left to tell. A
+        motion that has not settled may be periodic all the same, with more periods than were looked
+        for, or later.
+        """
+        return tuple(row.word for row in self.rows)
+
+    @property
     def turns(self) -> NDArray[np.int64]:
         """Forcing periods waited at each step."""
         return np.array([row.turns for row in self.rows])
@@ -147,7 +159,6 @@ class Sweep(Frozen):
         return {}
 
 
-MAX_PERIODS = 6  # longest period looked for, in forcing periods, unless told otherwise
 JUMP_SHARE = 0.05  # distance, relative to the motion, beyond which it is another one: a jump
 
 
@@ -165,7 +176,9 @@ def sweep(
     The speed changes when the unbalance points along +x. At each frequency the exact flow runs
     until the periodic motion it approaches is closer than 1e-9 of the motion's size. That motion
     is solved for, so that lingering just past a fold is not taken for settling; its leading
-    multiplier says how many turns are still to go.
+    multiplier says how many turns are still to go. Where none is approached, Lyapunov exponents
+    over 2048 further periods tell what the motion is, as in
+    :func:`~flipflow.lyapunov_exponents`.
 
     Parameters
     ----------
@@ -176,7 +189,7 @@ def sweep(
     initial
         "rest", an :class:`~flipflow.periodic.orbit.Orbit`, or a state (x, x'), (2 N,).
     max_periods
-        Longest period looked for, in forcing periods.
+        Longest period looked for, in forcing periods, 1 to 12.
     most_turns
         Most forcing periods waited at a step; what has not settled then is marked so.
     monitor
@@ -187,7 +200,7 @@ def sweep(
     Returns
     -------
     Sweep
-        Settled amplitudes, periods, jumps.
+        Settled amplitudes, periods, words, jumps.
 
     Raises
     ------
@@ -196,28 +209,67 @@ def sweep(
         or a machine without damping, which never settles.
     """
     speeds = checked_speeds(omega)
-    max_periods = checked_count("max_periods", max_periods, 12)
+    max_periods = checked_count("max_periods", max_periods, MAX_PERIODS)
     most_turns = checked_count("most_turns", most_turns, 10_000_000)
     say = checked_monitor(monitor)
     settling = Settling(system_of(machine), max_periods)
     z = initial_state(settling.solver.system, initial)
+    steps = (
+        Step(settling, speed, partial(settling.continued, omega=speed)) for speed in speeds.tolist()
+    )
+
+    def tell(done: int) -> None:
+        say(f"settled at {speeds[done - 1]:.4g} rad/s", done / speeds.size)
+
+    rows, jumped = step_by_step(steps, z, most_turns, tell)
+    jumps = tuple(Jump(k, float(speeds[k - 1]), float(speeds[k])) for k in jumped)
+    done = len(rows)
+    return Sweep(
+        machine, speeds[:done], tuple(rows), jumps, max_periods, most_turns,
+        settling.solver.formulation, __version__, complete=done == speeds.size,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where a machine settles next.
+
+    Parameters
+    ----------
+    settling
+        Runs the machine as it is at this step.
+    omega
+        Frequency in rad/s.
+    continued
+        The motion of the step before followed along its branch to this one; None where it ends.
+    """
+
+    settling: Settling
+    omega: float
+    continued: Callable[[Point], Point | None]
+
+
+def step_by_step(
+    steps: Iterable[Step], z: Real, most_turns: int, tell: Callable[[int], None]
+) -> tuple[list[Settled], list[int]]:
+    """Settle at one step after the other, each from where the one before ended.
+
+    Returns the rows, and the indices of those in which another motion is met. ``tell`` is called
+    with the number of rows that are finished; when it raises Cancelled, these are returned.
+    """
     rows: list[Settled] = []
-    jumps: list[Jump] = []
-    for k, speed in enumerate(speeds):
-        row = settling.settle(z, float(speed), most_turns)
-        if rows and _jumped(settling, rows[-1], row, float(speed)):
-            jumps.append(Jump(k, float(speeds[k - 1]), float(speed)))
+    jumps: list[int] = []
+    for step in steps:
+        row = with_word(step.settling, step.settling.settle(z, step.omega, most_turns), step.omega)
+        if rows and _jumped(step, rows[-1], row):
+            jumps.append(len(rows))
         rows.append(_kept(row))
         z = row.state
         try:
-            say(f"settled at {speed:.4g} rad/s", (k + 1) / speeds.size)
+            tell(len(rows))
         except Cancelled:
             break
-    done = len(rows)
-    return Sweep(
-        machine, speeds[:done], tuple(rows), tuple(jumps), max_periods, most_turns,
-        settling.solver.formulation, __version__, complete=done == speeds.size,
-    )  # fmt: skip
+    return rows, jumps
 
 
 def _kept(row: Settled) -> Settled:
@@ -227,11 +279,11 @@ def _kept(row: Settled) -> Settled:
     return replace(row, recent=row.recent[-row.point.formulation.turns :])
 
 
-def _jumped(settling: Settling, before: Settled, after: Settled, omega: float) -> bool:
+def _jumped(step: Step, before: Settled, after: Settled) -> bool:
     """Whether the motion before cannot be followed to the motion after, or lies far from it."""
     if before.point is None or after.point is None:
         return (before.point is None) != (after.point is None)
-    followed = settling.continued(before.point, omega)
+    followed, settling, omega = step.continued(before.point), step.settling, step.omega
     if followed is None:
         return True
     share = JUMP_SHARE * settling.size(after.recent, omega)

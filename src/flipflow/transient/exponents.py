@@ -1,0 +1,193 @@
+"""What moves, in words: whether a motion repeats, winds on a torus or is chaotic.
+
+The growth of small disturbances is followed over many forcing periods. Its mean rates are the
+Lyapunov exponents; means over batches of periods tell their standard errors. The largest exponent
+of a chaotic motion lies above 0, that of one that ends in a periodic motion below 0. Of a
+quasi-periodic motion it is 0, and more: its growth stays within bounds, while growth that is 0 in
+the mean alone wanders off as a random walk does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
+from flipflow.errors import IncompleteError
+from flipflow.model.monitor import Monitor
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.solver import Point
+from flipflow.transient.settling import (
+    CHAOTIC,
+    PERIODIC,
+    QUASI_PERIODIC,
+    RECENT,
+    UNDECIDED,
+    Settled,
+    Settling,
+    Word,
+)
+from flipflow.transient.tangent_growth import grow
+
+BATCHES = 32  # whose means tell the standard error
+CERTAIN = 4.0  # standard errors beyond which an exponent is not 0
+STRETCHES = 16  # of the growth, whose ranges tell whether it stays within bounds
+# A random walk's range over all of it is that over a sixteenth times 4, one within bounds times 1.
+WITHIN_BOUNDS = 2.0
+REPEATS = 1e-9  # distance of states, relative to the motion, within which it repeats
+PERIODS = 2048  # forcing periods followed for a word, after
+ALIGNING = 256  # those in which the frame turns into the directions that grow most
+MOST_PARTS = 4096  # times a period that the frame may have to be made orthonormal
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """How disturbances of one motion grow.
+
+    Parameters
+    ----------
+    growth
+        Logarithm of the growth in each forcing period, (P, 2 N), the leading direction first.
+    contact_share
+        Share of the time for which each spring carried a force, (m,).
+    first, recent
+        State at the beginning, (2 N,), and those after the last periods, (up to 64, 2 N).
+    omega
+        Frequency in rad/s.
+    """
+
+    growth: Real
+    contact_share: Real
+    first: Real
+    recent: Real
+    omega: float
+
+    @property
+    def batches(self) -> Real:
+        """Mean rates of growth in 1/s over each batch of periods, (32, 2 N)."""
+        turn = 2.0 * np.pi / self.omega
+        return np.array([part.mean(axis=0) / turn for part in np.array_split(self.growth, BATCHES)])
+
+    @property
+    def exponents(self) -> Real:
+        """Mean rates of growth in 1/s, (2 N,)."""
+        return np.asarray(self.growth.mean(axis=0) * self.omega / (2.0 * np.pi))
+
+    @property
+    def standard_error(self) -> Real:
+        """Standard errors of the exponents in 1/s, by batch means, (2 N,)."""
+        return np.asarray(self.batches.std(axis=0, ddof=1) / np.sqrt(BATCHES))
+
+    def word(self, settling: Settling) -> Word:
+        """What the motion is."""
+        if self._repeats(settling):
+            return PERIODIC
+        largest, error = self.exponents[0], CERTAIN * self.standard_error[0]
+        bounded = self._within_bounds()
+        if largest > error and not bounded:
+            return CHAOTIC
+        near = settling.approached(self.recent, self.omega)
+        # Growth seems to stay within bounds, too, where a periodic motion is come to slowly.
+        if bounded and near is None:
+            return QUASI_PERIODIC
+        if largest < -error or (near is not None and self._comes_closer(settling, near)):
+            return PERIODIC
+        return UNDECIDED
+
+    def _repeats(self, settling: Settling) -> bool:
+        """Whether the last states repeat after a number of periods that is looked for."""
+        recent = self.recent
+        same = REPEATS * (settling.size(recent, self.omega) + settling.solver.length)
+        counts = range(1, min(settling.max_periods, recent.shape[0] - 1) + 1)
+        return any(
+            settling.distance(recent[count:], recent[:-count], self.omega) <= same
+            for count in counts
+        )
+
+    def _comes_closer(self, settling: Settling, near: Point) -> bool:
+        """Whether the way to a periodic motion has at least halved."""
+        first, last = (
+            min(settling.distance(z, phase, self.omega) for phase in settling.phases(near))
+            for z in (self.first, self.recent[-1])
+        )
+        return last < 0.5 * first
+
+    def _within_bounds(self) -> bool:
+        """Whether the leading growth keeps within the bounds that a short stretch of it shows."""
+        total = np.cumsum(self.growth[:, 0])
+        ranges = [np.ptp(part) for part in np.array_split(total, STRETCHES)]
+        return bool(np.ptp(total) <= WITHIN_BOUNDS * np.mean(ranges))
+
+
+def grown(
+    solver: ExactSolver, z: Real, omega: float, periods: int, skip: int, monitor: Monitor
+) -> Growth:
+    """Follow disturbances of the motion from z over forcing periods, after ``skip`` of them.
+
+    Raises
+    ------
+    IncompleteError
+        When the flow over a turn does not end, or disturbances die out too fast to be told apart.
+    """
+    frame = _Frame(solver, z, omega)
+    sizes = [part.size for part in np.array_split(np.arange(periods), BATCHES)]
+    if skip:
+        for part in np.array_split(np.arange(skip), BATCHES):
+            frame.carry(part.size)
+            monitor("transient", 0.0)
+    first = frame.z.copy()
+    frame.touched[:] = 0.0
+    batches = []
+    for k, size in enumerate(sizes, 1):
+        batches.append(frame.carry(size))
+        monitor(f"{sum(sizes[:k])} forcing periods of {periods}", k / BATCHES)
+    duration = periods * 2.0 * np.pi / omega
+    return Growth(np.concatenate(batches), frame.touched / duration, first, frame.recent, omega)
+
+
+def with_word(settling: Settling, row: Settled, omega: float) -> Settled:
+    """A row with the word for its motion; only one that has not settled costs time."""
+    if row.settled:
+        return replace(row, word=PERIODIC)
+    try:
+        found = grown(settling.solver, row.state, omega, PERIODS, ALIGNING, lambda *_: None)
+    except IncompleteError:
+        return row
+    return replace(row, word=found.word(settling))
+
+
+class _Frame:
+    """A state and its frame of disturbances, carried on batch by batch."""
+
+    def __init__(self, solver: ExactSolver, z: Real, omega: float) -> None:
+        size = z.size
+        self.solver, self.omega, self.parts = solver, omega, 1
+        self.z = np.array(z, float)
+        self.frame = np.diag(np.repeat([1.0, omega], size // 2))
+        self.touched = np.zeros(len(solver.springs))
+        self.recent = self.z[None].copy()
+
+    def carry(self, periods: int) -> Real:
+        """Growth in each of some periods, (P, 2 N)."""
+        growth, states = np.empty((2, periods, self.z.size))
+        while True:
+            z, frame, touched = self.z.copy(), self.frame.copy(), self.touched.copy()
+            code = grow(
+                self.solver.machine, self.solver.shooting_work, self.omega, self.parts, z, frame,
+                growth, states, touched,
+            )  # fmt: skip
+            if code != status.SINGULAR or self.parts >= MOST_PARTS:
+                break
+            self.parts *= 2
+        if code == status.SINGULAR:
+            raise IncompleteError(
+                f"disturbances of the motion at {self.omega:.6g} rad/s die out too fast, or too "
+                "differently, within a forcing period to be told apart; give less damping"
+            )
+        if code != status.OK:
+            raise IncompleteError(f"the flow over one turn at {self.omega:.6g} rad/s did not end")
+        self.z, self.frame, self.touched = z, frame, touched
+        self.recent = np.concatenate([self.recent, states])[-RECENT:]
+        return growth
