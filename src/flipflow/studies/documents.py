@@ -31,7 +31,7 @@ from flipflow.model.arguments import (
 )
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring, HarmonicForce, Unbalance
-from flipflow.model.parameters import parameter_of
+from flipflow.model.parameters import parameter_of, value_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -44,7 +44,8 @@ from flipflow.periodic.options import (
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.results.codec import Codec, Form, array, plain
-from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.response_family import Member, ResponseFamily
+from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 from flipflow.transient.settling import Settled
 from flipflow.transient.sweep import Jump, Sweep
 
@@ -302,20 +303,51 @@ def sweep_from(document: Document) -> Sweep:
 
 
 def sensitivity_document(result: Sensitivity) -> dict[str, Any]:
-    """A sensitivity by its fields, some by other names."""
+    """A sensitivity by its fields, one by another name."""
     fields = CODEC.fields(Sensitivity).write(result)
-    named = {"machine": fields.pop("screen"), "vary": fields.pop("distributions")}
+    named = {"machine": fields.pop("machine"), "vary": fields.pop("distributions")}
     return {**named, "interval": isinstance(result.omega, tuple), **fields}
 
 
 def sensitivity_from(document: Document) -> Sensitivity:
     """The sensitivity of a document."""
-    named = {"screen": document["machine"], "distributions": document["vary"]}
-    found: Sensitivity = CODEC.fields(Sensitivity).read({**document, **named})
+    read = CODEC.fields(Sensitivity).read
+    found: Sensitivity = read({**_with_own(document), "distributions": document["vary"]})
     if not document["interval"]:
         return found
     low, high = np.asarray(found.omega).tolist()
     return dataclasses.replace(found, omega=(low, high))
+
+
+def one_at_a_time_from(document: Document) -> OneAtATime:
+    """The one-at-a-time look of a document."""
+    found: OneAtATime = CODEC.fields(OneAtATime).read(_with_own(_of_machine(document)))
+    return found
+
+
+def member_from(document: Document) -> Member:
+    """The member of a family of a document."""
+    found: Member = CODEC.fields(Member).read(_of_machine(document))
+    return found
+
+
+def family_from(document: Document) -> ResponseFamily:
+    """The family of a document."""
+    found: ResponseFamily = CODEC.fields(ResponseFamily).read(_of_machine(document))
+    return found
+
+
+def _of_machine(document: Document) -> Document:
+    """A document in which the machine has that name; it was "screen" while it had to be one."""
+    return document if "machine" in document else {**document, "machine": document["screen"]}
+
+
+def _with_own(document: Document) -> Document:
+    """A document with the machine's own values, which those of screens did not hold."""
+    if "own" in document:
+        return document
+    machine = MACHINES.read(document["machine"])
+    return {**document, "own": [value_of(machine, name) for name in document["names"]]}
 
 
 def _by_name(*kinds: type) -> dict[str, type]:
@@ -339,5 +371,8 @@ CODEC.learn(
         FieldBranch: Form(field_branch_document, field_branch_from),
         Sweep: Form(sweep_document, sweep_from),
         Sensitivity: Form(sensitivity_document, sensitivity_from),
+        OneAtATime: Form(CODEC.fields(OneAtATime).write, one_at_a_time_from),
+        Member: Form(CODEC.fields(Member).write, member_from),
+        ResponseFamily: Form(CODEC.fields(ResponseFamily).write, family_from),
     }
 )
