@@ -319,35 +319,29 @@ def sensitivity_from(document: Document) -> Sensitivity:
     return dataclasses.replace(found, omega=(low, high))
 
 
-def one_at_a_time_from(document: Document) -> OneAtATime:
-    """The one-at-a-time look of a document."""
-    found: OneAtATime = CODEC.fields(OneAtATime).read(_with_own(_of_machine(document)))
-    return found
-
-
-def member_from(document: Document) -> Member:
-    """The member of a family of a document."""
-    found: Member = CODEC.fields(Member).read(_of_machine(document))
-    return found
-
-
-def family_from(document: Document) -> ResponseFamily:
-    """The family of a document."""
-    found: ResponseFamily = CODEC.fields(ResponseFamily).read(_of_machine(document))
-    return found
-
-
-def _of_machine(document: Document) -> Document:
-    """A document in which the machine has that name; it was "screen" while it had to be one."""
-    return document if "machine" in document else {**document, "machine": document["screen"]}
-
-
 def _with_own(document: Document) -> Document:
     """A document with the machine's own values, which those of screens did not hold."""
     if "own" in document:
         return document
     machine = MACHINES.read(document["machine"])
     return {**document, "own": [value_of(machine, name) for name in document["names"]]}
+
+
+def of_screens(kind: type, complete: Callable[[Document], Document] = dict) -> Form:
+    """The form of a result whose machine a file calls "screen", which it had to be once.
+
+    ``complete`` adds what earlier files did not hold.
+    """
+    fields = CODEC.fields(kind)
+
+    def write(value: object) -> dict[str, Any]:
+        written = fields.write(value)
+        return {"screen": written.pop("machine"), **written}
+
+    def read(document: Document) -> object:
+        return fields.read(complete({**document, "machine": document["screen"]}))
+
+    return Form(write, read)
 
 
 def _by_name(*kinds: type) -> dict[str, type]:
@@ -371,8 +365,8 @@ CODEC.learn(
         FieldBranch: Form(field_branch_document, field_branch_from),
         Sweep: Form(sweep_document, sweep_from),
         Sensitivity: Form(sensitivity_document, sensitivity_from),
-        OneAtATime: Form(CODEC.fields(OneAtATime).write, one_at_a_time_from),
-        Member: Form(CODEC.fields(Member).write, member_from),
-        ResponseFamily: Form(CODEC.fields(ResponseFamily).write, family_from),
+        OneAtATime: of_screens(OneAtATime, _with_own),
+        Member: of_screens(Member),
+        ResponseFamily: of_screens(ResponseFamily),
     }
 )

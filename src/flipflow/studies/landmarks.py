@@ -19,12 +19,11 @@ from flipflow.dynamics.linear_response import (
     equal_amplitude_frequency,
     linear_response,
 )
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import IncompleteError
 from flipflow.model.quantities import leading_coordinate
 from flipflow.model.system import Machine
 from flipflow.results.frozen import Frozen
 
-FREE_SHARE = 1e-6  # of the highest natural frequency, below which one is zero but for rounding
 LOWEST_SHARE = 0.22  # lower end of the range over the first natural frequency
 HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all stops engaged
 
@@ -32,20 +31,10 @@ HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all s
 def analysed_range(machine: Machine, speed: float | None = None) -> tuple[float, float]:
     """From well below the first natural frequency to well above the last with stops engaged.
 
-    The first is the first above zero where nothing holds the machine. A working speed in rad/s
-    that lies outside widens the range.
-
-    Raises
-    ------
-    InputError
-        For a machine whose natural frequencies are all zero.
+    A working speed in rad/s that lies outside widens the range.
     """
-    bonded = bonded_natural_frequencies(machine)
-    known = np.append(linear_response(machine, 1.0).natural_frequencies, bonded)
-    held = known[known > FREE_SHARE * bonded[-1]]
-    if held.size == 0:
-        raise InputError("omega", None, "no spring holds this machine; give (low, high) in rad/s")
-    low, high = LOWEST_SHARE * float(held[0]), HIGHEST_SHARE * float(bonded[-1])
+    low = LOWEST_SHARE * float(linear_response(machine, 1.0).natural_frequencies[0])
+    high = HIGHEST_SHARE * float(bonded_natural_frequencies(machine)[-1])
     if speed is None:
         return low, high
     return min(low, 0.9 * speed), max(high, 1.1 * speed)
