@@ -207,3 +207,35 @@ def test_figure_shows_cells_and_motions(tmp_path, found):
     ]
     for ending in ("html", "svg", "png"):
         assert figure.write(tmp_path / f"basins.{ending}").stat().st_size > 1000
+
+
+def unforced(stiffness, gaps, law="paper"):
+    stop = ff.ClearanceSpring([1.0], 30.0, 1.0, *gaps, law)
+    return ff.MechanicalSystem([[1.0]], [[0.2]], [[stiffness]], (stop,), ff.HarmonicForce([0.0]))
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
+@pytest.mark.parametrize("gaps", [(0.4, np.inf), (0.4, 0.4), (0.0, np.inf), (0.0, 0.2)])
+def test_without_force_every_state_comes_to_rest(law, gaps):
+    """Rest may stand at a gap of zero, where its map is another on each side."""
+    found = ff.basins(unforced(1.0, gaps, law), 1.7, {0: np.linspace(-1.0, 1.0, 7)})
+    (rest,) = found.orbits
+    assert rest.stable
+    assert np.abs(rest.state).max() < 1e-9
+    np.testing.assert_array_equal(found.labels, 0)
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
+def test_each_rest_against_a_stop_has_its_own_basin(law):
+    """A spring that pushes away from the middle is held on either side: 30 (x - 0.4) = x."""
+    machine, omega = unforced(-1.0, (0.4, 0.2), law), 1.7
+    x = np.array([-0.9, -0.3, -0.02, 0.02, 0.3, 0.7])
+    found = ff.basins(machine, omega, {0: x}, {0: np.array([-0.4, 0.3])})
+    rests = np.array([orbit.state[0] for orbit in found.orbits])
+    assert sorted(rests) == pytest.approx([-0.2 * 30.0 / 29.0, 0.4 * 30.0 / 29.0], abs=1e-9)
+    for (i, j), label in np.ndenumerate(found.labels):
+        start = [x[i], found.axes[1].values[j]]
+        end = ff.simulate(machine, omega, 60, initial=start).displacement(0)[-1]
+        assert rests[label] == pytest.approx(end, abs=1e-4)
+    assert set(found.labels.ravel()) == {0, 1}

@@ -320,12 +320,14 @@ def test_monitor_sees_progress_and_may_cancel(screen):
         ({"branch": "from-rest"}, "from-below, upper, lower"),
         ({"quantity": "shear_strain", "machine": "bare"}, "shear_springs.height"),
         ({"quantity": "omega_ub", "omega": (9.0, 5.0)}, "reversed"),
-        ({"machine": "system"}, "FlipFlowScreen"),
+        ({"machine": "system"}, "springs[0].clearance"),
+        ({"machine": "word"}, "FlipFlowScreen"),
     ],
 )
 def test_bad_input_is_one_sentence(screen, changes, words):
     machines = {
         "bare": screen.replace(shear_height=None), "system": screen.system(), "screen": screen,
+        "word": "ffs0827",
     }  # fmt: skip
     given = {"vary": GAP, "quantity": "relative_amplitude", "omega": 120.0, "n": 4, **changes}
     machine = machines[given.pop("machine", "screen")]

@@ -81,3 +81,23 @@ def test_branch_with_folds_sharper_than_its_steps_reaches_the_end(drawn):
     assert len(branch.folds) % 2 == 0
     rises = np.sign(np.diff(branch.omega))
     assert np.count_nonzero(rises[1:] != rises[:-1]) == len(branch.folds)
+
+
+@pytest.mark.parametrize("interval", [(0.1, 3.0), (0.1, 2.0), (0.2, 3.0), (0.1, 1.0), (0.2, 0.32)])
+def test_two_folds_that_stand_close_are_both_kept(interval):
+    """A bilinear oscillator without gap: two folds 2e-5 rad/s apart in its fourth superharmonic.
+
+    Between those of the series there is no exact motion, and whether a point of the branch lies
+    there depends on the steps, which the interval sets.
+    """
+    stop = ff.ClearanceSpring([1.0], 3.0, 0.0, 0.0, np.inf)
+    bilinear = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], (stop,), ff.HarmonicForce([1.0]))
+    exact = ff.frequency_response(bilinear, interval)
+    series = ff.frequency_response(bilinear, interval, ff.HarmonicBalance(25))
+    assert exact.complete
+    assert series.complete
+    close = [fold.omega for fold in exact.folds if fold.omega < 0.3]
+    assert close == pytest.approx([0.2450662, 0.2450452], abs=1e-6)
+    shown = [fold.omega for fold in series.folds]
+    assert shown == pytest.approx([fold.omega for fold in exact.folds], abs=5e-5)
+    assert not [note for note in series.notes if note.startswith("fold of the series")]

@@ -85,7 +85,7 @@ def _omega(
     from flipflow.errors import InputError  # noqa: PLC0415
     from flipflow.model.quantities import quantity_named  # noqa: PLC0415
 
-    whole = quantity_named(quantity).of == "response"
+    whole = quantity_named(quantity, project.screen).of == "response"
     if speed is not None and (speeds is not None or whole):
         other = f"{quantity} belongs to the whole response" if whole else "--speeds is given, too"
         raise InputError("--speed", speed, f"{other}, leave it out")

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from scipy.optimize import brentq
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
+from flipflow.continuation.correction import Course
 from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.exact_solver import ExactSolver
@@ -33,6 +34,7 @@ from flipflow.periodic.stability import determinant_minus
 
 BESIDE = (0.05, 0.25, 0.5, 1.0, 2.0, 4.0, 0.01, 1e-3, 1e-4)  # steps to both sides, in this order
 FOLLOWED = (1.0, 4.0)  # steps before and after a point over which the exact branch is followed
+FINER = 4.0  # factor on its steps, so that none passes over two folds that the series shows apart
 EDGE = 1e-6  # relative widening of that interval of speeds
 ZERO = 1e-3  # a test below this share of its values at the ends has a zero there, not a jump
 LISTED = 8  # speeds that a note names
@@ -52,13 +54,21 @@ class ExactBeside:
 
     def at(self, position: float) -> Point | None:
         """The exact motion that Newton reaches from the series at a position along the branch."""
+        near = self._of_series(position)
+        return None if near is None else self._beside(near)
+
+    def _of_series(self, position: float) -> Point | None:
+        """The motion of the series at a position along the branch."""
         p = int(position)
         if not 0 <= p < self.traced.omega.size - 1:
             return None
         try:
-            near = self.solver.between(self.traced, p, position - p)
+            return self.solver.between(self.traced, p, position - p)
         except IncompleteError:
             return None
+
+    def _beside(self, near: Point) -> Point | None:
+        """The exact motion that Newton reaches from one of the series."""
         state = self.solver.states(near.u[None], np.array([near.omega]))[0]
         return self.exact.solve(state, near.omega)
 
@@ -71,32 +81,45 @@ class ExactBeside:
                 return True
         return False
 
-    def passes(self, position: float, room: float, test: Callable[[Traced, Real], Real]) -> bool:
+    def passes(
+        self, position: float, rooms: tuple[float, float], test: Callable[[Traced, Real], Real]
+    ) -> bool:
         """Whether the exact branch, followed past a position, has a zero of a test there.
 
         The exact branch is followed by its own arc length, from an exact motion before the position
         over the speeds that the series has up to as far after it. That also leads past folds, where
-        no exact motion has the speed of the series.
+        no exact motion has the speed of the series. Where two folds stand close there may be none
+        between them: then the branch is followed back from an exact motion after the position.
+        ``rooms`` are the steps to the special points before and after it.
         """
-        omega, course = self.traced.omega, self.traced.course
-        for steps in FOLLOWED:
-            start = max(position - min(steps, 0.5 * room), 0.0)
-            begin = self.at(start)
-            if begin is None:
+        for (way, room), steps in product(zip((1.0, -1.0), rooms, strict=True), FOLLOWED):
+            start = max(position - way * min(steps, 0.5 * room), 0.0)
+            near = self._of_series(start)
+            begin = None if near is None else self._beside(near)
+            if near is None or begin is None:
                 continue
-            first, last = max(int(position - steps), 0), int(position + steps) + 2
-            speeds = np.append(omega[first:last], begin.omega)
-            low, high = float(speeds.min()), float(speeds.max())
-            direction = float(np.sign(self.traced.tangent[int(start), -1]))
-            window = course._replace(
-                lower=low - EDGE * low, upper=high + EDGE * high, direction=direction
+            followed = self.exact.trace(
+                begin.u, begin.omega, self._window(position, steps, near, way)
             )
-            followed = self.exact.trace(begin.u, begin.omega, window)
             maps = self.exact.return_maps(followed.u, followed.omega, followed.jacobian)
             values = test(followed, maps)
             if np.any(values[1:] * values[:-1] < 0.0):
                 return True
         return False
+
+    def _window(self, position: float, steps: float, near: Point, way: float) -> Course:
+        """The course over the speeds of the series around a position, from a motion beside it."""
+        first, last = max(int(position - steps), 0), int(position + steps) + 2
+        speeds = np.append(self.traced.omega[first:last], near.omega)
+        low, high = float(speeds.min()), float(speeds.max())
+        course = self.traced.course
+        return course._replace(
+            lower=low - EDGE * low,
+            upper=high + EDGE * high,
+            omega_step=course.omega_step / FINER,
+            u_step=course.u_step / FINER,
+            direction=way * float(np.sign(near.omega_tangent)),
+        )
 
     def _zero_between(self, first: Point, last: Point, test: Callable[[Real], float]) -> bool:
         """Whether a test has a zero, not a jump, on the exact branch between two motions."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -127,18 +128,18 @@ def _confirmed(
         if not ours.size:
             continue
         ends = np.array([-1.0, *positions[ours], beside.traced.omega.size])
-        room = np.minimum(ends[1:-1] - ends[:-2], ends[2:] - ends[1:-1])
+        rooms = list(pairwise(np.diff(ends).tolist()))
         shown[ours] = (
             beside.folds_shown(positions[ours], side)
             if kind == FOLD
             else [
-                beside.crosses(*at, MAP_TESTS[kind])
-                for at in zip(positions[ours], room, strict=True)
+                beside.crosses(position, min(room), MAP_TESTS[kind])
+                for position, room in zip(positions[ours], rooms, strict=True)
             ]
         )
         if kind in _ALONG:
-            for i, steps in zip(ours, room, strict=True):
-                shown[i] = shown[i] or beside.passes(positions[i], steps, _ALONG[kind])
+            for i, room in zip(ours, rooms, strict=True):
+                shown[i] = shown[i] or beside.passes(positions[i], room, _ALONG[kind])
         omegas = [found[i].point.omega for i in ours if not shown[i]]
         notes += [unconfirmed_note(kind, omegas)] if omegas else []
     return [one for one, kept in zip(found, shown, strict=True) if kept], notes

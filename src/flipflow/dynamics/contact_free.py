@@ -6,6 +6,7 @@ of freedom.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -68,6 +69,8 @@ def span(orders: Sequence[int], amplitudes: Complex) -> tuple[float, float]:
         size = float(abs(amplitudes[0]))
         return -size, size
     # With z = exp(i theta) the slope is zero where sum_n i n (a_n z^n - conj(a_n) z^-n) is.
+    if not np.isfinite(amplitudes).all():
+        return math.nan, math.nan
     highest = max(orders)
     slope = np.zeros(2 * highest + 1, np.complex128)
     for order, amplitude in zip(orders, amplitudes, strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,10 +35,12 @@ class Unbalance:
         object.__setattr__(self, "vector", _force_vector(vector))
         object.__setattr__(self, "order", checked_count("order", order, MOST_ORDER))
 
+    power: ClassVar[int] = 2
+
     @property
     def terms(self) -> tuple[Term, ...]:
         """The force's amplitude as a sum of powers of omega: (power, vector (N,)) each."""
-        return ((2, self.order**2 * self.vector),)
+        return ((self.power, self.order**2 * self.vector),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +62,12 @@ class HarmonicForce:
         object.__setattr__(self, "vector", _force_vector(vector))
         object.__setattr__(self, "order", checked_count("order", order, MOST_ORDER))
 
+    power: ClassVar[int] = 0
+
     @property
     def terms(self) -> tuple[Term, ...]:
         """The force's amplitude as a sum of powers of omega: (power, vector (N,)) each."""
-        return ((0, self.vector),)
+        return ((self.power, self.vector),)
 
 
 @dataclass(frozen=True, eq=False)

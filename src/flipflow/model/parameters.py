@@ -10,9 +10,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_text
@@ -25,6 +25,7 @@ from flipflow.model.system import Machine, MechanicalSystem
 OF_SPRING = ("stiffness", "damping", "clearance", "clearance_minus")
 PATH = re.compile(rf"springs\[([0-9]+)\]\.({'|'.join(OF_SPRING)})")
 FORCING = "forcing"
+COUNTS = (int, "int")  # fields of this type are counted, and have no values between
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Parameter:
 
 
 def parameter_of(machine: Machine, name: object) -> Parameter:
-    """The parameter of a machine by its name.
+    """The parameter of a machine along which motions are followed, by its name.
 
     Raises
     ------
@@ -45,26 +46,98 @@ def parameter_of(machine: Machine, name: object) -> Parameter:
         For a name that the machine does not have, with those it has; for a value that is not
         finite.
     """
-    checked_text("field", name)
-    found = _of_fields(machine, str(name))
+    found = named_parameter(machine, name, "field", ("omega",))
     if not math.isfinite(found.value):
         raise InputError(found.name, found.value, "give the machine a finite value of it first")
     return found
 
 
-def _of_fields(machine: Machine, name: str) -> Parameter:
-    """A field of a dataclass, or a place in a plain system."""
+def named_parameter(
+    machine: Machine, name: object, field: str, besides: tuple[str, ...] = ()
+) -> Parameter:
+    """The parameter of a machine by its name, whatever its value.
+
+    Raises
+    ------
+    InputError
+        For a name that the machine does not have, with those it has and those ``besides``;
+        ``field`` is what the user calls the name.
+    """
+    checked_text(field, name)
+    known = parameter_names(machine)
+    if name not in known:
+        raise InputError(field, name, _choice((*besides, *known)))
     if isinstance(machine, MechanicalSystem):
-        return _of_system(machine, name)
-    names: tuple[str, ...] = ()
+        return _of_system(machine, str(name))
+    return _of_fields(machine, str(name))
+
+
+def parameter_names(machine: Machine) -> tuple[str, ...]:
+    """The names of all parameters of a machine that change its motion."""
+    if isinstance(machine, MechanicalSystem):
+        springs = range(len(machine.springs))
+        return (FORCING, *(f"springs[{j}].{part}" for j in springs for part in OF_SPRING))
     if isinstance(machine, FlipFlowScreen):
-        names = MOTION_FIELDS
-    elif dataclasses.is_dataclass(machine):
-        held = [(field.name, getattr(machine, field.name)) for field in dataclasses.fields(machine)]
-        names = tuple(n for n, v in held if isinstance(v, (int, float)) and not isinstance(v, bool))
-    if name not in names:
-        listed = ", ".join(repr(one) for one in ("omega", *names))
-        raise InputError("field", name, f"choose one of {listed}")
+        return MOTION_FIELDS
+    if not dataclasses.is_dataclass(machine):
+        return ()
+    return tuple(
+        field.name
+        for field in dataclasses.fields(machine)
+        if field.init and field.type not in COUNTS and _is_number(getattr(machine, field.name))
+    )
+
+
+def with_values(machine: Machine, values: Mapping[str, Any]) -> Machine:
+    """The machine with other values of some parameters; of a screen, of any of its fields.
+
+    Raises
+    ------
+    InputError
+        For a value that the machine does not take: what its class raises is told in a sentence.
+    """
+    if isinstance(machine, FlipFlowScreen):
+        return machine.replace(**values)
+    try:
+        changed = _with_values(machine, values)
+        changed.system()
+    except InputError:
+        raise
+    except (ValueError, ArithmeticError) as error:
+        given = next(iter(values.values())) if len(values) == 1 else dict(values)
+        raise InputError(", ".join(values), given, f"the machine refuses it, {error}") from None
+    return changed
+
+
+def value_of(machine: Machine, name: str) -> object:
+    """The machine's own value of a parameter; of a screen, of any of its fields."""
+    if isinstance(machine, FlipFlowScreen):
+        return getattr(machine, name)
+    return named_parameter(machine, name, "field").value
+
+
+def _with_values(machine: Machine, values: Mapping[str, Any]) -> Machine:
+    if not isinstance(machine, MechanicalSystem):
+        return dataclasses.replace(machine, **values)  # type: ignore[type-var]
+    changed: Machine = machine
+    # A clearance moves both sides of equal gaps, so that it comes before that of one side.
+    for name in sorted(values):
+        changed = named_parameter(changed, name, "field").at(values[name])
+    return changed
+
+
+def _choice(names: tuple[str, ...]) -> str:
+    if not names:
+        return "this machine has no parameters; give a frozen dataclass with fields of numbers"
+    return f"choose one of {', '.join(map(repr, names))}"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _of_fields(machine: Machine, name: str) -> Parameter:
+    """A field of a dataclass."""
 
     def at(value: float) -> Machine:
         return dataclasses.replace(machine, **{name: value})  # type: ignore[type-var]
@@ -75,15 +148,9 @@ def _of_fields(machine: Machine, name: str) -> Parameter:
 
 def _of_system(machine: MechanicalSystem, name: str) -> Parameter:
     """A place in a plain system."""
-    path = PATH.fullmatch(name)
     if name == FORCING:
         return Parameter(name, 1.0, lambda value: _forced(machine, value))
-    if path is None or int(path[1]) >= len(machine.springs):
-        places = [
-            f"'springs[{j}].{part}'" for j in range(len(machine.springs)) for part in OF_SPRING
-        ]
-        listed = ", ".join(["'omega'", "'forcing'", *places])
-        raise InputError("field", name, f"choose one of {listed}")
+    path = cast("re.Match[str]", PATH.fullmatch(name))
     j, part = int(path[1]), path[2]
 
     def at(value: float) -> Machine:

@@ -8,16 +8,18 @@ It feeds limits, sensitivities, reports and ``flipflow check``. Here a quantity 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 
 Direction = Literal["at most", "at least", "between"]
 Subject = Literal["motion", "response", "operation"]
+Part = Literal["amplitude", "phase"]
 BranchWord = Literal["from-below", "upper", "lower"]
 """Which motion a quantity is read off where several exist at one speed."""
 
@@ -68,6 +70,10 @@ class Quantity:
         Whether it says nothing of a machine without stops.
     of_folds
         Whether the folds of the motion's branch must be known, too.
+    elsewhere
+        Its label for a machine that is no screen; empty where screens alone have it.
+    coordinate, part
+        Of a machine's coordinate, that coordinate and what is read off it.
     limit
         The limit that may be set on it; None where there is none.
     """
@@ -82,11 +88,16 @@ class Quantity:
     needs: tuple[str, ...] = ()
     of_stops: bool = False
     of_folds: bool = False
+    elsewhere: str = ""
+    coordinate: Coordinate | None = None
+    part: Part | None = None
     limit: Limit | None = None
 
-    def missing(self, screen: FlipFlowScreen) -> tuple[str, ...]:
-        """Fields that it needs and the screen does not have, in the order of the alphabet."""
-        return tuple(sorted(name for name in self.needs if getattr(screen, name) is None))
+    def missing(self, machine: Machine) -> tuple[str, ...]:
+        """Fields that it needs and a screen does not have, in the order of the alphabet."""
+        if not isinstance(machine, FlipFlowScreen):
+            return ()
+        return tuple(sorted(name for name in self.needs if getattr(machine, name) is None))
 
 
 _NORMAL = ("normal_stiffness", "normal_damping")
@@ -158,7 +169,7 @@ _ALL = (
     Quantity(
         "stop_force", "stop force", "H", "N", "kN",
         "Greatest force on the stop springs of one side together.",
-        of_stops=True,
+        of_stops=True, elsewhere="stop force",
         limit=Limit(
             "at most", "Greatest force on the stop springs of one side together, peak.",
             "15 kN", (100.0, 10e6),
@@ -195,7 +206,7 @@ _ALL = (
     Quantity(
         "dissipated_power", "dissipated power", "P", "W", "kW",
         "Mean power that all dampers turn into heat; the motor must be larger.",
-        needs=_NORMAL,
+        needs=_NORMAL, elsewhere="dissipated power",
         limit=Limit(
             "at most", "Greatest power that the dampers turn into heat, mean over a turn.",
             "2 kW", (20.0, 1e6),
@@ -204,7 +215,7 @@ _ALL = (
     Quantity(
         "jump_margin", "margin to the jump", "s", "", "%",
         "Distance of the speed from the nearest jump speed, as a share of the jump speed.",
-        of_stops=True, of_folds=True,
+        of_stops=True, of_folds=True, elsewhere="margin to the jump",
         limit=Limit(
             "at least", "Least distance of the speed from the jump, as a share of the jump speed.",
             "20 %", (0.0, 0.9), upper=1.0,
@@ -218,12 +229,12 @@ _ALL = (
     Quantity(
         "peak_amplitude", "peak relative amplitude", "max |x2|", "m", "mm",
         "Largest relative amplitude over speed.",
-        of="response",
+        of="response", elsewhere="peak amplitude",
     ),
     Quantity(
         "peak_frequency", "speed of the peak", "w_peak", "rad/s", "rpm",
         "Speed of the largest relative amplitude.",
-        of="response",
+        of="response", elsewhere="speed of the peak",
     ),
     Quantity(
         "omega_ea", "speed of equal amplitudes", "w_ea", "rad/s", "rpm",
@@ -238,19 +249,28 @@ _ALL = (
     Quantity(
         "omega_cs", "speed at which contact begins", "w_cs", "rad/s", "rpm",
         "Speed at which the stop is first touched, the last rising one before the main peak.",
-        of="response",
+        of="response", elsewhere="speed at which contact begins",
     ),
     Quantity(
         "omega_lb", "lower jump speed", "w_lb", "rad/s", "rpm",
         "The lower of the two folds: the amplitude jumps here when the speed falls.",
-        of="response",
+        of="response", elsewhere="lower jump speed",
     ),
     Quantity(
         "omega_ub", "upper jump speed", "w_ub", "rad/s", "rpm",
         "The higher of the two folds: the amplitude jumps here when the speed rises.",
-        of="response",
+        of="response", elsewhere="upper jump speed",
     ),
 )
+
+# What is read off a coordinate: unit, shown unit, symbol, sentence.
+_READ: Mapping[Part, tuple[str, str, str, str]] = {
+    "amplitude": ("m", "mm", "|{}|", "Half the peak-to-peak motion of the coordinate."),
+    "phase": (
+        "rad", "deg", "phi({})",
+        "First harmonic of the coordinate against the exciting force; positive: it leads.",
+    ),
+}
 # fmt: on
 
 QUANTITIES: Mapping[str, Quantity] = {one.name: one for one in _ALL}
@@ -261,18 +281,55 @@ def quantities_of(subject: Subject) -> tuple[Quantity, ...]:
     return tuple(one for one in QUANTITIES.values() if one.of == subject)
 
 
-def quantity_named(name: object) -> Quantity:
-    """A quantity of a motion or of a whole response.
+def quantities_for(machine: Machine) -> Mapping[str, Quantity]:
+    """The quantities of a motion or of a whole response that a machine has, by name.
+
+    A screen has those of the table. Any other machine has those of the table that every machine
+    has, and amplitude and phase of each of its coordinates: ``"left_amplitude"`` of one that is
+    named "left", ``"amplitude[0]"`` of the first degree of freedom.
+    """
+    table = (*quantities_of("motion"), *quantities_of("response"))
+    if isinstance(machine, FlipFlowScreen):
+        return {one.name: one for one in table}
+    system = machine.system()
+    coordinates = (*system.coordinates, *range(system.size))
+    own = [_of_coordinate(which, part) for which in coordinates for part in _READ]
+    shared = [replace(one, label=one.elsewhere) for one in table if one.elsewhere]
+    return {one.name: one for one in (*own, *shared)}
+
+
+def quantity_named(name: object, machine: Machine) -> Quantity:
+    """A quantity of a motion or of a whole response, as a machine has it.
 
     Raises
     ------
     InputError
-        For a name that is not known.
+        For a name that the machine does not have, with those it has.
     """
-    known = {one.name: one for one in (*quantities_of("motion"), *quantities_of("response"))}
+    known = quantities_for(machine)
     if not isinstance(name, str) or name not in known:
         raise InputError("quantity", name, f"choose one of {', '.join(known)}")
     return known[name]
+
+
+def leading_coordinate(system: MechanicalSystem) -> Coordinate:
+    """The coordinate by which motions of a machine are compared: the relative one of a screen.
+
+    Any other machine has its coordinate "relative", else the first that is named, else the first
+    degree of freedom.
+    """
+    return "relative" if "relative" in system.coordinates else system.named[0]
+
+
+def _of_coordinate(which: Coordinate, part: Part) -> Quantity:
+    """Amplitude or phase of one coordinate."""
+    unit, shown_unit, symbol, sentence = _READ[part]
+    named = isinstance(which, str)
+    words = which if isinstance(which, str) else f"x{which + 1}"
+    return Quantity(
+        f"{which}_{part}" if named else f"{part}[{which}]", f"{part} of {words}",
+        symbol.format(words), unit, shown_unit, sentence, coordinate=which, part=part,
+    )  # fmt: skip
 
 
 def needing(field: str) -> tuple[Quantity, ...]:

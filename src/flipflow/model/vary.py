@@ -1,6 +1,6 @@
 """What may vary and how: the vocabulary of sensitivity, studies and design.
 
-``vary`` maps a field of the machine to an interval (low, high), an array that is sampled as it
+``vary`` maps a parameter of the machine to an interval (low, high), an array that is sampled as it
 stands, :class:`Normal` or :class:`Choice`. Each becomes a :class:`Variation`, which turns numbers
 between 0 and 1 into values of its field.
 """
@@ -23,7 +23,9 @@ from flipflow.model.arguments import (
     members_of,
 )
 from flipflow.model.fields import FIELD
+from flipflow.model.parameters import named_parameter, with_values
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine
 
 Real = NDArray[np.float64]
 Values = NDArray[np.float64] | NDArray[np.str_]
@@ -174,8 +176,8 @@ class Variation:
     distribution: Distribution
 
 
-def variations(vary: Vary, screen: FlipFlowScreen) -> tuple[Variation, ...]:
-    """The entries of ``vary``, checked against a screen, in the order given.
+def variations(vary: Vary, machine: Machine) -> tuple[Variation, ...]:
+    """The entries of ``vary``, checked against a machine, in the order given.
 
     Raises
     ------
@@ -185,10 +187,11 @@ def variations(vary: Vary, screen: FlipFlowScreen) -> tuple[Variation, ...]:
     """
     if not isinstance(vary, Mapping) or not vary:
         raise InputError("vary", vary, 'map fields to ranges, {"clearance": (5.4e-3, 6.6e-3)}')
-    return tuple(_variation(name, given, screen) for name, given in vary.items())
+    one = _of_screen if isinstance(machine, FlipFlowScreen) else _of_machine
+    return tuple(one(name, given, machine) for name, given in vary.items())
 
 
-def _variation(name: str, given: object, screen: FlipFlowScreen) -> Variation:
+def _of_screen(name: str, given: object, screen: Machine) -> Variation:
     checked_word("vary", name, (*FIELD, LAW))
     distribution = _distribution(name, given)
     counted = name == LAW or FIELD[name].whole
@@ -197,7 +200,18 @@ def _variation(name: str, given: object, screen: FlipFlowScreen) -> Variation:
     for value in distribution.checked:
         if name != LAW:
             FIELD[name].check(value, label=f"vary {name}")
-        screen.replace(**{name: value})
+        with_values(screen, {name: value})
+    return Variation(name, distribution)
+
+
+def _of_machine(name: str, given: object, machine: Machine) -> Variation:
+    """A parameter of a machine that is no screen."""
+    named_parameter(machine, name, "vary")
+    distribution = _distribution(name, given)
+    for value in distribution.checked:
+        if isinstance(value, str):
+            raise InputError(f"vary {name}", value, "give numbers")
+        with_values(machine, {name: value})
     return Variation(name, distribution)
 
 

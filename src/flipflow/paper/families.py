@@ -112,7 +112,7 @@ def family_tables(pair: FamilyPair) -> tuple[Table, ...]:
         failure = table["failure"][k]
         rows.append(cells(f"{label}: {failure}" if failure else label, *words))
     field = FIELD[pair.exact.field]
-    nominal = shown(getattr(pair.exact.screen, field.name), field.file_unit, field.unit)
+    nominal = shown(getattr(pair.exact.machine, field.name), field.file_unit, field.unit)
     region = pair.exact.common_region
     middle = NOTHING if region is None else f"{sum(region) / 2.0:.4g} rad/s"
     caption = (
@@ -124,7 +124,9 @@ def family_tables(pair: FamilyPair) -> tuple[Table, ...]:
 
 
 def _chosen(family: ResponseFamily, pair: FamilyPair) -> ResponseFamily:
-    return ResponseFamily(family.screen, family.field, tuple(family.members[k] for k in pair.drawn))
+    return ResponseFamily(
+        family.machine, family.field, tuple(family.members[k] for k in pair.drawn)
+    )
 
 
 def _number(value: float | str | None) -> float | None:

@@ -84,7 +84,7 @@ def _engaged(spring: ClearanceSpring) -> list[int]:
 def _linear_motion(
     system: MechanicalSystem, regimes: tuple[int, ...], omega: float
 ) -> tuple[Real, Complex] | None:
-    """x_0 (N,) and X (W, N) of a contact state; None where nothing holds it, or in resonance."""
+    """x_0 (N,) and X (W, N) of a contact state; None where nothing holds it, NaN in resonance."""
     rest = rest_of(system.K, system.springs, regimes, system.constant_force)
     if rest is None:
         return None
@@ -101,7 +101,7 @@ def _linear_motion(
         try:
             found.append(np.linalg.solve(K - w**2 * system.M + 1j * w * C, force))
         except np.linalg.LinAlgError:
-            return None
+            found.append(np.full(system.size, np.nan, np.complex128))
     return rest, np.array(found)
 
 

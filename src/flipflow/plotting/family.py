@@ -8,12 +8,13 @@ import numpy as np
 
 from flipflow.continuation.branch import Branch
 from flipflow.model.fields import FIELD
+from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
-from flipflow.plotting.response import LABELS, curve_traces
+from flipflow.plotting.response import coordinates, curve_traces, label
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
 
@@ -31,7 +32,9 @@ def family_figure(
     title: str = "",
     note: str = "",
 ) -> Figure:
-    """Amplitude of both frames and of the relative motion over rad/s, one line for each member.
+    """Amplitude of every coordinate over rad/s, one line for each member.
+
+    Of a screen these are both frames and the relative motion.
 
     Parameters
     ----------
@@ -44,11 +47,11 @@ def family_figure(
     title, note
         Title, and a sentence for the caption.
     """
-    symbol = FIELD[family.field].symbol
+    symbol = FIELD[family.field].symbol if family.field in FIELD else family.field
     words = list(labels) or [_value(family.field, member.value) for member in family.members]
     panels = tuple(
         _panel(which, family.members, words, beneath, first=k == 0)
-        for k, which in enumerate(("main", "floating", "relative"))
+        for k, which in enumerate(coordinates(family.machine.system()))
     )
     under = f" Wide and pale beneath: {BALANCE}." if beneath is not None else ""
     caption = f"Half the peak-to-peak motion. {READING}{under} {note}".strip()
@@ -57,7 +60,13 @@ def family_figure(
 
 
 def branch_traces(
-    name: str, branch: Branch, which: str, index: int, *, legend: bool = True, bold: bool = False
+    name: str,
+    branch: Branch,
+    which: Coordinate,
+    index: int,
+    *,
+    legend: bool = True,
+    bold: bool = False,
 ) -> Iterator[Trace]:
     """One coordinate of a branch over rad/s, its folds as circles."""
     curve = Curve.of(branch, which)
@@ -73,7 +82,9 @@ def branch_traces(
         )
 
 
-def beneath_traces(name: str, branch: Branch, which: str, *, legend: bool) -> Iterator[Trace]:
+def beneath_traces(
+    name: str, branch: Branch, which: Coordinate, *, legend: bool
+) -> Iterator[Trace]:
     """A branch as one wide pale line that another is laid over."""
     curve = Curve.of(branch, which)
     yield Trace(name, curve.omega, curve.amplitude * MM, "beneath", "beneath", legend=legend)
@@ -129,7 +140,7 @@ def _cut(curve: Curve, keep: np.ndarray) -> Curve:
 
 
 def _panel(
-    which: str,
+    which: Coordinate,
     members: Sequence[Member],
     labels: Sequence[str],
     beneath: ResponseFamily | None,
@@ -139,15 +150,17 @@ def _panel(
     traces: list[Trace] = []
     for k, member in enumerate(() if beneath is None else beneath.members):
         traces += beneath_traces(BALANCE, member.branch, which, legend=first and k == 0)
-    for k, (member, label) in enumerate(zip(members, labels, strict=True)):
-        traces += branch_traces(label, member.branch, which, k, legend=first)
+    for k, (member, words) in enumerate(zip(members, labels, strict=True)):
+        traces += branch_traces(words, member.branch, which, k, legend=first)
     ends = [member.branch.omega for member in members]
     top = max(float(trace.y.max()) for trace in traces)
     return Panel(
         speed_axis_in_radians(0.0, max(float(omega.max()) for omega in ends)),
-        Axis("amplitude", "mm", (0.0, 1.06 * top)), tuple(traces), title=LABELS[which],
+        Axis("amplitude", "mm", (0.0, 1.06 * top)), tuple(traces), title=label(which),
     )  # fmt: skip
 
 
 def _value(field: str, value: float) -> str:
+    if field not in FIELD:
+        return f"{field} = {value:.4g}"
     return f"{FIELD[field].symbol} = {value:.4g} {FIELD[field].unit}"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import FIELD
-from flipflow.model.quantities import QUANTITIES
+from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
@@ -74,7 +74,7 @@ def index_order(result: Sensitivity) -> list[int]:
 
 def changes(result: Sensitivity | OneAtATime, at: int | None) -> tuple[Real, Real]:
     """Change at the low and the high end of each field, (D,) each, in the quantity's shown unit."""
-    scale = SHOWN[QUANTITIES[result.quantity].shown_unit]
+    scale = SHOWN[quantity_named(result.quantity, result.machine).shown_unit]
     pick = slice(None) if at is None else at
     nominal = np.asarray(result.nominal)[() if at is None else at]
     low, high = result.at_low[pick], result.at_high[pick]
@@ -137,7 +137,7 @@ def _index_panel(result: Sensitivity) -> Panel:
 
 
 def _tornado_panel(result: Sensitivity | OneAtATime, at: int | None) -> Panel:
-    quantity = QUANTITIES[result.quantity]
+    quantity = quantity_named(result.quantity, result.machine)
     ends = np.stack(changes(result, at))
     order = [int(i) for i in np.argsort(-np.nan_to_num(np.abs(ends)).max(axis=0), kind="stable")]
     bars = list(_tornado_bars(ends, order))
@@ -168,7 +168,7 @@ def _rows(result: Sensitivity | OneAtATime, order: list[int]) -> Axis:
 
 def _row(result: Sensitivity | OneAtATime, i: int) -> str:
     """The field, and how far its ends lie from the machine's own value."""
-    nominal, name = getattr(result.screen, result.names[i]), _name(result.names[i])
+    nominal, name = result.own[i], _name(result.names[i])
     ends = result.ends[i]
     if not isinstance(nominal, float) or not np.isfinite(nominal) or nominal == 0.0:
         return name
@@ -181,7 +181,7 @@ def _name(field: str) -> str:
 
 
 def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:
-    label = QUANTITIES[result.quantity].label
+    label = quantity_named(result.quantity, result.machine).label
     if isinstance(result.omega, float):
         return f"Sensitivity of {label} at {result.omega * RPM:.4g} rpm"
     if at is None:

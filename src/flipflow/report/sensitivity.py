@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flipflow.model.fields import FIELD
-from flipflow.model.quantities import QUANTITIES
+from flipflow.model.quantities import quantity_named
 from flipflow.plotting.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
 from flipflow.report.blocks import (
     Block,
@@ -29,7 +29,7 @@ from flipflow.studies.sensitivity import Sensitivity
 @section(Sensitivity, Part.DETAILS, 10, brief=True)
 def summary_of_indices(result: Sensitivity) -> Iterator[Block]:
     """What was asked, the table of indices, and what is to be kept in mind."""
-    one = QUANTITIES[result.quantity]
+    one = quantity_named(result.quantity, result.machine)
     rows = [("Quantity", one.label), ("Samples", f"{result.n * (len(result.names) + 2)}")]
     if isinstance(result.omega, float):
         rows.append(("Speed", f"{rpm(result.omega)} rpm"))
@@ -61,7 +61,7 @@ def tornado(assessment: Assessment) -> Iterator[Block]:
 
 
 def _at_one(result: Sensitivity) -> Table:
-    unit = QUANTITIES[result.quantity].shown_unit
+    unit = quantity_named(result.quantity, result.machine).shown_unit
     columns = (
         Column("Field"), Column("Symbol", brief=False),
         Column("First", "order", numeric=True), Column("+/-", "95 %", numeric=True),

@@ -257,14 +257,14 @@ def energy_balance(working: Working) -> dict[str, float]:
 
     The stop's is what its damping takes and what it still holds when it lets go early.
     """
-    screen, orbit = working.screen, working.orbit
+    orbit = working.orbit
     powers = {
         "input": orbit.input_power(),
-        "isolation": screen.isolation_damping * orbit.mean_square_velocity("main"),
-        "shear": screen.shear_damping * orbit.mean_square_velocity("relative"),
+        "isolation": working.field("isolation_damping") * orbit.mean_square_velocity("main"),
+        "shear": working.field("shear_damping") * orbit.mean_square_velocity("relative"),
         "stop": 0.0,
     }
-    if screen.has_stop:
+    if working.stops:
         powers["stop"] = orbit.stop_power()
     if working.normal is not None:
         powers["normal"] = working.normal.power

@@ -32,7 +32,7 @@ from flipflow.model.arguments import (
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import Excitation, HarmonicForce, MovingBase, Unbalance
-from flipflow.model.parameters import parameter_of
+from flipflow.model.parameters import parameter_of, value_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -45,7 +45,8 @@ from flipflow.periodic.options import (
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.results.codec import Codec, Form, array, plain
-from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.response_family import Member, ResponseFamily
+from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 from flipflow.transient.settling import PERIODIC, UNDECIDED, Settled
 from flipflow.transient.settling import Word as Moving
 from flipflow.transient.sweep import Jump, Sweep
@@ -308,20 +309,45 @@ def sweep_from(document: Document) -> Sweep:
 
 
 def sensitivity_document(result: Sensitivity) -> dict[str, Any]:
-    """A sensitivity by its fields, some by other names."""
+    """A sensitivity by its fields, one by another name."""
     fields = CODEC.fields(Sensitivity).write(result)
-    named = {"machine": fields.pop("screen"), "vary": fields.pop("distributions")}
+    named = {"machine": fields.pop("machine"), "vary": fields.pop("distributions")}
     return {**named, "interval": isinstance(result.omega, tuple), **fields}
 
 
 def sensitivity_from(document: Document) -> Sensitivity:
     """The sensitivity of a document."""
-    named = {"screen": document["machine"], "distributions": document["vary"]}
-    found: Sensitivity = CODEC.fields(Sensitivity).read({**document, **named})
+    read = CODEC.fields(Sensitivity).read
+    found: Sensitivity = read({**_with_own(document), "distributions": document["vary"]})
     if not document["interval"]:
         return found
     low, high = np.asarray(found.omega).tolist()
     return dataclasses.replace(found, omega=(low, high))
+
+
+def _with_own(document: Document) -> Document:
+    """A document with the machine's own values, which those of screens did not hold."""
+    if "own" in document:
+        return document
+    machine = MACHINES.read(document["machine"])
+    return {**document, "own": [value_of(machine, name) for name in document["names"]]}
+
+
+def of_screens(kind: type, complete: Callable[[Document], Document] = dict) -> Form:
+    """The form of a result whose machine a file calls "screen", which it had to be once.
+
+    ``complete`` adds what earlier files did not hold.
+    """
+    fields = CODEC.fields(kind)
+
+    def write(value: object) -> dict[str, Any]:
+        written = fields.write(value)
+        return {"screen": written.pop("machine"), **written}
+
+    def read(document: Document) -> object:
+        return fields.read(complete({**document, "machine": document["screen"]}))
+
+    return Form(write, read)
 
 
 def _by_name(*kinds: type) -> dict[str, type]:
@@ -360,5 +386,8 @@ CODEC.learn(
         FieldBranch: Form(field_branch_document, field_branch_from),
         Sweep: Form(sweep_document, sweep_from),
         Sensitivity: Form(sensitivity_document, sensitivity_from),
+        OneAtATime: of_screens(OneAtATime, _with_own),
+        Member: of_screens(Member),
+        ResponseFamily: of_screens(ResponseFamily),
     }
 )

@@ -15,6 +15,7 @@ from flipflow.errors import IncompleteError
 from flipflow.model.limits import Limits, limit_bounds
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.quantity_values import Working
 
@@ -267,8 +268,8 @@ def _joined(parts: list[list[Interval]], span: Interval) -> Intervals:
     return intersect(tuple(joined), (span,))
 
 
-def working_motion(screen: FlipFlowScreen, branch: Branch, omega: float) -> Working | None:
+def working_motion(machine: Machine, branch: Branch, omega: float) -> Working | None:
     """The motion reached from below at ``omega``, None where the branch does not cover it."""
     orbit: Orbit | None = branch.orbit_from_below(omega)
     jumps = tuple(fold.omega for fold in branch.folds)
-    return None if orbit is None else Working(screen, orbit, jumps)
+    return None if orbit is None else Working(machine, orbit, jumps)

@@ -1,4 +1,4 @@
-"""Landmarks of a screen's response over speed: what is asked of the response as a whole."""
+"""Landmarks of a machine's response over speed: what is asked of the response as a whole."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from flipflow.dynamics.linear_response import (
     linear_response,
 )
 from flipflow.errors import IncompleteError
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.quantities import leading_coordinate
+from flipflow.model.system import Machine
 from flipflow.results.frozen import Frozen
 
 LOWEST_SHARE = 0.22  # lower end of the range over the first natural frequency
 HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all stops engaged
 
 
-def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[float, float]:
+def analysed_range(machine: Machine, speed: float | None = None) -> tuple[float, float]:
     """From well below the first natural frequency to well above the last with stops engaged.
 
     A working speed in rad/s that lies outside widens the range.
     """
-    low = LOWEST_SHARE * float(linear_response(screen, 1.0).natural_frequencies[0])
-    high = HIGHEST_SHARE * float(bonded_natural_frequencies(screen)[-1])
+    low = LOWEST_SHARE * float(linear_response(machine, 1.0).natural_frequencies[0])
+    high = HIGHEST_SHARE * float(bonded_natural_frequencies(machine)[-1])
     if speed is None:
         return low, high
     return min(low, 0.9 * speed), max(high, 1.1 * speed)
@@ -41,19 +42,21 @@ def analysed_range(screen: FlipFlowScreen, speed: float | None = None) -> tuple[
 
 @dataclass(frozen=True)
 class Landmarks:
-    """Characteristic frequencies of a screen and its operating region, all in rad/s.
+    """Characteristic frequencies of a machine and its operating region, all in rad/s.
 
     Parameters
     ----------
     omega_ea, omega_ar
-        w_ea and w_ar: equal amplitudes, antiresonance of the main frame.
+        w_ea and w_ar: equal amplitudes, antiresonance of the main frame; None for a machine that
+        is no screen.
     omega_cs
         w_cs: contact begins, the last rising one before the main peak; None if it never does.
     omega_lb, omega_ub
         The two saddle-nodes of the main resonance; None without folds.
     lower, upper
         The paper's operating region: [w_cs, w_lb] with a stop that is reached (without folds up
-        to the peak of the relative amplitude), else [w_ea, w_ar].
+        to the peak of the relative amplitude), else [w_ea, w_ar]; all speeds analysed where a
+        machine that is no screen reaches no stop.
     notes
         What is to be kept in mind.
     """
@@ -68,16 +71,18 @@ class Landmarks:
     notes: tuple[str, ...] = ()
 
 
-def landmarks(screen: FlipFlowScreen, branch: Branch) -> Landmarks:
-    """Read w_ea, w_ar, w_cs, w_lb, w_ub and the region between them off a screen's branch.
+def landmarks(machine: Machine, branch: Branch) -> Landmarks:
+    """Read w_ea, w_ar, w_cs, w_lb, w_ub and the region between them off a machine's branch.
+
+    Of a machine that is no screen the leading coordinate stands for the relative motion.
 
     Raises
     ------
     IncompleteError
         When the branch has no points.
     """
-    ea, ar = equal_amplitude_frequency(screen), antiresonance_frequency(screen)
-    works = screen.has_stop and not screen.stop().bonded
+    ea, ar = equal_amplitude_frequency(machine), antiresonance_frequency(machine)
+    works = any(one.acts and not one.bonded for one in machine.system().springs)
     peak = _main_peak(branch, ar)
     touched = peak.orbit.touches and works
     begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.position < peak.position]
@@ -102,7 +107,7 @@ def _untouched_notes(branch: Branch) -> Iterator[str]:
     if np.any(branch.traced.signature != 0):
         yield (
             "The stop is not reached at the main resonance, only elsewhere: the region is that of "
-            "a screen without stop."
+            "a machine without stop."
         )
     else:
         yield "The stop is not reached at any speed analysed."
@@ -110,11 +115,12 @@ def _untouched_notes(branch: Branch) -> Iterator[str]:
 
 def _main_peak(branch: Branch, antiresonance: float | None) -> SpecialPoint:
     """The largest relative motion above the antiresonance, which parts the two resonances."""
-    peak = branch.peak("relative")
+    which = leading_coordinate(branch.system)
+    peak = branch.peak(which)
     if antiresonance is None or peak.omega >= antiresonance:
         return peak
-    higher = [one for one in branch.peaks("relative") if one.omega >= antiresonance]
-    return max(higher, key=lambda one: one.amplitude("relative"), default=peak)
+    higher = [one for one in branch.peaks(which) if one.omega >= antiresonance]
+    return max(higher, key=lambda one: one.amplitude(which), default=peak)
 
 
 def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float | None]:
@@ -122,13 +128,14 @@ def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float
 
     A fold beyond a trough belongs to another resonance, as do those before the peak.
     """
-    size = branch.amplitude("relative")
+    which = leading_coordinate(branch.system)
+    size = branch.amplitude(which)
     for first, second in pairwise(branch.folds):
         # A peak and the fold beside it may stand in one step of the branch.
         if first.position <= peak.position - 1.0:
             continue
         way = size[math.ceil(peak.position) : math.floor(first.position) + 1]
-        if np.any(way < first.amplitude("relative")):
+        if np.any(way < first.amplitude(which)):
             break
         return min(first.omega, second.omega), max(first.omega, second.omega)
     return None, None
@@ -136,17 +143,17 @@ def _main_folds(branch: Branch, peak: SpecialPoint) -> tuple[float | None, float
 
 @dataclass(frozen=True, eq=False)
 class Response(Frozen):
-    """A screen over an interval of speed; its branch is followed when first asked for.
+    """A machine over an interval of speed; its branch is followed when first asked for.
 
     Parameters
     ----------
-    screen
-        The screen as loaded.
+    machine
+        The machine; a screen as loaded.
     span
         The interval (low, high) in rad/s.
     """
 
-    screen: FlipFlowScreen
+    machine: Machine
     span: tuple[float, float]
 
     @cached_property
@@ -158,27 +165,27 @@ class Response(Frozen):
         IncompleteError
             When the branch could not be followed to the end of the interval.
         """
-        branch = frequency_response(self.screen, self.span)
+        branch = frequency_response(self.machine, self.span)
         if not branch.complete:
             raise IncompleteError(branch.status.value)
         return branch
 
     @cached_property
     def peak(self) -> SpecialPoint:
-        """The motion of largest relative amplitude."""
-        return self.branch.peak("relative")
+        """The motion of the largest amplitude of the leading coordinate."""
+        return self.branch.peak(leading_coordinate(self.branch.system))
 
     @cached_property
     def marks(self) -> Landmarks:
         """The landmarks of the branch."""
-        return landmarks(self.screen, self.branch)
+        return landmarks(self.machine, self.branch)
 
 
 RESPONSE_VALUES: Mapping[str, Callable[[Response], float | None]] = {
-    "peak_amplitude": lambda r: r.peak.amplitude("relative"),
+    "peak_amplitude": lambda r: r.peak.amplitude(leading_coordinate(r.branch.system)),
     "peak_frequency": lambda r: r.peak.omega,
-    "omega_ea": lambda r: equal_amplitude_frequency(r.screen),
-    "omega_ar": lambda r: antiresonance_frequency(r.screen),
+    "omega_ea": lambda r: equal_amplitude_frequency(r.machine),
+    "omega_ar": lambda r: antiresonance_frequency(r.machine),
     "omega_cs": lambda r: r.marks.omega_cs,
     "omega_lb": lambda r: r.marks.omega_lb,
     "omega_ub": lambda r: r.marks.omega_ub,

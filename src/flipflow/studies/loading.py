@@ -15,6 +15,7 @@ from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_interval
 from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.system import Coordinate
 from flipflow.periodic.options import Method, checked_method
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 
@@ -288,5 +289,10 @@ def _refined(
 
 def relative_from_below(branch: Branch, omega: float) -> float:
     """Relative amplitude in m at a speed in rad/s as it rises slowly; NaN without a motion."""
+    return amplitude_from_below(branch, omega, "relative")
+
+
+def amplitude_from_below(branch: Branch, omega: float, which: Coordinate) -> float:
+    """Amplitude of a coordinate in m, as :func:`relative_from_below`."""
     orbit = branch.orbit_from_below(omega)
-    return math.nan if orbit is None else orbit.amplitude("relative")
+    return math.nan if orbit is None else orbit.amplitude(which)

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from flipflow.dynamics.contact_free import contact_free
 from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
 from flipflow.model.constants import GRAVITY
-from flipflow.model.quantities import QUANTITIES
+from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.frozen import Frozen
 
@@ -31,10 +32,10 @@ Coordinate = Literal["main", "floating", "relative"]
 
 
 class Motions(Protocol):
-    """What a quantity is read off: one motion of a screen, or many of many screens.
+    """What a quantity is read off: one motion of a machine, or many of many screens.
 
     Every answer is a number for one motion and an array over motions for many; NaN where the
-    screen lacks data.
+    screen lacks data, or the machine is none.
     """
 
     @property
@@ -111,27 +112,44 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
 
 @dataclass(frozen=True, eq=False)
 class Working(Frozen):
-    """A screen in one periodic motion, solved for.
+    """A machine in one periodic motion, solved for.
 
     Parameters
     ----------
-    screen
-        The screen as loaded.
+    machine
+        The machine; a screen as loaded.
     orbit
-        Its motion along the surface.
+        Its motion; of a screen, along the surface.
     jumps
         Frequencies in rad/s of the folds of its branch.
     """
 
-    screen: FlipFlowScreen
+    machine: Machine
     orbit: Orbit
     jumps: tuple[float, ...] = ()
 
     def value(self, name: str) -> float | None:
-        """A quantity by name, SI; None where the screen lacks data that it needs."""
-        if QUANTITIES[name].missing(self.screen):
+        """A quantity of a screen by name, SI; None where the screen lacks data that it needs."""
+        return self.value_of(QUANTITIES[name])
+
+    def value_of(self, quantity: Quantity) -> float | None:
+        """A quantity that the machine has, SI; None where a screen lacks data that it needs."""
+        if quantity.part is not None and quantity.coordinate is not None:
+            return float(getattr(self.orbit, quantity.part)(quantity.coordinate))
+        if quantity.missing(self.machine):
             return None
-        return float(MOTION_VALUES[name](self))
+        return float(MOTION_VALUES[quantity.name](self))
+
+    @property
+    def screen(self) -> FlipFlowScreen | None:
+        """The machine where it is a screen, of which more is known than the motion tells."""
+        return self.machine if isinstance(self.machine, FlipFlowScreen) else None
+
+    @cached_property
+    def stops(self) -> tuple[int, ...]:
+        """Indices of the stops that can ever act."""
+        springs = self.machine.system().springs
+        return tuple(j for j, spring in enumerate(springs) if spring.acts)
 
     @property
     def omega(self) -> float:
@@ -141,10 +159,10 @@ class Working(Frozen):
     @cached_property
     def normal(self) -> NormalMotion | None:
         """Motion normal to the surface, None where its data are missing."""
-        return normal_motion(self.screen, self.omega)
+        return None if self.screen is None else normal_motion(self.screen, self.omega)
 
     def field(self, name: str) -> float:
-        return _number(getattr(self.screen, name))
+        return _number(None if self.screen is None else getattr(self.screen, name))
 
     def amplitude(self, which: Coordinate) -> float:
         return self.orbit.amplitude(which)
@@ -163,13 +181,15 @@ class Working(Frozen):
         return self._peak(lambda _, __, a: a[:, degree], NormalMotion.acceleration)
 
     def foundation_force(self) -> float:
-        k, c = self.screen.isolation_stiffness, self.screen.isolation_damping
+        k, c = self.field("isolation_stiffness"), self.field("isolation_damping")
         return self._peak(lambda x, v, _: k * x[:, 0] + c * v[:, 0], NormalMotion.foundation_force)
 
     def stop_force(self) -> float:
-        return self.orbit.stop_force_peak() if self.screen.has_stop else 0.0
+        return max((self.orbit.stop_force_peak(j) for j in self.stops), default=0.0)
 
     def dissipated_power(self) -> float:
+        if self.screen is None:
+            return self.orbit.input_power()
         return math.nan if self.normal is None else self.orbit.input_power() + self.normal.power
 
     def jump_margin(self) -> float:

@@ -1,4 +1,4 @@
-"""How the response changes with one field of the machine: curves, peaks, region."""
+"""How the response changes with one parameter of a machine: curves, peaks, region."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_interval, checked_reals, checked_word
 from flipflow.model.fields import FIELD
+from flipflow.model.parameters import named_parameter, with_values
+from flipflow.model.quantities import leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Coordinate, Machine, system_of
 from flipflow.periodic.options import Method
 from flipflow.results.frozen import Frozen
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
-from flipflow.studies.loading import relative_from_below
+from flipflow.studies.loading import amplitude_from_below
 
 Real = NDArray[np.float64]
 FREQUENCIES = 9  # equally spaced speeds of the common region at which members are compared
@@ -33,6 +36,8 @@ class Member(Frozen):
     ----------
     value
         The field's value, SI.
+    machine
+        The machine with this value.
     branch
         Motions over speed, with their special points.
     marks
@@ -42,33 +47,49 @@ class Member(Frozen):
     """
 
     value: float
-    screen: FlipFlowScreen
+    machine: Machine
     branch: Branch
     marks: Landmarks | None
     failure: str = ""
 
+    @property
+    def screen(self) -> Machine:
+        """The machine, by the name it has where it is a screen."""
+        return self.machine
+
     @cached_property
     def main_peaks(self) -> tuple[SpecialPoint, ...]:
-        """Resonances of the main frame, rising in speed: w01 and w02 as its amplitude shows."""
-        return () if self.failure else self.branch.peaks("main")
+        """Resonances of the driven mass, rising in speed; of a screen w01 and w02.
+
+        That is the main frame of a screen, the leading coordinate of any other machine.
+        """
+        return () if self.failure else self.branch.peaks(self._driven)
 
     @cached_property
     def relative_peak(self) -> SpecialPoint | None:
-        """The largest relative motion."""
-        return None if self.failure else self.branch.peak("relative")
+        """The largest motion of the leading coordinate, the relative one of a screen."""
+        return None if self.failure else self.branch.peak(self._leading)
 
     @cached_property
     def antiresonance(self) -> SpecialPoint | None:
-        """Where the main frame moves least between its first and its last resonance."""
+        """Where the driven mass moves least between its first and its last resonance."""
         if len(self.main_peaks) < 2:
             return None
         first, last = self.main_peaks[0].position, self.main_peaks[-1].position
-        feet = [t for t in self.branch.troughs("main") if first < t.position < last]
-        return min(feet, key=lambda t: t.amplitude("main"), default=None)
+        feet = [t for t in self.branch.troughs(self._driven) if first < t.position < last]
+        return min(feet, key=lambda t: t.amplitude(self._driven), default=None)
 
     def relative_amplitude(self, omega: float) -> float:
-        """Relative amplitude in m as the speed rises slowly; NaN where no motion is known."""
-        return math.nan if self.failure else relative_from_below(self.branch, omega)
+        """Amplitude in m of the leading coordinate as the speed rises slowly; NaN without one."""
+        return math.nan if self.failure else amplitude_from_below(self.branch, omega, self._leading)
+
+    @property
+    def _leading(self) -> Coordinate:
+        return leading_coordinate(self.branch.system)
+
+    @property
+    def _driven(self) -> Coordinate:
+        return "main" if isinstance(self.machine, FlipFlowScreen) else self._leading
 
     @property
     def zone(self) -> float:
@@ -89,7 +110,7 @@ class ResponseFamily(Frozen):
 
     Parameters
     ----------
-    screen
+    machine
         The machine they come from.
     field
         Name of the field.
@@ -97,13 +118,18 @@ class ResponseFamily(Frozen):
         One for each value, in the order given.
     """
 
-    screen: FlipFlowScreen
+    machine: Machine
     field: str
     members: tuple[Member, ...]
 
     def __repr__(self) -> str:
         values = ", ".join(f"{member.value:.6g}" for member in self.members)
         return f"ResponseFamily({self.field}: {values})"
+
+    @property
+    def screen(self) -> Machine:
+        """The machine, by the name it has where it is a screen."""
+        return self.machine
 
     @property
     def values(self) -> Real:
@@ -128,7 +154,10 @@ class ResponseFamily(Frozen):
 
     @cached_property
     def relative_amplitude(self) -> Real:
-        """Relative amplitude in m at the common frequencies, (n, n_omega); NaN where not known."""
+        """Relative amplitude in m at the common frequencies, (n, n_omega); NaN where not known.
+
+        Of a machine that is no screen, the amplitude of its leading coordinate.
+        """
         return np.array(
             [
                 [member.relative_amplitude(float(w)) for w in self.common_frequencies]
@@ -144,35 +173,51 @@ class ResponseFamily(Frozen):
         ``omega_cs``, ``omega_lb``, ``omega_ub``, ``zone``; ``lower``, ``upper`` of the operating
         region; ``relative_at_lower``, ``relative_at_middle``, ``relative_at_upper`` at the ends
         and the middle of the common region; ``failure``.
+
+        Of a machine that is no screen ``peak_frequency`` and ``peak_amplitude`` of the leading
+        coordinate stand for all peaks, and ``amplitude_at_lower`` and so on for the last ones.
         """
         rows = [self._row(k, member) for k, member in enumerate(self.members)]
         return {name: [row[name] for row in rows] for name in rows[0]}
 
     def _row(self, k: int, member: Member) -> dict[str, float | str | None]:
-        marks, peaks = member.marks, member.main_peaks
-        first = peaks[0] if len(peaks) > 1 else None
-        last = peaks[-1] if len(peaks) > 1 else None
+        marks, of_screen = member.marks, isinstance(self.machine, FlipFlowScreen)
         names = ("omega_cs", "omega_lb", "omega_ub", "lower", "upper")
-        row: dict[str, float | str | None] = {
-            self.field: member.value,
-            "first_peak_omega": None if first is None else first.omega,
-            "first_peak_main": None if first is None else first.amplitude("main"),
-            "second_peak_omega": None if last is None else last.omega,
-            "second_peak_main": None if last is None else last.amplitude("main"),
-        }
-        top = member.relative_peak
-        row["relative_peak_omega"] = None if top is None else top.omega
-        row["relative_peak"] = None if top is None else top.amplitude("relative")
+        row: dict[str, float | str | None] = {self.field: member.value}
+        row |= _peaks_of_screen(member) if of_screen else _peak_of_machine(member)
         row |= {name: None if marks is None else getattr(marks, name) for name in names}
         row["zone"] = member.zone
+        what = "relative" if of_screen else "amplitude"
         for place, at in (("lower", 0), ("middle", FREQUENCIES // 2), ("upper", -1)):
             known = self.common_frequencies.size > 0
-            row[f"relative_at_{place}"] = float(self.relative_amplitude[k, at]) if known else None
+            row[f"{what}_at_{place}"] = float(self.relative_amplitude[k, at]) if known else None
         return row | {"failure": member.failure}
 
 
+def _peaks_of_screen(member: Member) -> dict[str, float | str | None]:
+    peaks, top = member.main_peaks, member.relative_peak
+    first = peaks[0] if len(peaks) > 1 else None
+    last = peaks[-1] if len(peaks) > 1 else None
+    return {
+        "first_peak_omega": None if first is None else first.omega,
+        "first_peak_main": None if first is None else first.amplitude("main"),
+        "second_peak_omega": None if last is None else last.omega,
+        "second_peak_main": None if last is None else last.amplitude("main"),
+        "relative_peak_omega": None if top is None else top.omega,
+        "relative_peak": None if top is None else top.amplitude("relative"),
+    }
+
+
+def _peak_of_machine(member: Member) -> dict[str, float | str | None]:
+    top = member.relative_peak
+    if top is None:
+        return {"peak_frequency": None, "peak_amplitude": None}
+    which = leading_coordinate(member.branch.system)
+    return {"peak_frequency": top.omega, "peak_amplitude": top.amplitude(which)}
+
+
 def response_family(
-    screen: FlipFlowScreen,
+    screen: Machine,
     vary: Mapping[str, ArrayLike],
     *,
     omega: tuple[float, float] | None = None,
@@ -183,9 +228,11 @@ def response_family(
     Parameters
     ----------
     screen
-        The machine whose other fields are kept.
+        The machine whose other fields are kept: a screen, any frozen dataclass with
+        ``.system()``, or a :class:`~flipflow.MechanicalSystem`.
     vary
-        One field and its values, SI: ``{"clearance": [2e-3, 4e-3]}``.
+        One field and its values, SI: ``{"clearance": [2e-3, 4e-3]}``; a place in a plain system,
+        ``{"springs[0].clearance": [2e-3, 4e-3]}``, or ``"forcing"``, a factor on its excitation.
     omega
         Speeds (low, high) in rad/s; None: wide enough for every member.
     method
@@ -199,28 +246,31 @@ def response_family(
     Raises
     ------
     InputError
-        For anything but a screen, for other than one field, and for a value that physics forbids.
+        For what is no machine, for other than one of its fields, which are told then, and for a
+        value that physics forbids.
     """
-    if not isinstance(screen, FlipFlowScreen):
-        raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")
-    field, values = _one_field(vary)
-    screens = [screen.replace(**{field: float(value)}) for value in values]
-    spans = [analysed_range(one) for one in screens]
+    system_of(screen)
+    field, values = _one_field(vary, screen)
+    machines = [with_values(screen, {field: float(value)}) for value in values]
+    spans = [analysed_range(one) for one in machines]
     wide = (min(low for low, _ in spans), max(high for _, high in spans))
     interval = wide if omega is None else checked_interval("omega", omega)
     members = tuple(
         _member(float(value), one, frequency_response(one, interval, method))
-        for value, one in zip(values, screens, strict=True)
+        for value, one in zip(values, machines, strict=True)
     )
     return ResponseFamily(screen, field, members)
 
 
-def _one_field(vary: Mapping[str, ArrayLike]) -> tuple[str, Real]:
+def _one_field(vary: Mapping[str, ArrayLike], machine: Machine) -> tuple[str, Real]:
     if not isinstance(vary, Mapping) or len(vary) != 1:
         remedy = 'name one field and its values, as {"clearance": [5e-3, 6e-3]}'
         raise InputError("vary", vary, remedy)
     ((field, values),) = vary.items()
-    checked_word("vary", field, FIELD)
+    if isinstance(machine, FlipFlowScreen):
+        checked_word("vary", field, FIELD)
+    else:
+        named_parameter(machine, field, "vary")
     name = f"vary[{field!r}]"
     array = np.atleast_1d(checked_reals(name, values, "give numbers in SI"))
     if array.ndim != 1 or array.size == 0:
@@ -228,10 +278,10 @@ def _one_field(vary: Mapping[str, ArrayLike]) -> tuple[str, Real]:
     return field, array
 
 
-def _member(value: float, screen: FlipFlowScreen, branch: Branch) -> Member:
+def _member(value: float, machine: Machine, branch: Branch) -> Member:
     if not branch.complete:
-        return Member(value, screen, branch, None, branch.status.value)
+        return Member(value, machine, branch, None, branch.status.value)
     try:
-        return Member(value, screen, branch, landmarks(screen, branch))
+        return Member(value, machine, branch, landmarks(machine, branch))
     except IncompleteError as error:
-        return Member(value, screen, branch, None, str(error))
+        return Member(value, machine, branch, None, str(error))

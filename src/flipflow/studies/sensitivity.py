@@ -1,4 +1,4 @@
-"""Which field of a machine matters most to a quantity."""
+"""Which parameter of a machine matters most to a quantity."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ from flipflow.model.arguments import (
     checked_word,
 )
 from flipflow.model.monitor import Monitor
+from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine, system_of
 from flipflow.model.vary import Distribution, Variation, Vary, variations
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.sensitivity_samples import (
@@ -45,7 +46,7 @@ class Sensitivity:
 
     Parameters
     ----------
-    screen
+    machine
         The machine about which the fields vary.
     quantity
         Name of the quantity, one of the table in :mod:`flipflow.model.quantities`.
@@ -71,13 +72,15 @@ class Sensitivity:
         The quantity of the machine itself, SI.
     at_low, at_high
         The quantity with one field at the low or the high end of its range, SI.
+    own
+        The machine's own value of each field.
     notes
         A sentence for each thing to keep in mind.
     version
         Version of flipflow.
     """
 
-    screen: FlipFlowScreen
+    machine: Machine
     quantity: str
     branch: str
     names: tuple[str, ...]
@@ -94,12 +97,18 @@ class Sensitivity:
     nominal: float | Real
     at_low: Real
     at_high: Real
+    own: tuple[object, ...]
     notes: tuple[str, ...]
     version: str
 
     def __repr__(self) -> str:
         fields = ", ".join(self.names)
         return f"Sensitivity({self.quantity} on {fields}; {self.n} groups)"
+
+    @property
+    def screen(self) -> Machine:
+        """The machine, by the name it has where it is a screen."""
+        return self.machine
 
     @property
     def over_frequency(self) -> bool:
@@ -118,11 +127,11 @@ class OneAtATime:
 
     Parameters
     ----------
-    screen, quantity, names, distributions, omega, nominal, at_low, at_high
+    machine, quantity, names, distributions, omega, nominal, at_low, at_high, own
         As in :class:`Sensitivity`, at one frequency in rad/s.
     """
 
-    screen: FlipFlowScreen
+    machine: Machine
     quantity: str
     names: tuple[str, ...]
     distributions: tuple[Distribution, ...]
@@ -130,6 +139,7 @@ class OneAtATime:
     nominal: float
     at_low: Real
     at_high: Real
+    own: tuple[object, ...]
 
     @property
     def over_frequency(self) -> bool:
@@ -148,7 +158,7 @@ BLOCK_VALUES = 2_000_000
 
 
 def sensitivity(
-    machine: FlipFlowScreen,
+    machine: Machine,
     vary: Vary,
     quantity: str,
     omega: ArrayLike | None = None,
@@ -159,7 +169,7 @@ def sensitivity(
     monitor: Monitor | None = None,
     branch: BranchWord = "from-below",
 ) -> Sensitivity:
-    r"""Sobol indices of a quantity on fields of a screen that vary independently.
+    r"""Sobol indices of a quantity on fields of a machine that vary independently.
 
     The first-order index :math:`S_i = \mathrm{Var}(E(y | x_i)) / \mathrm{Var}(y)` is the share of
     the variance that goes away when field i is known; the total index
@@ -172,14 +182,22 @@ def sensitivity(
     Parameters
     ----------
     machine
-        The screen about which the fields vary.
+        The machine about which the fields vary: a screen, any frozen dataclass with ``.system()``,
+        or a :class:`~flipflow.MechanicalSystem`.
     vary
-        Fields of the screen, each with an interval (low, high), an array that is sampled as it
-        stands, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
+        Fields of the screen or of the dataclass, or places in the system such as
+        ``"springs[0].clearance"``; each with an interval (low, high), an array that is sampled as
+        it stands, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
     quantity
         A quantity of a motion, such as ``"relative_amplitude"`` or ``"main_frame_acceleration"``,
         or one of the whole response: ``"peak_amplitude"``, ``"peak_frequency"``, ``"omega_ea"``,
-        ``"omega_ar"``, ``"omega_cs"``, ``"omega_lb"``, ``"omega_ub"``.
+        ``"omega_ar"``, ``"omega_cs"``, ``"omega_lb"``, ``"omega_ub"``. A machine that is no
+        screen has ``"amplitude[0]"``, ``"phase[0]"`` and so on of its degrees of freedom,
+        ``"left_amplitude"``, ``"left_phase"`` of a coordinate named "left"; ``"stop_force"``,
+        the greatest of all its stops; ``"dissipated_power"``, ``"jump_margin"``; and of the whole
+        response those above but for ``"omega_ea"`` and ``"omega_ar"``. Its peak is that of the
+        coordinate "relative", else of the first that is named, else of the first degree of
+        freedom.
     omega
         Frequency in rad/s, one or (n_omega,). For a quantity of the whole response the interval
         (low, high) analysed; None: from well below the first natural frequency of the machine to
@@ -196,7 +214,8 @@ def sensitivity(
     branch
         The motion that is meant where several exist: ``"from-below"`` is met when the speed is
         raised slowly, ``"upper"`` and ``"lower"`` are the largest and the smallest relative
-        amplitude of those motions of the branch that are not unstable.
+        amplitude of those motions of the branch that are not unstable; of a machine that is no
+        screen, amplitude of the coordinate of its peak.
 
     Returns
     -------
@@ -206,8 +225,8 @@ def sensitivity(
     Raises
     ------
     InputError
-        For an unknown field or quantity, a range that physics forbids, and data that the quantity
-        needs and the screen does not have.
+        For an unknown field or quantity, with those that the machine has; for a range that physics
+        forbids, and data that the quantity needs and a screen does not have.
     MissingExtra
         When SALib is not installed.
 
@@ -236,7 +255,7 @@ def sensitivity(
     return _result(question, varied, groups, found, failed, nominal, ends, omega)
 
 
-def one_at_a_time(machine: FlipFlowScreen, vary: Vary, quantity: str, omega: float) -> OneAtATime:
+def one_at_a_time(machine: Machine, vary: Vary, quantity: str, omega: float) -> OneAtATime:
     """Move each field alone to the ends of its range: what a tornado chart shows.
 
     Parameters
@@ -257,7 +276,7 @@ def one_at_a_time(machine: FlipFlowScreen, vary: Vary, quantity: str, omega: flo
     rows = _ends(machine, varied)
     ends = np.concatenate(list(_values(question, rows, nominal, 1, None)), axis=1)[:, 0]
     return OneAtATime(
-        screen=machine,
+        machine=machine,
         quantity=quantity,
         names=tuple(variation.name for variation in varied),
         distributions=tuple(variation.distribution for variation in varied),
@@ -265,13 +284,17 @@ def one_at_a_time(machine: FlipFlowScreen, vary: Vary, quantity: str, omega: flo
         nominal=float(nominal[0, 0]),
         at_low=ends[: len(varied)],
         at_high=ends[len(varied) :],
+        own=_own(machine, varied),
     )
 
 
-def _question(machine: object, name: str, omega: object, branch: BranchWord) -> Question:
-    if not isinstance(machine, FlipFlowScreen):
-        raise InputError("machine", type(machine).__name__, "give a FlipFlowScreen")
-    quantity = quantity_named(name)
+def _own(machine: Machine, varied: Sequence[Variation]) -> tuple[object, ...]:
+    return tuple(value_of(machine, one.name) for one in varied)
+
+
+def _question(machine: Machine, name: str, omega: object, branch: BranchWord) -> Question:
+    system_of(machine)
+    quantity = quantity_named(name, machine)
     checked_word("branch", branch, get_args(BranchWord))
     span = analysed_range(machine)
     if quantity.of == "response":
@@ -287,13 +310,13 @@ def _question(machine: object, name: str, omega: object, branch: BranchWord) -> 
 def _nominal(question: Question) -> Real:
     """The quantity of the machine itself, (1, K); a machine that cannot be solved at all raises."""
     try:
-        values = [list(values_of(question, question.screen))]
+        values = [list(values_of(question, question.machine))]
     except IncompleteError:
         values = [[None] * question.omega.size]
     return np.array(values, dtype=float)
 
 
-def _require_data(machine: FlipFlowScreen, quantity: Quantity) -> None:
+def _require_data(machine: Machine, quantity: Quantity) -> None:
     absent = quantity.missing(machine)
     if absent:
         raise InputError("quantity", quantity.name, missing_words(absent))
@@ -351,12 +374,12 @@ def _joined(blocks: Sequence[tuple[SobolIndices, Real]]) -> tuple[SobolIndices, 
     return SobolIndices(*tables), np.concatenate([failed for _, failed in blocks])
 
 
-def _ends(machine: FlipFlowScreen, varied: Sequence[Variation]) -> Columns:
+def _ends(machine: Machine, varied: Sequence[Variation]) -> Columns:
     """Rows that change one field at a time: all low ends, then all high ends."""
     count = len(varied)
     columns: dict[str, NDArray[Any]] = {}
     for i, one in enumerate(varied):
-        column = np.full(2 * count, getattr(machine, one.name), dtype=object)
+        column = np.full(2 * count, value_of(machine, one.name), dtype=object)
         column[i], column[count + i] = one.distribution.ends
         columns[one.name] = column
     return columns
@@ -381,7 +404,7 @@ def _result(
 
     count = len(varied)
     return Sensitivity(
-        screen=question.screen,
+        machine=question.machine,
         quantity=question.quantity.name,
         branch=question.branch,
         names=tuple(variation.name for variation in varied),
@@ -398,6 +421,7 @@ def _result(
         nominal=over(nominal[0]),
         at_low=over(ends[:count].T),
         at_high=over(ends[count:].T),
+        own=_own(question.machine, varied),
         notes=tuple(_notes(n, found, failed)),
         version=__version__,
     )

@@ -15,9 +15,10 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
-from flipflow.model.quantities import BranchWord, Quantity
+from flipflow.model.parameters import value_of, with_values
+from flipflow.model.quantities import BranchWord, Quantity, leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import system_of
+from flipflow.model.system import Machine, system_of
 from flipflow.periodic.options import PiecewiseExact
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
@@ -39,8 +40,8 @@ class Question:
 
     Parameters
     ----------
-    screen
-        The machine whose fields are changed.
+    machine
+        The machine whose parameters are changed.
     quantity
         What is read off.
     omega
@@ -51,21 +52,23 @@ class Question:
         Which motion is meant.
     """
 
-    screen: FlipFlowScreen
+    machine: Machine
     quantity: Quantity
     omega: Real
     span: tuple[float, float]
     branch: BranchWord
 
     def in_closed_form(self, names: Sequence[str]) -> bool:
-        """Whether no sample can touch a stop, so that every motion has a formula."""
-        free = not self.screen.has_stop and not STOP_FIELDS & set(names)
+        """Whether samples are screens that touch no stop, so that every motion has a formula."""
+        if not isinstance(self.machine, FlipFlowScreen):
+            return False
+        free = not self.machine.has_stop and not STOP_FIELDS & set(names)
         return free and self.quantity.of == "motion"
 
 
 def closed_form_values(question: Question, columns: Columns, omega: Real) -> Real:
     """The quantity of S samples at frequencies (K,), (S, K); NaN where physics forbids a value."""
-    nominal = {name: np.asarray(getattr(question.screen, name), float) for name in FIELD}
+    nominal = {name: np.asarray(value_of(question.machine, name), float) for name in FIELD}
     evaluate = MOTION_VALUES[question.quantity.name]
     rows = len(next(iter(columns.values())))
     values = np.empty((rows, omega.size))
@@ -118,14 +121,14 @@ def _each(work: Callable[[int], None], items: range, threads: int) -> Iterator[f
 
 def _sample(question: Question, names: tuple[str, ...], row: tuple[object, ...]) -> Real:
     try:
-        screen = question.screen.replace(**dict(zip(names, row, strict=True)))
-        return np.array([_number(value) for value in values_of(question, screen)])
+        machine = with_values(question.machine, dict(zip(names, row, strict=True)))
+        return np.array([_number(value) for value in values_of(question, machine)])
     except (InputError, IncompleteError):
         return np.full(question.omega.size, np.nan)
 
 
-def values_of(question: Question, screen: FlipFlowScreen) -> Iterator[float | None]:
-    """The quantity of one screen at each frequency, None where there is none.
+def values_of(question: Question, machine: Machine) -> Iterator[float | None]:
+    """The quantity of one machine at each frequency, None where there is none.
 
     Raises
     ------
@@ -136,46 +139,47 @@ def values_of(question: Question, screen: FlipFlowScreen) -> Iterator[float | No
     """
     quantity = question.quantity
     if quantity.of == "response":
-        yield RESPONSE_VALUES[quantity.name](Response(screen, question.span))
+        yield RESPONSE_VALUES[quantity.name](Response(machine, question.span))
         return
-    for working in _workings(question, screen):
-        yield None if working is None else working.value(quantity.name)
+    for working in _workings(question, machine):
+        yield None if working is None else working.value_of(quantity)
 
 
-def _workings(question: Question, screen: FlipFlowScreen) -> Iterator[Working | None]:
+def _workings(question: Question, machine: Machine) -> Iterator[Working | None]:
     """The motion that is meant at each frequency."""
     omega = question.omega.tolist()
     below = question.branch == "from-below"
     narrow = below and not question.quantity.of_folds
     if narrow and len(omega) == 1:
-        yield _reached(screen, omega[0])
+        yield _reached(machine, omega[0])
         return
-    branch = Response(screen, (min(omega), max(omega)) if narrow else question.span).branch
+    branch = Response(machine, (min(omega), max(omega)) if narrow else question.span).branch
     for one in omega:
         if below:
-            yield working_motion(screen, branch, one)
+            yield working_motion(machine, branch, one)
         else:
-            yield _outermost(question, screen, branch, one)
+            yield _outermost(question, machine, branch, one)
 
 
-def _reached(screen: FlipFlowScreen, omega: float) -> Working | None:
+def _reached(machine: Machine, omega: float) -> Working | None:
     """The motion reached from below at one frequency, without a branch around it."""
-    solver = solver_for(system_of(screen), PiecewiseExact())
+    solver = solver_for(system_of(machine), PiecewiseExact())
     solver.system.require_damping()
     point = solver.solve(first_unknowns(solver, omega), omega)
-    return None if point is None else Working(screen, Orbit(screen, point))
+    return None if point is None else Working(machine, Orbit(machine, point))
 
 
 def _outermost(
-    question: Question, screen: FlipFlowScreen, branch: Branch, omega: float
+    question: Question, machine: Machine, branch: Branch, omega: float
 ) -> Working | None:
     """The largest or the smallest of the motions that are not unstable."""
     found = [orbit for orbit in branch.orbits_at(omega) if orbit.stability != UNSTABLE]
     if not found:
         return None
     pick = max if question.branch == "upper" else min
-    orbit = pick(found, key=lambda one: one.amplitude("relative"))
-    return Working(screen, orbit, tuple(fold.omega for fold in branch.folds))
+    which = leading_coordinate(branch.system)
+    orbit = pick(found, key=lambda one: one.amplitude(which))
+    return Working(machine, orbit, tuple(fold.omega for fold in branch.folds))
 
 
 def _allowed(name: str, column: Real) -> NDArray[np.bool_]:
