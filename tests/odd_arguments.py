@@ -322,11 +322,15 @@ def classes() -> tuple[Call, ...]:
             "direction": [1.0], "stiffness": 1.0, "damping": 0.0, "clearance": 1.0,
             "clearance_minus": None, "law": "paper",
         },
-        ff.HarmonicForce: {"vector": [1.0]},
-        ff.Unbalance: {"vector": [1.0]},
+        ff.HarmonicForce: {"vector": [1.0], "order": 2},
+        ff.Unbalance: {"vector": [1.0], "order": 2},
+        ff.MovingBase: {
+            "displacement": 0.1, "stiffness": [1.0], "damping": [0.1], "order": 2,
+        },
         ff.MechanicalSystem: {
             "M": [[1.0]], "C": [[1.0]], "K": [[1.0]], "springs": (),
             "excitation": ff.Unbalance([1.0]), "coordinates": {"main": [1.0]},
+            "static_force": [0.1],
         },
         ff.FlipFlowScreen: {
             **{name: getattr(screen(), name) for name in ff.FlipFlowScreen.__dataclass_fields__}

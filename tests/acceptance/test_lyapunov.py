@@ -422,7 +422,7 @@ def test_bad_input_of_exponents_is_refused(chain, options, field):
         ("forcing", [1.0], {}, "omega"),
         ("gap", [1.0], {"omega": 1.0}, "gap"),
         (3, [1.0], {"omega": 1.0}, "parameter"),
-        ("springs[0].clearance", [-1.0], {"omega": 1.0}, "clearance"),
+        ("springs[0].stiffness", [-1.0], {"omega": 1.0}, "stiffness"),
         ("omega", [1.0], {"points": 0}, "points"),
         ("omega", [1.0], {"max_periods": 13}, "max_periods"),
         ("omega", [1.0], {"most_turns": 0}, "most_turns"),

@@ -78,8 +78,8 @@ def test_a_series_takes_the_terms_it_needs() -> None:
     def parts(shape):
         return lambda v: {
             "inertia": np.eye(1), "damping": np.eye(1), "stiffness": np.array([[shape(v)]]),
-            "direction": np.eye(1), "force": np.ones((2, 1)), "stop": np.ones((2, 1)),
-            "gap": np.array([[v, math.inf]]),
+            "direction": np.eye(1), "force": np.ones((2, 1)), "static": np.zeros((1, 1)),
+            "stop": np.ones((2, 1)), "gap": np.array([[v, math.inf]]),
         }  # fmt: skip
 
     smooth = machine_series(parts(math.exp), 0.0, 2.0)

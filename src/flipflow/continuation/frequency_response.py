@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
@@ -76,7 +77,9 @@ def frequency_response(
     The branch is the one reached from below: it starts from the motion that is connected with
     the contact-free one at lower frequency, and is followed through its folds by pseudo-arclength
     until it leaves the interval. Every point has its stability and error, every special point is
-    refined. Motions detached from this branch are not seen.
+    refined. Motions detached from this branch are not seen. A machine that stands on its stops has
+    no motion without contact: there the branch is that of the motion into which it settles or,
+    where that one turns back, the one that leads down from the upper end.
 
     Parameters
     ----------
@@ -117,7 +120,29 @@ def frequency_response(
 def followed(machine: Machine, method: Method, solver: Solver, course: correction.Course) -> Branch:
     """The branch over ``course`` with stability and special points."""
     traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
+    if traced.code == status.REACHED_LOWER and not _begins_free(solver, course.lower):
+        traced = _spanning(solver, course) or traced
     return described(machine, method, solver, traced)
+
+
+def _begins_free(solver: Solver, omega: float) -> bool:
+    """Whether some lower frequency than ``omega`` touches no stop."""
+    return contact_free_up_to(solver.machine, solver.flow.modes, omega) > 0.0
+
+
+def _spanning(solver: Solver, course: correction.Course) -> Traced | None:
+    """The branch through a motion at the upper bound, where it leads down to the lower one.
+
+    A machine that stands on its stops is reached from below by many motions, and that into which
+    it happens to settle may lie on a branch that only turns back.
+    """
+    down = course._replace(direction=-1.0)
+    start = some_unknowns(solver, course.upper)
+    last = solver.end_of_branch(start, course.upper, down, POINTS_MOST)
+    if last is None:
+        return None
+    traced = solver.trace(last, course.lower, course)
+    return traced if traced.code == status.REACHED_UPPER else None
 
 
 def described(machine: Machine, method: Method, solver: Solver, traced: Traced) -> Branch:
