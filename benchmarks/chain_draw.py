@@ -20,7 +20,8 @@ def draw(seed, number, *, law=None, ratio=None):
     A chain of one to six masses with springs between them and to the ground, damped in proportion,
     under a force of any phase or an unbalance, a third of them under a constant force as well. One
     to four stops act between neighbours or against the ground, each with a gap that is a share of
-    the largest linear amplitude there, so that nearly all are met. ``law`` and the damping ``ratio`` of the stops are drawn where not given.
+    the largest linear amplitude there, so that nearly all are met. ``law`` and the damping
+    ``ratio`` of the stops are drawn where not given.
     """
     rng = np.random.default_rng([seed, number])
     n = int(rng.integers(1, MOST_MASSES + 1))

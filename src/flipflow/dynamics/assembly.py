@@ -62,9 +62,10 @@ def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineA
 
 def _require_hold(system: MechanicalSystem) -> None:
     """Refuse a machine with a free motion that no stop ever ends, or that nothing damps."""
-    free = _null_space(system.K)
-    if free.shape[1] == 0:
+    sizes = np.linalg.svd(system.K, compute_uv=False).tolist()
+    if sizes[-1] > system.size * EPSILON * sizes[0]:
         return
+    free = _null_space(system.K)
     springs = [spring for spring in system.springs if spring.stiffness > 0.0]
     D = np.array([spring.direction for spring in springs]).reshape(len(springs), system.size)
     if _null_space(D @ free).shape[1]:

@@ -85,6 +85,8 @@ def rest_of(
             d, k = spring.direction, spring.stiffness * float(shares(spring.law, regime)[0])
             held += k * np.outer(d, d)
             push += k * signed_gap_of(spring, regime) * d
+    if not push.any():
+        return push
     x = np.linalg.lstsq(held, push, rcond=None)[0]
     size = np.abs(held) @ np.abs(x) + np.abs(push)
     return np.asarray(x) if np.all(np.abs(held @ x - push) <= ROUNDING * size) else None
