@@ -17,6 +17,7 @@ from flipflow.model.drive import DRIVE_FIELDS
 from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS
 from flipflow.model.quantities import needing
+from flipflow.model.screen import Measured
 
 FORMAT = 1
 
@@ -159,6 +160,11 @@ def _machine_entries() -> Iterable[Entry]:
         "stops", "law", "choice",
         "Force law: the paper's, no pull, no damping outwards, damping within the spring's force.",
         "paper", choices=get_args(ContactLaw),
+    )  # fmt: skip
+    yield Entry(
+        "stops", "clearance_measured", "choice",
+        "Gaps as measured on the standing, empty machine, or as drawn with unstressed springs.",
+        "standing", choices=get_args(Measured),
     )  # fmt: skip
     yield Entry(
         "shear_springs", "temperature_factor", "temperatures",

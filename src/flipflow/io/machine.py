@@ -44,6 +44,8 @@ def read_screen(tables: Tables, notes: Notes) -> FlipFlowScreen:
     _choice(tables, "exciter.type", "circular", notes)
     if "stops" in tables:
         values["stop_law"] = _choice(tables, "stops.law", "paper", notes)
+        measured = _choice(tables, "stops.clearance_measured", "standing", notes)
+        values["clearance_measured"] = measured
     rows = tables.get("shear_springs", {}).get("temperature_factor")
     if rows is not None:
         label = "shear_springs.temperature_factor"

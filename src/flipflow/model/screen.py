@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Self, get_args
+from typing import Literal, Self, get_args
 
 import numpy as np
 
@@ -19,12 +19,14 @@ from flipflow.model.arguments import (
     checked_text,
     checked_word,
 )
+from flipflow.model.constants import GRAVITY
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import Unbalance
 from flipflow.model.fields import FIELDS
 from flipflow.model.system import MechanicalSystem
 
+Measured = Literal["standing", "drawn"]
 DEGREES = "give a finite number of degrees Celsius, or None"
 
 
@@ -87,6 +89,13 @@ class FlipFlowScreen:
         k1n in N/m and c1n in N s/m normal to the surface; None leaves that direction unchecked.
     temperature_factor
         Pairs (degrees Celsius, factor on the shear stiffness), rising in temperature.
+    clearance_measured
+        ``"standing"``: the gaps as measured on the standing, empty machine; ``"drawn"``: with
+        unstressed springs. With a ``deck_angle`` the weight of the floating frame, and of what it
+        carries, shifts them: see :attr:`gap_shift`.
+    measured_shift
+        The shift in m of a machine under a load, which :meth:`loaded` sets; None: this machine is
+        the one on which the gaps were measured.
     deck_angle, deck_area, shear_height, shear_pieces, stop_pieces, supports, bearings
         What some checks need, in SI; None leaves those checks out.
 
@@ -118,11 +127,18 @@ class FlipFlowScreen:
     stop_pieces: float | None = None
     supports: float | None = None
     bearings: float | None = None
+    clearance_measured: Measured = "standing"
+    measured_shift: float | None = None
 
     def __post_init__(self) -> None:
         for field in FIELDS:
             object.__setattr__(self, field.name, field.check(getattr(self, field.name)))
         checked_word("stop_law", self.stop_law, get_args(ContactLaw))
+        checked_word("clearance_measured", self.clearance_measured, get_args(Measured))
+        if self.measured_shift is not None:
+            remedy = "give a finite number of m, or None"
+            shift = checked_number("measured_shift", self.measured_shift, remedy)
+            object.__setattr__(self, "measured_shift", shift)
         object.__setattr__(self, "temperature_factor", _checked_table(self.temperature_factor))
 
     def replace(self, **changes: object) -> Self:
@@ -134,15 +150,43 @@ class FlipFlowScreen:
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def loaded(self, load: Load) -> Self:
-        """Return the screen as it is under ``load``: softer or stiffer, heavier, warmer."""
+        """Return the screen as it is under ``load``: softer or stiffer, heavier, warmer.
+
+        What the floating frame carries hangs on the shear springs of the load case. The weight
+        that hung there before stays where it was measured: the factors are dynamic ones.
+        """
         checked_kind("load", load, Load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
         factor = load.stiffness_factor * self.temperature_stiffness_factor(load.temperature)
+        stiffness = self.shear_stiffness * factor
         return self.replace(
             main_mass=self.main_mass + load.main_mass,
             floating_mass=self.floating_mass + load.floating_mass,
-            shear_stiffness=self.shear_stiffness * factor,
+            shear_stiffness=stiffness,
             shear_damping=self.shear_damping * load.damping_factor,
+            measured_shift=self.gap_shift + self._sag(load.floating_mass, stiffness),
         )
+
+    @property
+    def gap_shift(self) -> float:
+        """How far in m the weight on the shear springs shifts the rest between the stops.
+
+        A floating frame that hangs down the slope by s = m2 g sin(alpha) / k2 comes that much
+        nearer to the stop on the plus side, x1 - xf > 0, and leaves that on the minus side: x
+        points up the slope. On the standing machine on which the gaps were measured it is zero.
+        """
+        if self.measured_shift is not None:
+            return self.measured_shift
+        drawn = self.clearance_measured == "drawn"
+        return self._sag(self.floating_mass, self.shear_stiffness) if drawn else 0.0
+
+    @property
+    def weight_considered(self) -> bool:
+        """Whether it is known what the weight does to the gaps."""
+        return self.deck_angle is not None
+
+    def _sag(self, mass: float, stiffness: float) -> float:
+        """How far a mass on the floating frame hangs down the slope, in m."""
+        return mass * GRAVITY * math.sin(self.deck_angle or 0.0) / stiffness
 
     def temperature_stiffness_factor(self, temperature: float | None) -> float:
         """Factor on k2 at a temperature in degrees Celsius, linear between the table's rows."""
@@ -167,18 +211,25 @@ class FlipFlowScreen:
         return self.stop().acts
 
     def stop(self) -> ClearanceSpring:
-        """The stop springs as one clearance spring on the relative motion x1 - xf."""
+        """The stop springs as one clearance spring on the relative motion x1 - xf.
+
+        Its gaps count from where the machine hangs under its weight, without contact.
+        """
+        minus = self.clearance if self.clearance_minus is None else self.clearance_minus
         return ClearanceSpring(
             (1.0, -1.0),
             self.stop_stiffness,
             self.stop_damping,
-            self.clearance,
-            self.clearance_minus,
+            self.clearance - self.gap_shift,
+            minus + self.gap_shift,
             self.stop_law,
         )
 
     def system(self) -> MechanicalSystem:
-        """Return the equations of motion in (x1, xf), absolute, along the screen surface."""
+        """Return the equations of motion in (x1, xf), absolute, along the screen surface.
+
+        They count from where the machine hangs under its weight, without contact.
+        """
         m1, m2 = self.main_mass, self.floating_mass
         c1, c2 = self.isolation_damping, self.shear_damping
         k1, k2 = self.isolation_stiffness, self.shear_stiffness
