@@ -56,8 +56,11 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
     ),
     "kg m^2": ("a moment of inertia", "0.8 kg m^2", {"kg m^2": 1.0, "kg cm^2": 1e-4}),
     "N m": ("a torque", "40 N m", {"N m": 1.0, "kN m": 1e3}),
-    "s": ("a time", "20 s", {"s": 1.0, "ms": 1e-3, "min": 60.0}),
+    "s": ("a time", "20 s", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}),
     "W": ("a power", "2 kW", {"W": 1.0, "kW": 1e3, "MW": 1e6}),
+    "W/K": ("a thermal conductance", "1.5 W/K", {"W/K": 1.0}),
+    "K": ("a difference of temperature", "10 K", {"K": 1.0}),
+    "m/s": ("a speed", "0.4 m/s", {"m/s": 1.0, "mm/s": 1e-3}),
     "kg/m^2": ("a mass per area", "30 kg/m^2", {"kg/m^2": 1.0, "t/m^2": 1e3, "g/m^2": 1e-3}),
     "rad": ("an angle", "15 deg", {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}),
     "rad/s": (
