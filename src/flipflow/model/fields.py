@@ -241,7 +241,7 @@ FIELDS: tuple[Field, ...] = (
     ),
     Field(
         "rotating_mass", "mr", "kg", "kg", "exciter.rotating_mass",
-        "Mass that the exciter bearings carry, unbalances and shaft: the frame accelerates it, too.",
+        "Mass that the exciter bearings carry, unbalances and shaft; the frame moves it, too.",
         default=None, plausible=(0.5, 5e3),
         example="45 kg",
     ),
@@ -259,7 +259,7 @@ FIELDS: tuple[Field, ...] = (
     ),
     Field(
         "bearing_life_exponent", "p", "", "", "exciter.bearing_life_exponent",
-        "Exponent of the rated life: 10/3 for roller bearings, 3 for ball bearings; left out, 10/3.",
+        "Exponent of the rated life: 10/3 for rollers, 3 for balls; left out, 10/3.",
         lower_open=True, default=10.0 / 3.0, plausible=(3.0, 3.4),
         example=3.3333,
     ),

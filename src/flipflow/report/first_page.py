@@ -47,6 +47,7 @@ NO_NORMAL = (
 MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 118
 MOST_NAMED = 4
 OVERLEAF, OVERLEAF_TITLE = 'under "Load cases and notes" on the next page', "Load cases and notes"
+BEARING = ("bearing_load", "bearing_life")
 CASE_COLUMNS = (
     ("relative_amplitude", "amplitude"),
     ("stroke", "stroke"),
@@ -183,13 +184,19 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
         return
     yield Values(
         (
-            ("Foundation", _line(assessment, "foundation_force", "support_force")),
-            ("Shear springs", _line(assessment, "shear_strain")),
+            ("Into the ground", _ground(assessment)),
+            ("Shear springs", _line(assessment, "shear_strain", "shear_piece_force")),
             ("Stop springs", _line(assessment, "stop_force", "stop_piece_force")),
-            ("Exciter, bearings", _line(assessment, "exciter_force", "bearing_force")),
+            ("Exciter, bearings", _line(assessment, "exciter_force", *BEARING)),
             ("Power, throw", _power_and_throw(assessment)),
         )
     )
+
+
+def _ground(assessment: Assessment) -> str:
+    """What goes into the ground."""
+    loads = assessment.foundation
+    return "not calculated: no motion was found." if loads is None else loads.sentence
 
 
 def crowded(assessment: Assessment) -> bool:
