@@ -156,7 +156,8 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
 @read_off.register
 def loads_of(loads: FoundationLoads) -> dict[str, Any]:
     """What goes into the ground in a sentence, and the loads of each support by its name."""
-    each = {one.name: _support_loads(loads, one) for one in (*loads.cases, *loads.runs)}
+    every: tuple[CaseLoads | RunLoads, ...] = (*loads.cases, *loads.runs)
+    each = {one.name: _support_loads(loads, one) for one in every}
     return {"sentence": loads.sentence, "each_support": dict.fromkeys(loads.supports, each)}
 
 

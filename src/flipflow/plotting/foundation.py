@@ -152,9 +152,8 @@ def _plan(columns: list[tuple[str, ...]]) -> str:
                 f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="white" stroke="{INK}" '
                 f'stroke-width="1.4"/>'
             )
-            parts.append(
-                _words(x, y + (17.0 if y > (top + bottom) / 2.0 else -9.0), name, bold=True)
-            )
+            beside = 17.0 if y > (top + bottom) / 2.0 else -9.0
+            parts.append(_words(x, y + beside, name, bold=True))
     return "".join(parts)
 
 

@@ -179,24 +179,19 @@ def _cases_table(assessment: Assessment) -> Table:
 
 @section(Assessment, Part.FIRST_PAGE, 70)
 def surroundings(assessment: Assessment) -> Iterator[Block]:
-    """One line each on foundation, springs, exciter and bearings."""
+    """What goes into the ground; one line each on springs, exciter and bearings."""
     if assessment.omega is None:
         return
+    loads = assessment.foundation
     yield Values(
         (
-            ("Into the ground", _ground(assessment)),
+            ("Into the ground", "not known" if loads is None else loads.sentence),
             ("Shear springs", _line(assessment, "shear_strain", "shear_piece_force")),
             ("Stop springs", _line(assessment, "stop_force", "stop_piece_force")),
             ("Exciter, bearings", _line(assessment, "exciter_force", *BEARING)),
             ("Power, throw", _power_and_throw(assessment)),
         )
     )
-
-
-def _ground(assessment: Assessment) -> str:
-    """What goes into the ground."""
-    loads = assessment.foundation
-    return "not calculated: no motion was found." if loads is None else loads.sentence
 
 
 def crowded(assessment: Assessment) -> bool:

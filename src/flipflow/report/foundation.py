@@ -37,14 +37,20 @@ ROTATION = {
 }
 
 
-@section(Assessment, Part.DETAILS, 80)
+@section(Assessment, Part.DETAILS, 80, brief=True)
+def into_the_ground(assessment: Assessment) -> Iterator[Block]:
+    """What goes into the ground, in a sentence."""
+    if assessment.foundation is not None:
+        yield Heading(TITLE, 1)
+        yield Text(assessment.foundation.sentence, "Into the ground:")
+
+
+@section(Assessment, Part.DETAILS, 81)
 def foundation_page(assessment: Assessment) -> Iterator[Block]:
     """Supports, static and running loads, start and stop, orders, travel."""
     loads = assessment.foundation
     if loads is None:
         return
-    yield Heading(TITLE, 1)
-    yield Text(ground(loads))
     yield DrawingBlock(foundation_drawing(loads))
     shown = heaviest(loads)
     if shown:
@@ -55,11 +61,6 @@ def foundation_page(assessment: Assessment) -> Iterator[Block]:
     yield _travel_table(loads, shown)
     for note in _notes(assessment, loads, shown):
         yield Note(note)
-
-
-def ground(loads: FoundationLoads) -> str:
-    """What goes into the ground, as a sentence of its own."""
-    return f"{loads.sentence[:1].upper()}{loads.sentence[1:]}"
 
 
 def heaviest(loads: FoundationLoads) -> list[CaseLoads]:

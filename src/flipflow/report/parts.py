@@ -29,7 +29,7 @@ class PartRow(NamedTuple):
 
 ROWS = (
     PartRow("Shear spring", "shear_piece_force", "max |k2 x2 + c2 x2'| / n2", EQUATION),
-    PartRow("Shear spring", "shear_strain", "max |x2| / h2", "definition of the engineering strain"),
+    PartRow("Shear spring", "shear_strain", "max |x2| / h2", "engineering strain"),
     PartRow("Shear spring", "shear_piece_power", "c2 mean(x2'^2) / n2", EQUATION),
     PartRow(
         "Shear spring", "shear_temperature_rise", "P2 / (n2 G2)",

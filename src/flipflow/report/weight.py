@@ -19,6 +19,7 @@ MEASURED = {
     "standing": "gaps as measured on the standing, empty machine; what a case adds shifts them",
     "drawn": "gaps as drawn with unstressed springs; the floating frame's weight shifts them",
 }
+NEAR_CONTACT = 1.1  # share of the contact speed up to which a speed lies just above it
 MOST_CASES = 8  # load cases for which the table has room
 
 
@@ -48,20 +49,23 @@ def weight(assessment: Assessment) -> Iterator[Block]:
 
 @section(Assessment, Part.DETAILS, 33, brief=True)
 def doubled(assessment: Assessment) -> Iterator[Block]:
-    """Where a motion of two turns takes the place of one."""
-    for case in assessment.cases:
-        for low, high in case.gaps.doubled:
-            yield Note(
-                f"Case {case.name}: from {rpm(low)} to {rpm(high)} rpm the motion of one period "
-                f"gives way to one of two{_above_contact(case.gaps, low)}."
-            )
+    """Where, just above contact, a motion of two turns takes the place of one."""
+    found = [
+        f"{rpm(low)} to {rpm(high)} rpm ({case.name})"
+        for case in assessment.cases
+        for low, high in case.gaps.doubled
+        if _just_above_contact(case.gaps, low)
+    ]
+    if found:
+        yield Note(
+            "Just above contact the motion of one period gives way to one of two: "
+            f"{'; '.join(found)}."
+        )
 
 
-def _above_contact(gaps: GapsUnderWeight, low: float) -> str:
-    """Words where this lies between the contact of one side and a little beyond the other's."""
-    touched = gaps.contact_plus or gaps.contact_minus
-    near = touched is not None and touched <= low <= 1.1 * touched
-    return ", just above contact" if near else ""
+def _just_above_contact(gaps: GapsUnderWeight, low: float) -> bool:
+    touched = min(gaps.contact_plus or math.inf, gaps.contact_minus or math.inf)
+    return touched <= low <= NEAR_CONTACT * touched
 
 
 def _table(cases: list[CaseAssessment]) -> Table:

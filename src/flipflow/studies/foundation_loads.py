@@ -195,11 +195,15 @@ class FoundationLoads:
             parts.append(f"{run.name} up to {self._worst(run.peaks)} near {at * RPM:.0f} rpm")
         return f"{'; '.join(parts)}; {self._lift_words()}."
 
+    @property
+    def _every(self) -> tuple[CaseLoads | RunLoads, ...]:
+        return (*self.cases, *self.runs)
+
     def _lift_words(self) -> str:
         lifting = self.lifting
         if lifting:
             return f"a spring lifts off in {'; '.join(lifting)}"
-        known = any(one.least.normal is not None for one in (*self.cases, *self.runs))
+        known = any(one.least.normal is not None for one in self._every)
         return "no spring lifts off" if known else "lift-off is not checked"
 
     def _worst(self, load: Components) -> str:
@@ -218,11 +222,11 @@ class FoundationLoads:
     @property
     def lifting(self) -> tuple[str, ...]:
         """Names of cases and runs in which a spring lifts off its support."""
-        every: tuple[CaseLoads | RunLoads, ...] = (*self.cases, *self.runs)
         return tuple(
-            one.name for one in every
+            one.name
+            for one in self._every
             if min(one.least.normal or 0.0, one.least.vertical or 0.0) < 0.0
-        )  # fmt: skip
+        )
 
 
 def foundation_loads(

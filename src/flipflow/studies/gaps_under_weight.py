@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipflow.continuation.branch import Branch
-from flipflow.continuation.special_points import CONTACT_BEGIN
+from flipflow.continuation.special_points import CONTACT_BEGIN, DOUBLING
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.landmarks import landmarks
 
 SAMPLES = 4096  # times in a turn at which the forces of both sides are looked at
-DOUBLING = "period doubling"
 
 
 @dataclass(frozen=True)
