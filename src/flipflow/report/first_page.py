@@ -186,8 +186,7 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
     yield Values(
         (
             ("Into the ground", "not known" if loads is None else loads.sentence),
-            ("Shear springs", _line(assessment, "shear_strain", "shear_piece_force")),
-            ("Stop springs", _line(assessment, "stop_force", "stop_piece_force")),
+            ("Springs", _springs(assessment)),
             ("Exciter, bearings", _line(assessment, "exciter_force", *BEARING)),
             ("Power, throw", _power_and_throw(assessment)),
         )
@@ -332,7 +331,7 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
         return f"not checked, {missing_words(missing)}" if missing else "not checked"
     _, case = (min if lowest else max)(found, key=lambda one: one[0])
     if first == "stop_force" and not case.stop_reached:
-        return "stop not reached" if case.screen.has_stop else "none fitted"
+        return "stop not reached" if case.screen.has_stop else "no stops fitted"
     parts = [
         f"{QUANTITIES[name].label} {named(name, case.values[name])}"
         for name in names
@@ -340,6 +339,11 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     ]
     where = f" (case {case.name})" if len(assessment.cases) > 1 else ""
     return f"{', '.join(parts)}{where}"
+
+
+def _springs(assessment: Assessment) -> str:
+    shear, stop = _line(assessment, "shear_piece_force"), _line(assessment, "stop_force")
+    return f"{shear}; {stop}"
 
 
 def _power_and_throw(assessment: Assessment) -> str:

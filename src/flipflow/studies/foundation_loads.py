@@ -183,17 +183,17 @@ class FoundationLoads:
         parts = []
         if self.cases:
             heaviest = max(self.cases, key=lambda one: one.static.total or 0.0)
-            parts.append(f"{head} bears at most {self._kilo(heaviest.static.total)} at rest")
+            parts.append(f"{self._kilo(heaviest.static.total)} at rest")
             one = max(self.cases, key=lambda one: one.running.total or one.running.along or 0.0)
             parts.append(
-                f"running at {digits(one.omega * RPM, 4)} rpm adds up to "
-                f"{self._worst(one.running)} (case {one.name})"
+                f"running at {digits(one.omega * RPM, 4)} rpm {self._worst(one.running)} "
+                f"(case {one.name})"
             )
         if self.runs:
             run = max(self.runs, key=lambda one: one.peaks.total or one.peaks.along or 0.0)
             at = run.at.total or run.at.along or 0.0
-            parts.append(f"{run.name} up to {self._worst(run.peaks)} near {at * RPM:.0f} rpm")
-        return f"{'; '.join(parts)}; {self._lift_words()}."
+            parts.append(f"{run.name} {self._worst(run.peaks)} near {at * RPM:.0f} rpm")
+        return f"{head}: {'; '.join(parts)}; {self._lift_words()}."
 
     @property
     def _every(self) -> tuple[CaseLoads | RunLoads, ...]:
@@ -211,9 +211,9 @@ class FoundationLoads:
         if load.vertical is None or load.horizontal is None:
             pairs = ((load.along, "along the surface"), (load.normal, "normal to it"))
         else:
-            pairs = ((load.vertical, "vertically"), (load.horizontal, "horizontally"))
-        known = (f"{self._kilo(value)} {word}" for value, word in pairs if value is not None)
-        return " and ".join(known)
+            pairs = ((load.vertical, "vertical"), (load.horizontal, "horizontal"))
+        known = (f"±{self._kilo(value)} {word}" for value, word in pairs if value is not None)
+        return ", ".join(known)
 
     def _kilo(self, force: float | None) -> str:
         """A force of all supports, shared by them, in kN."""
