@@ -71,7 +71,11 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
     "degC": ("a temperature", "50 degC", {"degC": 1.0, "°C": 1.0, "K": 1.0, "degF": 5.0 / 9.0}),
     "": ("a ratio", "20 %", {"": 1.0, "%": 1e-2}),
 }
-_OFFSET: Mapping[str, float] = {"K": -273.15, "degF": -160.0 / 9.0}
+# Of temperatures, which count from another zero; differences of them do not.
+_OFFSET: Mapping[tuple[str, str], float] = {
+    ("degC", "K"): -273.15,
+    ("degC", "degF"): -160.0 / 9.0,
+}
 _NEVER_PINT = frozenset({"rad", "rad/s", "degC", ""})
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -149,7 +153,7 @@ def in_unit(value: float, unit: str, si_unit: str) -> float:
     float
         The value in ``unit``.
     """
-    return (value - _OFFSET.get(unit, 0.0)) / _UNITS[si_unit][2][unit]
+    return (value - _OFFSET.get((si_unit, unit), 0.0)) / _UNITS[si_unit][2][unit]
 
 
 def shown(value: float, unit: str, si_unit: str) -> str:
@@ -192,7 +196,7 @@ def _normal(unit: str) -> str:
 def _convert(number: str, name: str, unit: str, *, field: str, written: str, example: str) -> float:
     what, _, known = _UNITS[unit]
     if name in known:
-        return _times(number, known[name]) + _OFFSET.get(name, 0.0)
+        return _times(number, known[name]) + _OFFSET.get((unit, name), 0.0)
     if not name:
         raise InputError(field, written, f"write the unit of {what}, for example {example!r}")
     other = next((w for w, _, units in _UNITS.values() if name in units), None)

@@ -8,7 +8,7 @@ from flipflow.plotting.drawing import Drawing
 from flipflow.plotting.palette import COLOURS, INK
 from flipflow.studies.foundation_loads import FoundationLoads
 
-WIDTH, HEIGHT = 690, 236
+WIDTH, HEIGHT = 690, 216
 GROUND, LEFT, RIGHT = 190.0, 40.0, 320.0  # ground line and ends of the frame in the side view
 DEPTH, LIFT = 34.0, 44.0  # depth of the frame, and height of its lower end above the ground
 STEEPEST = math.radians(28.0)  # of what is drawn; a steeper deck is drawn like this
@@ -125,7 +125,7 @@ def _arrow(
     if upright:
         at, anchor = (tip[0] + (-4.0 if low else 4.0), tip[1] + 12.0), "end" if low else "start"
     else:
-        at, anchor = (tip[0] + 4.0, tip[1] + (12.0 if low else -2.0)), "middle"
+        at, anchor = (tip[0] + 5.0, tip[1] + (12.0 if low else -4.0)), "middle"
     return (
         f'<path d="M{x} {y}L{tip[0]:.1f} {tip[1]:.1f}{barbs}" stroke="{colour}" '
         f'stroke-width="1.6" fill="none"/><text x="{at[0]:.1f}" y="{at[1]:.1f}" '

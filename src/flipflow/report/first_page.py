@@ -47,7 +47,6 @@ NO_NORMAL = (
 MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 118
 MOST_NAMED = 4
 OVERLEAF, OVERLEAF_TITLE = 'under "Load cases and notes" on the next page', "Load cases and notes"
-BEARING = ("bearing_load", "bearing_life")
 CASE_COLUMNS = (
     ("relative_amplitude", "amplitude"),
     ("stroke", "stroke"),
@@ -182,12 +181,13 @@ def surroundings(assessment: Assessment) -> Iterator[Block]:
     """What goes into the ground; one line each on springs, exciter and bearings."""
     if assessment.omega is None:
         return
-    loads = assessment.foundation
+    loads, screen = assessment.foundation, assessment.project.screen
+    bearing = "bearing_force" if QUANTITIES["bearing_load"].missing(screen) else "bearing_load"
     yield Values(
         (
             ("Into the ground", "not known" if loads is None else loads.sentence),
             ("Springs", _springs(assessment)),
-            ("Exciter, bearings", _line(assessment, "exciter_force", *BEARING)),
+            ("Exciter, bearings", _line(assessment, "exciter_force", bearing)),
             ("Power, throw", _power_and_throw(assessment)),
         )
     )

@@ -111,6 +111,9 @@ def _running_table(loads: FoundationLoads, shown: Sequence[CaseLoads]) -> Table:
         "Static: weight of machine and load. Then the greatest dynamic load to both sides, peak. "
         "Least: static less dynamic; below zero a spring lifts off."
     )
+    if loads.supports:
+        count = len(loads.supports)
+        caption += f" The {count} supports move in step: all together load {count} times as much."
     at = f"running at {rpm(shown[0].omega)} rpm"
     hertz = f"{in_unit(shown[0].omega, 'Hz', 'rad/s'):.4g} Hz"
     return Table(f"{_one(loads)}, {at} ({hertz})", columns, rows, caption)
