@@ -311,7 +311,7 @@ def test_eight_springs_on_four_supports(tmp_path) -> None:
     assert (screen.supports, screen.isolation_pieces) == (4.0, 8.0)
     close("k1", screen.isolation_stiffness, 630e3, rel=1e-12)
     file.write_text(eight.replace("pieces = 8", "pieces = 6"))
-    with pytest.raises(ff.InputError, match="isolation.pieces = 6: give a multiple of the 4"):
+    with pytest.raises(ff.InputError, match=r"isolation\.pieces = 6: give a multiple of the 4"):
         ff.load(file)
     with pytest.raises(ff.InputError, match="isolation_pieces"):
         screen.replace(supports=3)
