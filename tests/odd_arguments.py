@@ -38,6 +38,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins, GridAxis
+from flipflow.studies.foundation_loads import Components, FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
 from flipflow.studies.operating_region import OperatingRegion
@@ -119,6 +120,12 @@ def screen() -> ff.FlipFlowScreen:
 def plain() -> ff.FlipFlowScreen:
     """The same without stop: closed form."""
     return ff.load("ffs0827-linear")
+
+
+@cache
+def running() -> Orbit:
+    """A motion of the machine without stop."""
+    return ff.frequency_response(plain(), (80.0, 90.0), FEW).orbits_at(85.0)[0]
 
 
 @cache
@@ -245,6 +252,8 @@ def functions() -> tuple[Call, ...]:
         Call("continue_orbit", ff.continue_orbit,
              {"orbit": orbit(), "field": "omega", "interval": narrow, "monitor": None},
              (Branch, FieldBranch)),
+        Call("foundation_loads", ff.foundation_loads,
+             {"motions": {"empty": running()}, "runs": None}, (FoundationLoads,)),
         Call("figure", ff.figure, {"result": tiny_branch()}, (Figure,)),
         Call("frequency_response", ff.frequency_response,
              {"machine": tiny(), "omega": narrow, "method": FEW}, (Branch,)),
@@ -358,7 +367,9 @@ def methods() -> tuple[Call, ...]:
     basins = ff.basins(tiny(), OMEGA, {"main": [0.0]}, most_turns=50)
     ramp = ff.ramp(tiny(), (95.0, 105.0), 100.0)
     over = ff.continue_orbit(folded().orbit(0), "clearance", (5.99e-3, 6.01e-3))
-    table = ff.load("ffs0827").replace(temperature_factor=((0.0, 1.1), (40.0, 1.0)))
+    rows = ((0.0, 1.1), (40.0, 1.0))
+    table = ff.load("ffs0827").replace(temperature_factor=rows, stop_temperature_factor=rows)
+    loads = ff.foundation_loads({"empty": running()})
     spring = tiny().springs[0]
     motion = one.motion
     listed = [
@@ -398,6 +409,8 @@ def methods() -> tuple[Call, ...]:
         (table, "replace", {"main_mass": 900.0}, (ff.FlipFlowScreen,)),
         (table, "loaded", {"load": ff.Load()}, (ff.FlipFlowScreen,)),
         (table, "temperature_stiffness_factor", {"temperature": 20.0}, (float,)),
+        (table, "stop_temperature_stiffness_factor", {"temperature": 20.0}, (float,)),
+        (loads, "of_support", {"load": loads.cases[0].running}, (Components,)),
         (spring, "force", {"gap": [0.0], "rate": [0.0]}, array),
         (tiny(), "coordinate", which, array),
         (motor(), "torque", {"speed": [0.0]}, array),

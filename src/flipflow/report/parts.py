@@ -48,7 +48,7 @@ ROWS = (
 )  # fmt: skip
 
 
-@section(Assessment, Part.DETAILS, 36)
+@section(Assessment, Part.DETAILS, 75)
 def parts(assessment: Assessment) -> Iterator[Block]:
     """Every part's load in its worst case."""
     cases = [case for case in assessment.cases if case.values]

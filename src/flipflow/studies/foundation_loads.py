@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_kind, checked_mapping
+from flipflow.model.arguments import checked_kind, checked_mapping, checked_text
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.numerals import digits
 from flipflow.model.screen import FlipFlowScreen, Rotation
@@ -59,11 +59,6 @@ class Components:
     horizontal: float | None = None
     vertical: float | None = None
     total: float | None = None
-
-    def scaled(self, factor: float) -> Components:
-        """Every component times a factor."""
-        own = vars(self).items()
-        return Components(**{name: None if v is None else factor * v for name, v in own})
 
 
 @dataclass(frozen=True)
@@ -141,7 +136,7 @@ class RunLoads:
     travel: Mapping[str, Components]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FoundationLoads:
     """What goes into the ground; forces are those of all supports together.
 
@@ -171,9 +166,16 @@ class FoundationLoads:
     runs: tuple[RunLoads, ...]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        parts = f"{len(self.cases)} load cases, {len(self.runs)} runs"
+        return f"FoundationLoads({len(self.supports)} supports, {parts})"
+
     def of_support(self, load: Components) -> Components:
         """The share of one support in a load of all together; all of it with no known number."""
-        return load.scaled(1.0 / max(len(self.supports), 1))
+        checked_kind("load", load, Components, "give a load of one of the cases or runs")
+        count = max(len(self.supports), 1)
+        shared = {name: None if v is None else v / count for name, v in vars(load).items()}
+        return Components(**shared)
 
     @property
     def sentence(self) -> str:
@@ -261,6 +263,11 @@ def foundation_loads(
     screens = [checked_kind("motions", one, FlipFlowScreen, remedy) for one in machines]
     if not screens:
         raise InputError("motions", motions, "give at least one motion or run")
+    for name in (*motions, *(runs or {})):
+        checked_text("name", name)
+    stands = {(one.supports, one.deck_angle, one.rotation) for one in screens}
+    if len(stands) > 1:
+        raise InputError("motions", list(motions), "give load cases and runs of one machine")
     first = screens[0]
     names = tuple(f"S{k + 1}" for k in range(int(first.supports or 0)))
     return FoundationLoads(
