@@ -335,8 +335,9 @@ def classes() -> tuple[Call, ...]:
         ff.LoadStep: {"t": 0.1, "load": ff.Load()},
         ff.Lump: {"t": 0.1, "frame": "main", "mass": 1.0, "velocity": 0.0},
         ff.Load: {
-            "stiffness_factor": 1.0, "damping_factor": 1.0, "main_mass": 0.0,
-            "floating_mass": 0.0, "temperature": None, "name": "",
+            "stiffness_factor": 1.0, "damping_factor": 1.0, "stop_stiffness_factor": 1.0,
+            "stop_damping_factor": 1.0, "main_mass": 0.0, "floating_mass": 0.0,
+            "temperature": None, "temperature_of": "rubber", "name": "",
         },
         ff.Motor: {
             "synchronous_speed": 150.0, "rated_power": 100.0, "breakdown_torque": None,
