@@ -412,6 +412,7 @@ def methods() -> tuple[Call, ...]:
         (table, "temperature_stiffness_factor", {"temperature": 20.0}, (float,)),
         (table, "stop_temperature_stiffness_factor", {"temperature": 20.0}, (float,)),
         (loads, "of_support", {"load": loads.cases[0].running}, (Components,)),
+        (loads, "static_on", {"support": "S1", "case": loads.cases[0]}, (Components,)),
         (spring, "force", {"gap": [0.0], "rate": [0.0]}, array),
         (tiny(), "coordinate", which, array),
         (motor(), "torque", {"speed": [0.0]}, array),

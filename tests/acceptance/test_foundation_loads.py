@@ -239,6 +239,29 @@ def test_what_is_missing_is_said_and_left_out(linear) -> None:
         assert word in told
 
 
+@pytest.mark.parametrize("supports", [2, 4, 5, 6, 8])
+def test_weight_on_each_support_balances_about_the_centre_of_gravity(linear, supports) -> None:
+    """Forces and moments of a rigid body; it tilts on its springs, so the shares lie on a line."""
+    screen = linear.replace(supports=supports, load_centre=0.58)
+    loads = ff.foundation_loads({"empty": motion(screen)})
+    case = loads.cases[0]
+    forces = np.array([loads.static_on(one, case).vertical for one in loads.supports])
+    close("sum", forces.sum(), 1226.0 * G, rel=1e-12)
+    columns = np.arange(supports) // 2
+    if supports > 2:
+        place = columns / columns.max()
+        close("moment", forces @ (place - 0.58), 0.0, abs=1e-9 * 1226.0 * G)
+        line = np.polyfit(place, forces, 1)
+        close("line", forces, np.polyval(line, place), rel=1e-12)
+    if supports == 4:
+        close("lever", forces / (1226.0 * G), [0.21, 0.21, 0.29, 0.29], rel=1e-12)
+        _, up = by_hand(screen, OMEGA, 1.0)
+        lightest = 0.21 * 1226.0 * G * math.cos(ANGLE) - abs(up) / 4.0
+        close("least", loads.of_support(case.least).normal, lightest, rel=1e-5)
+    with pytest.raises(ff.InputError, match="support"):
+        loads.static_on("S99", case)
+
+
 def test_only_screens_have_a_foundation(linear) -> None:
     plain = motion(linear.system())
     for wrong in ({}, {"a": 1}, {"a": plain}):
@@ -275,6 +298,8 @@ def test_supports_of_the_document_add_up_to_the_whole(assessment) -> None:
         for name, value in whole.items():
             parts = [one[case.name]["running"][name] for one in each.values()]
             close(name, sum(parts), value, rel=1e-12)
+        weights = [one[case.name]["static"]["vertical"] for one in each.values()]
+        close("weight", sum(weights), case.static.vertical, rel=1e-12)
 
 
 def test_the_page_for_the_civil_engineer_names_supports_and_what_is_not_known(assessment) -> None:

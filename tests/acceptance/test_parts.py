@@ -15,11 +15,12 @@ from scipy.optimize import bisect, brentq
 
 import flipflow as ff
 from flipflow.io.check import check_project
+from flipflow.model.fields import FIELD
 from flipflow.model.numerals import digits
 from flipflow.report import summary
 from flipflow.report.html import html
 from flipflow.report.numbers import bounds, percent
-from flipflow.studies.quantity_values import Working
+from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working
 from judge import close
 
 pytestmark = pytest.mark.numerical
@@ -70,6 +71,19 @@ def test_one_shear_spring_with_stops(screen, found) -> None:
     close("force", found.value("shear_piece_force"), force, rel=1e-5)
     power = screen.shear_damping * np.mean(v2[:-1] ** 2) / 12.0
     close("power", found.value("shear_piece_power"), power, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", [
+    "shear_piece_force", "shear_piece_power", "shear_temperature_rise", "stop_approach_speed",
+    "bearing_load", "bearing_life",
+])  # fmt: skip
+def test_many_machines_in_closed_form_are_one_machine_solved(name) -> None:
+    """What a sensitivity evaluates for arrays of screens without stop."""
+    screen = ff.load("ffs0827-linear").replace(**FULL)
+    fields = {one: np.asarray(getattr(screen, one), float) for one in FIELD}
+    arrays = ContactFree(fields, np.array([OMEGA]))
+    got = MOTION_VALUES[name](arrays)
+    close(name, np.ravel(got), [working(screen).value(name)], rel=1e-5)
 
 
 def test_one_stop_meets_its_partner_as_fast_as_the_gap_closes(found) -> None:

@@ -14,7 +14,7 @@ from flipflow.results.codec import exact, plain
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.documents import CODEC
-from flipflow.studies.foundation_loads import CaseLoads, Components, FoundationLoads, RunLoads
+from flipflow.studies.foundation_loads import CaseLoads, FoundationLoads, RunLoads
 from flipflow.studies.jump_risk import JumpRisk, Throw
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.start_and_blows import Transients
@@ -157,17 +157,20 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
 def loads_of(loads: FoundationLoads) -> dict[str, Any]:
     """What goes into the ground in a sentence, and the loads of each support by its name."""
     every: tuple[CaseLoads | RunLoads, ...] = (*loads.cases, *loads.runs)
-    each = {one.name: _support_loads(loads, one) for one in every}
-    return {"sentence": loads.sentence, "each_support": dict.fromkeys(loads.supports, each)}
+    each = {
+        support: {one.name: _support_loads(loads, one, support) for one in every}
+        for support in loads.supports
+    }
+    return {"sentence": loads.sentence, "each_support": each}
 
 
-def _support_loads(loads: FoundationLoads, one: CaseLoads | RunLoads) -> dict[str, Any]:
-    parts: dict[str, Components] = {"least": one.least}
-    if isinstance(one, CaseLoads):
-        parts |= {"static": one.static, "running": one.running}
-    else:
-        parts["peaks"] = one.peaks
-    return {name: vars(loads.of_support(part)) for name, part in parts.items()}
+def _support_loads(
+    loads: FoundationLoads, one: CaseLoads | RunLoads, support: str
+) -> dict[str, Any]:
+    if isinstance(one, RunLoads):
+        return {"peaks": vars(loads.of_support(one.peaks))}
+    static = loads.static_on(support, one)
+    return {"static": vars(static), "running": vars(loads.of_support(one.running))}
 
 
 def _transients(found: Transients | None) -> dict[str, Any] | None:

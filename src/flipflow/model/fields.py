@@ -234,6 +234,13 @@ FIELDS: tuple[Field, ...] = (
         example=8, whole=True,
     ),
     Field(
+        "load_centre", "s_c", "", "%", "isolation.load_centre",
+        "Where the centre of gravity lies between the lowest supports, 0 %, and the highest, "
+        "100 %; left out, all carry alike.",
+        upper=1.0, default=None, plausible=(0.2, 0.8),
+        example="50 %",
+    ),
+    Field(
         "bearings", "nb", "", "", "exciter.bearings",
         "Number of exciter bearings that share the unbalance force.",
         lower=1.0, default=None, plausible=(1.0, 32.0),

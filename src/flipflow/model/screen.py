@@ -117,6 +117,8 @@ class FlipFlowScreen:
         What some checks need, in SI; None leaves those checks out.
     isolation_pieces
         Number of isolation springs, a multiple of the supports; None: one at each support.
+    load_centre
+        Where the centre of gravity lies between the lowest supports, 0, and the highest, 1.
     rotating_mass, bearing_rating, bearing_load_factor, bearing_life_exponent
         What load and life of the exciter bearings need, in SI.
     shear_conductance
@@ -155,6 +157,7 @@ class FlipFlowScreen:
     rotation: Rotation = "with-flow"
     stop_temperature_factor: tuple[tuple[float, float], ...] = ()
     isolation_pieces: float | None = None
+    load_centre: float | None = None
     rotating_mass: float | None = None
     bearing_rating: float | None = None
     bearing_load_factor: float = 1.2

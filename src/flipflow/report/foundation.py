@@ -79,6 +79,16 @@ def _kilo(loads: FoundationLoads, load: Components, names: Sequence[str]) -> lis
     return [quantity(getattr(each, name), "kN", "N", with_unit=False) for name in names]
 
 
+def _static(loads: FoundationLoads, case: CaseLoads) -> str:
+    """Weight on a support in kN; from least to greatest where they differ."""
+    (even,) = _kilo(loads, case.static, ("vertical",))
+    if len(set(loads.static_shares)) < 2:
+        return even
+    every = sorted(loads.static_on(one, case).vertical or 0.0 for one in loads.supports)
+    low, high = (quantity(force, "kN", "N", with_unit=False) for force in (every[0], every[-1]))
+    return f"{low} to {high}"
+
+
 def _state(least: Components) -> Cell:
     known = [value for value in (least.normal, least.vertical) if value is not None]
     if not known:
@@ -99,7 +109,7 @@ def _running_table(loads: FoundationLoads, shown: Sequence[CaseLoads]) -> Table:
         (
             *cells(
                 one.name,
-                *_kilo(loads, one.static, ("vertical",)),
+                _static(loads, one),
                 *_kilo(loads, one.running, LOADS),
                 *_kilo(loads, one.least, ("vertical", "normal")),
             ),
@@ -210,6 +220,9 @@ def _notes(
 ) -> Iterator[str]:
     if loads.supports:
         yield f"Loads of the {len(loads.supports)} supports are {loads.position}."
+        if len(set(loads.static_shares)) > 1:
+            pairs = zip(loads.supports, loads.static_shares, strict=True)
+            yield "At rest " + ", ".join(f"{name} {100.0 * p:.3g} %" for name, p in pairs) + "."
     yield f"Rotation {loads.rotation}: {ROTATION[loads.rotation]}. It changes the horizontal load."
     yield from loads.notes
     missing = [case.name for case in assessment.cases if case.orbit is None]

@@ -6,7 +6,8 @@ downwards, "horizontal" the way in which the surface rises. With the surface inc
 
 .. math:: H = F_a \cos\alpha + F_n \sin\alpha , \quad V = F_n \cos\alpha - F_a \sin\alpha .
 
-The frames are rigid and do not pitch, so every support carries the same dynamic load. Motion and
+The frames are rigid and do not pitch, so every support carries the same dynamic load; at rest the
+weight is shared evenly, or as the place of the centre of gravity has it. Motion and
 load across the machine are not calculated.
 """
 
@@ -37,6 +38,10 @@ EXCITED = math.sqrt(0.5)  # share of the greatest force that bounds the half-pow
 WITHIN = 8  # times looked at within each step of a run
 GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 EQUAL = "assumed equal: the machine file holds no positions of the supports"
+SHARED = (
+    "shared at rest by a rigid frame on equal springs, evenly spaced up the slope, two abreast, "
+    "from isolation.load_centre"
+)
 LATERAL = "Lateral loads, across the machine, are not calculated."
 
 
@@ -95,8 +100,8 @@ class CaseLoads:
     orders
         Orders 1 to 3 of it.
     least
-        Least load in N over a turn, static less dynamic, "normal" and "vertical"; a spring that
-        stands on its support lifts off below zero.
+        Least load in N over a turn, static less dynamic, "normal" and "vertical", of the support
+        that carries least, times their number; its spring lifts off below zero.
     travel
         Greatest displacement from rest in m of the frames, "main" and "floating".
     """
@@ -156,6 +161,8 @@ class FoundationLoads:
         Every start and coast-down.
     notes
         What is left out.
+    static_shares
+        Share of the weight that each support carries at rest.
     """
 
     supports: tuple[str, ...]
@@ -165,6 +172,7 @@ class FoundationLoads:
     cases: tuple[CaseLoads, ...]
     runs: tuple[RunLoads, ...]
     notes: tuple[str, ...]
+    static_shares: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         parts = f"{len(self.cases)} load cases, {len(self.runs)} runs"
@@ -174,8 +182,20 @@ class FoundationLoads:
         """The share of one support in a load of all together; all of it with no known number."""
         checked_kind("load", load, Components, "give a load of one of the cases or runs")
         count = max(len(self.supports), 1)
-        shared = {name: None if v is None else v / count for name, v in vars(load).items()}
-        return Components(**shared)
+        return _times(load, 1.0 / count)
+
+    def static_on(self, support: str, case: CaseLoads) -> Components:
+        """Weight on one support in a load case, in N.
+
+        Raises
+        ------
+        InputError
+            For a support of another name.
+        """
+        checked_kind("case", case, CaseLoads, "give one of the load cases")
+        if support not in self.supports:
+            raise InputError("support", support, f"choose one of {', '.join(self.supports)}")
+        return _times(case.static, self.static_shares[self.supports.index(support)])
 
     @property
     def sentence(self) -> str:
@@ -185,7 +205,8 @@ class FoundationLoads:
         parts = []
         if self.cases:
             heaviest = max(self.cases, key=lambda one: one.static.total or 0.0)
-            parts.append(f"{self._kilo(heaviest.static.total)} at rest")
+            uneven = max(self.static_shares, default=1.0) * max(count, 1)
+            parts.append(f"{self._kilo(uneven * (heaviest.static.total or 0.0))} at rest")
             one = max(self.cases, key=lambda one: one.running.total or one.running.along or 0.0)
             parts.append(
                 f"running at {digits(one.omega * RPM, 4)} rpm {self._worst(one.running)} "
@@ -265,20 +286,53 @@ def foundation_loads(
         raise InputError("motions", motions, "give at least one motion or run")
     for name in (*motions, *(runs or {})):
         checked_text("name", name)
-    stands = {(one.supports, one.deck_angle, one.rotation) for one in screens}
+    stands = {(one.supports, one.deck_angle, one.rotation, one.load_centre) for one in screens}
     if len(stands) > 1:
         raise InputError("motions", list(motions), "give load cases and runs of one machine")
     first = screens[0]
     names = tuple(f"S{k + 1}" for k in range(int(first.supports or 0)))
     return FoundationLoads(
         supports=names,
-        position=EQUAL,
+        position=EQUAL if first.load_centre is None else SHARED,
         deck_angle=first.deck_angle,
         rotation=first.rotation,
         cases=tuple(_case_loads(name, orbit) for name, orbit in motions.items()),
         runs=tuple(_run_loads(name, run) for name, run in (runs or {}).items()),
         notes=tuple(_notes(first)),
+        static_shares=static_shares(len(names), first.load_centre),
     )
+
+
+def static_shares(count: int, centre: float | None) -> tuple[float, ...]:
+    r"""Share of the weight on each of ``count`` supports, two abreast up the slope.
+
+    A rigid frame on equal springs at places u from 0 to 1, its centre of gravity at c:
+
+    .. math:: p_i = \frac{1}{n} \left( 1 + \frac{(c - \bar u)(u_i - \bar u)}{\overline{(u -
+              \bar u)^2}} \right) ,
+
+    so that the shares add up to one and balance about the centre of gravity. The height of the
+    centre of gravity above the springs is left out.
+    """
+    if count == 0:
+        return ()
+    column = np.arange(count) // 2
+    place = column / max(column[-1], 1)
+    spread = float(place.var())
+    if centre is None or spread == 0.0:
+        return (1.0 / count,) * count
+    away = place - place.mean()
+    return tuple((1.0 + (centre - float(place.mean())) * away / spread) / count)
+
+
+def _smallest(screen: FlipFlowScreen) -> float:
+    """Static load of the support that carries least over an even share."""
+    shares = static_shares(int(screen.supports or 0), screen.load_centre)
+    return min(shares, default=1.0) * max(len(shares), 1)
+
+
+def _times(load: Components, factor: float) -> Components:
+    return Components(**{k: None if v is None else factor * v for k, v in vars(load).items()})
 
 
 def static_load(screen: FlipFlowScreen) -> Components:
@@ -344,7 +398,7 @@ def _case_loads(name: str, orbit: Orbit) -> CaseLoads:
         static=static,
         running=_orbit_peaks(orbit, force),
         orders=tuple(_orders(orbit, screen)),
-        least=_orbit_least(orbit, force, static),
+        least=_orbit_least(orbit, force, _times(static, _smallest(screen))),
         travel={frame: _orbit_peaks(orbit, way(k)) for k, frame in enumerate(("main", "floating"))},
     )
 
@@ -447,7 +501,7 @@ def _run_loads(name: str, run: RunUp) -> RunLoads:
         peaks=_greatest(force),
         at=Components(**{one: float(omega[row]) for one, row in rows.items()}),
         excited=_excited(size, angles, omega),
-        least=Components(**_least(force, static)),
+        least=Components(**_least(force, _times(static, _smallest(screen)))),
         travel={one: _greatest(_by_direction(way, y, angle)) for one, way in ways.items()},
     )
 
