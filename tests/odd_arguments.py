@@ -39,6 +39,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins, GridAxis
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.foundation_loads import Components, FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
 from flipflow.studies.lyapunov import LyapunovExponents
@@ -121,6 +122,12 @@ def screen() -> ff.FlipFlowScreen:
 def plain() -> ff.FlipFlowScreen:
     """The same without stop: closed form."""
     return ff.load("ffs0827-linear")
+
+
+@cache
+def running() -> Orbit:
+    """A motion of the machine without stop."""
+    return ff.frequency_response(plain(), (80.0, 90.0), FEW).orbits_at(85.0)[0]
 
 
 @cache
@@ -251,6 +258,8 @@ def functions() -> tuple[Call, ...]:
         Call("continue_orbit", ff.continue_orbit,
              {"orbit": orbit(), "field": "omega", "interval": narrow, "monitor": None},
              (Branch, FieldBranch)),
+        Call("foundation_loads", ff.foundation_loads,
+             {"motions": {"empty": running()}, "runs": None}, (FoundationLoads,)),
         Call("figure", ff.figure, {"result": tiny_branch()}, (Figure,)),
         Call("frequency_response", ff.frequency_response,
              {"machine": tiny(), "omega": narrow, "method": FEW}, (Branch,)),
@@ -339,8 +348,9 @@ def classes() -> tuple[Call, ...]:
         ff.LoadStep: {"t": 0.1, "load": ff.Load()},
         ff.Lump: {"t": 0.1, "frame": "main", "mass": 1.0, "velocity": 0.0},
         ff.Load: {
-            "stiffness_factor": 1.0, "damping_factor": 1.0, "main_mass": 0.0,
-            "floating_mass": 0.0, "temperature": None, "name": "",
+            "stiffness_factor": 1.0, "damping_factor": 1.0, "stop_stiffness_factor": 1.0,
+            "stop_damping_factor": 1.0, "main_mass": 0.0, "floating_mass": 0.0,
+            "temperature": None, "temperature_of": "rubber", "name": "",
         },
         ff.Motor: {
             "synchronous_speed": 150.0, "rated_power": 100.0, "breakdown_torque": None,
@@ -372,7 +382,9 @@ def methods() -> tuple[Call, ...]:
     basins = ff.basins(tiny(), OMEGA, {"main": [0.0]}, most_turns=50)
     ramp = ff.ramp(tiny(), (95.0, 105.0), 100.0)
     over = ff.continue_orbit(folded().orbit(0), "clearance", (5.99e-3, 6.01e-3))
-    table = ff.load("ffs0827").replace(temperature_factor=((0.0, 1.1), (40.0, 1.0)))
+    rows = ((0.0, 1.1), (40.0, 1.0))
+    table = ff.load("ffs0827").replace(temperature_factor=rows, stop_temperature_factor=rows)
+    loads = ff.foundation_loads({"empty": running()})
     spring = tiny().springs[0]
     motion = one.motion
     listed = [
@@ -413,6 +425,9 @@ def methods() -> tuple[Call, ...]:
         (table, "replace", {"main_mass": 900.0}, (ff.FlipFlowScreen,)),
         (table, "loaded", {"load": ff.Load()}, (ff.FlipFlowScreen,)),
         (table, "temperature_stiffness_factor", {"temperature": 20.0}, (float,)),
+        (table, "stop_temperature_stiffness_factor", {"temperature": 20.0}, (float,)),
+        (loads, "of_support", {"load": loads.cases[0].running}, (Components,)),
+        (loads, "static_on", {"support": "S1", "case": loads.cases[0]}, (Components,)),
         (spring, "force", {"gap": [0.0], "rate": [0.0]}, array),
         (tiny(), "coordinate", which, array),
         (motor(), "torque", {"speed": [0.0]}, array),

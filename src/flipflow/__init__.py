@@ -21,6 +21,7 @@ _HOME = {
     "operating_region": "flipflow.studies.operating_region",
     "periodic_orbits": "flipflow.studies.periodic_orbits",
     "basins": "flipflow.studies.basins",
+    "foundation_loads": "flipflow.studies.foundation_loads",
     "jump_risk": "flipflow.studies.jump_risk",
     "start_up": "flipflow.transient.startup",
     "coast_down": "flipflow.transient.startup",
@@ -102,6 +103,7 @@ if TYPE_CHECKING:
     from flipflow.studies.assessment import assess as assess
     from flipflow.studies.basins import basins as basins
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
+    from flipflow.studies.foundation_loads import foundation_loads as foundation_loads
     from flipflow.studies.jump_risk import jump_risk as jump_risk
     from flipflow.studies.loading import loading as loading
     from flipflow.studies.lyapunov import lyapunov_exponents as lyapunov_exponents

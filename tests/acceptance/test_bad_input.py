@@ -113,7 +113,7 @@ VALUES = {
     "pieces not counted": (
         "supports = 4",
         'stiffness_each = "157.5 kN/m"',
-        ("isolation.stiffness_each", "isolation.supports"),
+        ("isolation.stiffness_each", "isolation.pieces"),
     ),
     "missing mass": ('main_mass = "916 kg"', "", ("frames.main_mass", "(left out)", "'1000 kg'")),
     "missing gap": ('clearance = "6 mm"', "", ("stops.clearance", "(left out)", "gap")),

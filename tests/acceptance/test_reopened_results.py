@@ -28,6 +28,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
 from flipflow.studies.lyapunov import LyapunovExponents
@@ -102,6 +103,12 @@ MADE: dict[type, list[Callable[[], object]]] = {
     RunUp: [
         lambda: ff.start_up(screen(), DRIVE, duration=0.5),
         lambda: ff.coast_down(screen(), 80.0, ff.SpeedProfile((0.0, 0.4), (80.0, 60.0))),
+    ],
+    FoundationLoads: [
+        lambda: ff.foundation_loads(
+            {"empty": response().orbits_at(203.0)[0]},
+            {"start": ff.start_up(screen(), DRIVE, duration=0.5)},
+        )
     ],
     Sweep: [
         lambda: ff.sweep(screen(), np.linspace(198.0, 207.0, 4)),

@@ -22,6 +22,10 @@ from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working
 
 OMEGA = 80.0
 OPTIONAL = tuple(sorted({name for one in QUANTITIES.values() for name in one.needs}))
+# No limit needs the rest of them.
+FOR_LIMITS = tuple(
+    sorted({name for one in QUANTITIES.values() if one.limit is not None for name in one.needs})
+)
 LIMITS = ff.Limits(
     relative_amplitude=(1e-3, 8e-3), main_frame_acceleration=50.0, floating_frame_acceleration=90.0,
     speed=(60.0, 100.0), shear_strain=0.5, stop_force=1e5, foundation_force=1e4,
@@ -80,7 +84,11 @@ def test_a_formula_reads_what_is_declared_and_nothing_else(project, branch, kind
     assert unknown == {one.name for one in QUANTITIES.values() if lacking in one.needs}
 
 
-@pytest.mark.parametrize("lacking", subsets(OPTIONAL), ids=" ".join)
+@pytest.mark.parametrize(
+    "lacking",
+    [*subsets(FOR_LIMITS), *((name,) for name in OPTIONAL if name not in FOR_LIMITS), OPTIONAL],
+    ids=" ".join,
+)
 def test_check_and_assessment_leave_out_the_same_limits(project, branch, lacking):
     part = dataclasses.replace(project, screen=without(project.screen, lacking))
     case = assess_case(part.screen, ff.Load(), branch, OMEGA)

@@ -113,6 +113,7 @@ def test_the_report_opens_with_title_and_verdict(assessment):
         "Results",
         "What moves the amplitude",
         "Start, stop and disturbances",
+        "Loads on the foundation",
         "Appendix",
     ]
 

@@ -89,10 +89,16 @@ def _speeds(result: Check) -> Table:
 
 
 def _cases(cases: Iterable[Case]) -> Table:
-    table = _table("Load case", "k2 x", "c2 x", "main kg", "floating kg", "degC", right=5)
+    table = _table(
+        "Load case", "k2 x", "c2 x", "k3 x", "c3 x", "main kg", "floating kg", "degC", right=7
+    )
     for case in cases:
-        numbers = (case.stiffness_factor, case.damping_factor, case.main_mass, case.floating_mass)
+        numbers = (
+            case.stiffness_factor, case.damping_factor, case.stop_stiffness_factor,
+            case.stop_damping_factor, case.main_mass, case.floating_mass,
+        )  # fmt: skip
         warm = "" if case.temperature is None else f"{case.temperature:.4g}"
+        warm += " air" if case.temperature_of == "air" else ""
         table.add_row(printable(case.name), *(f"{number:.4g}" for number in numbers), warm)
     return table
 

@@ -10,6 +10,7 @@ import typer
 from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
 from flipflow.cli.output import console, print_list, printable
 from flipflow.cli.progress import progress
+from flipflow.model.numerals import digits
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -179,7 +180,7 @@ def _show(project: Project, start: RunUp, coast: RunUp | None, out: Console) -> 
     _run(start, "On the way up", out)
     if start.power:
         scale, unit = (1e-3, "kW") if max(start.power.values()) >= 100.0 else (1.0, "W")
-        shares = (f"{part} {start.power[part] * scale:.3g} {unit}" for part in POWER)
+        shares = (f"{part} {digits(start.power[part] * scale)} {unit}" for part in POWER)
         say(out, f"Mean power at the end: {', '.join(shares)}")
     if coast is not None:
         out.print()
@@ -194,7 +195,7 @@ def _run(run: RunUp, title: str, out: Console) -> None:
     out.print(f"{title:<30}{'greatest':>12}{'at rpm':>10}{'at s':>9}")
     for key, peak in run.peaks.items():
         word, scale, unit = WORDS[key]
-        value = f"{peak.value * scale:.3g} {unit}"
+        value = f"{digits(peak.value * scale)} {unit}"
         out.print(f"  {word:<28}{value:>12}{peak.omega * RPM:>10.0f}{peak.t:>9.2f}")
     first = f"w01 = {run.first_frequency * RPM:.0f} rpm"
     passed = f"passed in {run.passing:.2g} s" if run.passing is not None else "not passed"

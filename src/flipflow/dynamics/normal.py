@@ -18,7 +18,9 @@ Complex = NDArray[np.complex128]
 class NormalMotion:
     r"""Motion y normal to the surface: both frames move alike.
 
-    .. math:: (m_1 + m_2) \ddot y + c_{1n} \dot y + k_{1n} y = m_0 r \omega^2 \sin \omega t
+    .. math:: (m_1 + m_2) \ddot y + c_{1n} \dot y + k_{1n} y = s m_0 r \omega^2 \sin \omega t
+
+    s is 1, or -1 where the unbalance turns the other way: see :attr:`FlipFlowScreen.normal_sense`.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def normal_motion(screen: FlipFlowScreen, omega: float) -> NormalMotion | None:
     if k is None or c is None:
         return None
     mass = screen.main_mass + screen.floating_mass
-    Y = normal_amplitude(mass, c, k, screen.eccentric_moment, omega)
+    Y = screen.normal_sense * normal_amplitude(mass, c, k, screen.eccentric_moment, omega)
     return NormalMotion(omega, complex(Y), k, c)
 
 

@@ -50,6 +50,9 @@ class Case:
     floating_mass: float
     temperature: float | None
     source: str
+    stop_stiffness_factor: float = 1.0
+    stop_damping_factor: float = 1.0
+    temperature_of: str = "rubber"
 
 
 @dataclass(frozen=True)
@@ -160,6 +163,10 @@ def _cases(project: Project) -> Iterator[Case]:
             floating_mass=load.floating_mass,
             temperature=load.temperature,
             source=sources.get(f"load_cases.{load.name}", sources.get("load_cases", "")),
+            stop_stiffness_factor=load.stop_stiffness_factor
+            * screen.stop_temperature_stiffness_factor(load.temperature),
+            stop_damping_factor=load.stop_damping_factor,
+            temperature_of=load.temperature_of,
         )
 
 

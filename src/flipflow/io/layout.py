@@ -17,6 +17,7 @@ from flipflow.model.drive import DRIVE_FIELDS
 from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS
 from flipflow.model.quantities import needing
+from flipflow.model.screen import Measured, Rotation, TemperatureOf
 
 FORMAT = 1
 
@@ -102,8 +103,18 @@ LOAD_FIELDS: tuple[Field, ...] = (
         lower_open=True, default=1.0, plausible=(0.1, 10.0), example=1.0,
     ),
     Field(
+        "stop_stiffness_factor", "", "", "", "load_cases.stop_stiffness_factor",
+        "Factor on the stiffness of the stop springs under this load.",
+        lower_open=True, default=1.0, plausible=(0.2, 5.0), example=1.1,
+    ),
+    Field(
+        "stop_damping_factor", "", "", "", "load_cases.stop_damping_factor",
+        "Factor on the damping of the stop springs under this load.",
+        lower_open=True, default=1.0, plausible=(0.1, 10.0), example=1.0,
+    ),
+    Field(
         "temperature", "T", "degC", "degC", "load_cases.temperature",
-        "Temperature of the shear springs; needs shear_springs.temperature_factor.",
+        "Temperature of the rubber; needs shear_springs.temperature_factor.",
         lower=-273.15, default=None, plausible=(-60.0, 120.0), example="50 degC",
     ),
 )
@@ -156,20 +167,40 @@ def _machine_entries() -> Iterable[Entry]:
         "How the unbalance moves.", "circular", choices=("circular",),
     )  # fmt: skip
     yield Entry(
+        "exciter", "rotation", "choice",
+        "Whether the top of the unbalance moves down the slope, with the material, or up.",
+        "with-flow", choices=get_args(Rotation),
+    )  # fmt: skip
+    yield Entry(
         "stops", "law", "choice",
         "Force law: the paper's, no pull, no damping outwards, damping within the spring's force.",
         "paper", choices=get_args(ContactLaw),
+    )  # fmt: skip
+    yield Entry(
+        "stops", "clearance_measured", "choice",
+        "Gaps as measured on the standing, empty machine, or as drawn with unstressed springs.",
+        "standing", choices=get_args(Measured),
     )  # fmt: skip
     yield Entry(
         "shear_springs", "temperature_factor", "temperatures",
         "Factor on the stiffness over the temperature of the rubber.",
         [["-10 degC", 1.15], ["20 degC", 1.0], ["50 degC", 0.85]],
     )  # fmt: skip
+    yield Entry(
+        "stops", "temperature_factor", "temperatures",
+        "Factor on the stiffness of the stop springs over their temperature.",
+        [["-10 degC", 1.1], ["20 degC", 1.0], ["50 degC", 0.9]],
+    )  # fmt: skip
 
 
 def _load_entries() -> Iterable[Entry]:
     yield Entry("load_cases", "name", "text", "What the case is called in reports.", "full")
     yield from map(entry_of, LOAD_FIELDS)
+    yield Entry(
+        "load_cases", "temperature_of", "choice",
+        "Whose temperature it is: the rubber's, or the air's, which springs at work are above.",
+        "rubber", choices=get_args(TemperatureOf),
+    )  # fmt: skip
     yield Entry("load_cases", "material", "material", MATERIAL.sentence, MATERIAL.example, MATERIAL)
     yield Entry(
         "load_cases", "split_main_floating", "split",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any, get_args
 
 from flipflow.errors import InputError
 from flipflow.io.layout import LOAD_FIELDS, MATERIAL, MATERIAL_PER_AREA, SECTIONS, refuse_unknown
 from flipflow.io.units import measured
 from flipflow.io.values import LEFT_OUT, Notes, Table, read_number, read_text
-from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.screen import FlipFlowScreen, Load, TemperatureOf
 
 
 def read_load_cases(tables: list[Table], screen: FlipFlowScreen, notes: Notes) -> tuple[Load, ...]:
@@ -39,12 +40,13 @@ def _read_case(table: Table, label: str, screen: FlipFlowScreen, notes: Notes) -
     name = read_text(table, entries[0], label=f"{label}, name")
     if not name.strip():
         raise InputError(f"{label}, name", table.get("name", LEFT_OUT), 'give one, such as "full"')
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     for field in LOAD_FIELDS:
         key = field.key.split(".")[1]
         if key in table:
             values[field.name] = read_number(table[key], field, label=f"{label}, {key}")
     values.update(_material(table, label, screen))
+    values["temperature_of"] = _temperature_of(table, label)
     for key, written in table.items():
         if key != "name":
             notes.written[f"{label}, {key}"] = written
@@ -55,6 +57,15 @@ def _read_case(table: Table, label: str, screen: FlipFlowScreen, notes: Notes) -
         written = table.get(error.field, error.value)
         raise InputError(f"{label}, {error.field}", written, error.remedy) from None
     return load
+
+
+def _temperature_of(table: Table, label: str) -> str:
+    """Whose temperature a case gives."""
+    written = table.get("temperature_of", "rubber")
+    if written not in get_args(TemperatureOf):
+        remedy = f"choose one of {', '.join(get_args(TemperatureOf))}"
+        raise InputError(f"{label}, temperature_of", written, remedy)
+    return str(written)
 
 
 def _material(table: Table, label: str, screen: FlipFlowScreen) -> dict[str, float]:

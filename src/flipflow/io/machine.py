@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from flipflow.errors import InputError
 from flipflow.io.layout import SECTIONS, entry_of
@@ -19,6 +20,9 @@ from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.screen import FlipFlowScreen
 
 Tables = dict[str, Table]
+TEMPERATURE_TABLES = {
+    "shear_springs": "temperature_factor", "stops": "stop_temperature_factor",
+}  # fmt: skip
 
 
 def read_screen(tables: Tables, notes: Notes) -> FlipFlowScreen:
@@ -34,21 +38,24 @@ def read_screen(tables: Tables, notes: Notes) -> FlipFlowScreen:
     for field in FIELDS:
         value = counts.get(field.name)
         if not field.whole:
-            count = counts.get(field.count) if field.count else None
-            value = read_total(_section(tables, field), field, count, notes)
+            value = read_total(_section(tables, field), field, _count(field, counts), notes)
         if value is not None:
             values[field.name] = value
         elif field.required:
             raise _left_out(field)
     _stops(tables, values, notes)
     _choice(tables, "exciter.type", "circular", notes)
+    values["rotation"] = _choice(tables, "exciter.rotation", "with-flow", notes)
     if "stops" in tables:
         values["stop_law"] = _choice(tables, "stops.law", "paper", notes)
-    rows = tables.get("shear_springs", {}).get("temperature_factor")
-    if rows is not None:
-        label = "shear_springs.temperature_factor"
-        notes.written[label] = rows
-        values["temperature_factor"] = read_temperatures(rows, label)
+        measured = _choice(tables, "stops.clearance_measured", "standing", notes)
+        values["clearance_measured"] = measured
+    for section, name in TEMPERATURE_TABLES.items():
+        rows = tables.get(section, {}).get("temperature_factor")
+        if rows is not None:
+            label = f"{section}.temperature_factor"
+            notes.written[label] = rows
+            values[name] = read_temperatures(rows, label)
     return FlipFlowScreen(**values)  # type: ignore[arg-type]
 
 
@@ -65,6 +72,25 @@ def _counts(tables: Tables, notes: Notes) -> dict[str, float]:
             notes.written[field.key] = table[key]
             counts[field.name] = read_number(table[key], field)
     return counts
+
+
+def _count(field: Field, counts: Mapping[str, float]) -> float | None:
+    """How many pieces make a total; one isolation spring at each support if nothing else is said.
+
+    Raises
+    ------
+    InputError
+        For isolation springs that are no multiple of the supports.
+    """
+    if field.count is None:
+        return None
+    pieces, supports = counts.get(field.count), counts.get("supports")
+    if field.count != "isolation_pieces" or supports is None:
+        return pieces
+    if pieces is not None and pieces % supports:
+        remedy = f"give a multiple of the {supports:g} supports"
+        raise InputError(FIELD[field.count].key, int(pieces), remedy)
+    return supports if pieces is None else pieces
 
 
 def _choice(tables: Tables, label: str, default: str, notes: Notes) -> str:

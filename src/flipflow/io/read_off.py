@@ -14,6 +14,7 @@ from flipflow.results.codec import exact, plain
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.documents import CODEC
+from flipflow.studies.foundation_loads import CaseLoads, FoundationLoads, RunLoads
 from flipflow.studies.jump_risk import JumpRisk, Throw
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.start_and_blows import Transients
@@ -129,6 +130,7 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
                 "values": plain(case.values),
                 "energy": plain(case.energy),
                 "stop_reached": case.stop_reached,
+                "gaps": plain(vars(case.gaps)),
                 "stability": None if case.orbit is None else case.orbit.stability,
                 "multipliers": None if case.orbit is None else plain(case.orbit.multipliers),
                 "branch_status": case.branch.status.name,
@@ -143,10 +145,32 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
             }
             for case in assessment.cases
         ],
+        "ground": None if assessment.foundation is None else assessment.foundation.sentence,
+        "foundation": None if assessment.foundation is None else loads_of(assessment.foundation),
         "transients": _transients(assessment.transients),
         "tornado": None if assessment.tornado is None else _tornado_document(assessment.tornado),
         "notes": list(assessment.notes),
     }
+
+
+@read_off.register
+def loads_of(loads: FoundationLoads) -> dict[str, Any]:
+    """What goes into the ground in a sentence, and the loads of each support by its name."""
+    every: tuple[CaseLoads | RunLoads, ...] = (*loads.cases, *loads.runs)
+    each = {
+        support: {one.name: _support_loads(loads, one, support) for one in every}
+        for support in loads.supports
+    }
+    return {"sentence": loads.sentence, "each_support": each}
+
+
+def _support_loads(
+    loads: FoundationLoads, one: CaseLoads | RunLoads, support: str
+) -> dict[str, Any]:
+    if isinstance(one, RunLoads):
+        return {"peaks": vars(loads.of_support(one.peaks))}
+    static = loads.static_on(support, one)
+    return {"static": vars(static), "running": vars(loads.of_support(one.running))}
 
 
 def _transients(found: Transients | None) -> dict[str, Any] | None:

@@ -24,6 +24,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.documents import CODEC
+from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
 from flipflow.studies.lyapunov import LyapunovExponents
@@ -44,6 +45,7 @@ SCHEMAS: dict[type, str] = {
     Orbit: "flipflow/orbit/1",
     Basins: "flipflow/basins/1",
     JumpRisk: "flipflow/jump-risk/1",
+    FoundationLoads: "flipflow/foundation-loads/1",
     History: "flipflow/history/1",
     RunUp: "flipflow/run-up/1",
     Sweep: "flipflow/sweep/1",

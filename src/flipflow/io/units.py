@@ -56,8 +56,11 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
     ),
     "kg m^2": ("a moment of inertia", "0.8 kg m^2", {"kg m^2": 1.0, "kg cm^2": 1e-4}),
     "N m": ("a torque", "40 N m", {"N m": 1.0, "kN m": 1e3}),
-    "s": ("a time", "20 s", {"s": 1.0, "ms": 1e-3, "min": 60.0}),
+    "s": ("a time", "20 s", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}),
     "W": ("a power", "2 kW", {"W": 1.0, "kW": 1e3, "MW": 1e6}),
+    "W/K": ("a thermal conductance", "1.5 W/K", {"W/K": 1.0}),
+    "K": ("a difference of temperature", "10 K", {"K": 1.0}),
+    "m/s": ("a speed", "0.4 m/s", {"m/s": 1.0, "mm/s": 1e-3}),
     "kg/m^2": ("a mass per area", "30 kg/m^2", {"kg/m^2": 1.0, "t/m^2": 1e3, "g/m^2": 1e-3}),
     "rad": ("an angle", "15 deg", {"rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0}),
     "rad/s": (
@@ -68,7 +71,11 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
     "degC": ("a temperature", "50 degC", {"degC": 1.0, "°C": 1.0, "K": 1.0, "degF": 5.0 / 9.0}),
     "": ("a ratio", "20 %", {"": 1.0, "%": 1e-2}),
 }
-_OFFSET: Mapping[str, float] = {"K": -273.15, "degF": -160.0 / 9.0}
+# Of temperatures, which count from another zero; differences of them do not.
+_OFFSET: Mapping[tuple[str, str], float] = {
+    ("degC", "K"): -273.15,
+    ("degC", "degF"): -160.0 / 9.0,
+}
 _NEVER_PINT = frozenset({"rad", "rad/s", "degC", ""})
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -146,7 +153,7 @@ def in_unit(value: float, unit: str, si_unit: str) -> float:
     float
         The value in ``unit``.
     """
-    return (value - _OFFSET.get(unit, 0.0)) / _UNITS[si_unit][2][unit]
+    return (value - _OFFSET.get((si_unit, unit), 0.0)) / _UNITS[si_unit][2][unit]
 
 
 def shown(value: float, unit: str, si_unit: str) -> str:
@@ -189,7 +196,7 @@ def _normal(unit: str) -> str:
 def _convert(number: str, name: str, unit: str, *, field: str, written: str, example: str) -> float:
     what, _, known = _UNITS[unit]
     if name in known:
-        return _times(number, known[name]) + _OFFSET.get(name, 0.0)
+        return _times(number, known[name]) + _OFFSET.get((unit, name), 0.0)
     if not name:
         raise InputError(field, written, f"write the unit of {what}, for example {example!r}")
     other = next((w for w, _, units in _UNITS.values() if name in units), None)

@@ -129,13 +129,13 @@ FIELDS: tuple[Field, ...] = (
         "isolation_stiffness", "k1", "N/m", "kN/m", "isolation.stiffness",
         "Stiffness of all isolation springs together, along the screen surface.",
         lower_open=True, plausible=(1e3, 50e6),
-        example="700 kN/m", count="supports",
+        example="700 kN/m", count="isolation_pieces",
     ),
     Field(
         "isolation_damping", "c1", "N s/m", "kN s/m", "isolation.damping",
         "Viscous damping of all isolation springs together, along the screen surface.",
         plausible=(0.0, 2e6),
-        example="10 kN s/m", count="supports",
+        example="10 kN s/m", count="isolation_pieces",
     ),
     Field(
         "shear_stiffness", "k2", "N/m", "kN/m", "shear_springs.stiffness",
@@ -177,13 +177,13 @@ FIELDS: tuple[Field, ...] = (
         "normal_stiffness", "k1n", "N/m", "kN/m", "isolation.normal_stiffness",
         "Stiffness of all isolation springs together, normal to the screen surface.",
         lower_open=True, default=None, plausible=(1e3, 50e6),
-        example="700 kN/m", count="supports",
+        example="700 kN/m", count="isolation_pieces",
     ),
     Field(
         "normal_damping", "c1n", "N s/m", "kN s/m", "isolation.normal_damping",
         "Viscous damping of all isolation springs together, normal to the screen surface.",
         default=None, plausible=(0.0, 2e6),
-        example="10 kN s/m", count="supports",
+        example="10 kN s/m", count="isolation_pieces",
     ),
     Field(
         "deck_angle", "alpha", "rad", "deg", "frames.deck_angle",
@@ -210,6 +210,12 @@ FIELDS: tuple[Field, ...] = (
         example=12, whole=True,
     ),
     Field(
+        "shear_conductance", "G2", "W/K", "W/K", "shear_springs.conductance",
+        "Heat that one shear spring gives off for each kelvin it is warmer than the air.",
+        lower_open=True, default=None, plausible=(0.05, 100.0),
+        example="1.5 W/K",
+    ),
+    Field(
         "stop_pieces", "n3", "", "", "stops.pieces_per_side",
         "Number of stop springs on each side.",
         lower=1.0, default=None, plausible=(1.0, 200.0),
@@ -217,15 +223,52 @@ FIELDS: tuple[Field, ...] = (
     ),
     Field(
         "supports", "n1", "", "", "isolation.supports",
-        "Number of supports that carry the isolation springs.",
+        "Number of supports, the points at which the isolation loads the foundation.",
         lower=1.0, default=None, plausible=(1.0, 100.0),
         example=4, whole=True,
+    ),
+    Field(
+        "isolation_pieces", "n1p", "", "", "isolation.pieces",
+        "Number of isolation springs, a multiple of the supports; left out, one at each support.",
+        lower=1.0, default=None, plausible=(1.0, 200.0),
+        example=8, whole=True,
+    ),
+    Field(
+        "load_centre", "s_c", "", "%", "isolation.load_centre",
+        "Where the centre of gravity lies between the lowest supports, 0 %, and the highest, "
+        "100 %; left out, all carry alike.",
+        upper=1.0, default=None, plausible=(0.2, 0.8),
+        example="50 %",
     ),
     Field(
         "bearings", "nb", "", "", "exciter.bearings",
         "Number of exciter bearings that share the unbalance force.",
         lower=1.0, default=None, plausible=(1.0, 32.0),
         example=2, whole=True,
+    ),
+    Field(
+        "rotating_mass", "mr", "kg", "kg", "exciter.rotating_mass",
+        "Mass that the exciter bearings carry, unbalances and shaft; the frame moves it, too.",
+        default=None, plausible=(0.5, 5e3),
+        example="45 kg",
+    ),
+    Field(
+        "bearing_rating", "C", "N", "kN", "exciter.bearing_rating",
+        "Basic dynamic load rating of one exciter bearing, from its catalogue.",
+        lower_open=True, default=None, plausible=(5e3, 10e6),
+        example="350 kN",
+    ),
+    Field(
+        "bearing_load_factor", "fz", "", "", "exciter.bearing_load_factor",
+        "Factor on the load of a bearing in a vibrating machine; left out, 1.2.",
+        lower_open=True, default=1.2, plausible=(1.0, 3.0),
+        example=1.2,
+    ),
+    Field(
+        "bearing_life_exponent", "p", "", "", "exciter.bearing_life_exponent",
+        "Exponent of the rated life: 10/3 for rollers, 3 for balls; left out, 10/3.",
+        lower_open=True, default=10.0 / 3.0, plausible=(3.0, 3.4),
+        example=3.3333,
     ),
 )
 # fmt: on

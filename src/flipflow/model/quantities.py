@@ -167,6 +167,21 @@ _ALL = (
         ),
     ),
     Quantity(
+        "shear_piece_force", "force per shear spring", "F2/n2", "N", "kN",
+        "Greatest dynamic force of one shear spring, k2 x2 + c2 x2' shared by all.",
+        needs=("shear_pieces",),
+    ),
+    Quantity(
+        "shear_piece_power", "power per shear spring", "P2/n2", "W", "W",
+        "Mean power that one shear spring turns into heat.",
+        needs=("shear_pieces",),
+    ),
+    Quantity(
+        "shear_temperature_rise", "temperature rise of a shear spring", "dT2", "K", "K",
+        "How much warmer than the air a shear spring is in the mean: its power over conductance.",
+        needs=("shear_pieces", "shear_conductance"),
+    ),
+    Quantity(
         "stop_force", "stop force", "H", "N", "kN",
         "Greatest force on the stop springs of one side together.",
         of_stops=True, elsewhere="stop force",
@@ -179,6 +194,11 @@ _ALL = (
         "stop_piece_force", "force per stop spring", "H/n3", "N", "kN",
         "The stop force shared by the stop springs of one side.",
         needs=("stop_pieces",), of_stops=True,
+    ),
+    Quantity(
+        "stop_approach_speed", "approach speed of the stops", "x2' at contact", "m/s", "m/s",
+        "Greatest relative speed with which a stop is met; 0 where none is.",
+        of_stops=True,
     ),
     Quantity(
         "foundation_force", "foundation force", "F1", "N", "kN",
@@ -202,6 +222,16 @@ _ALL = (
         "bearing_force", "force per exciter bearing", "m0r w^2/nb", "N", "kN",
         "The exciter force shared by the bearings.",
         needs=("bearings",),
+    ),
+    Quantity(
+        "bearing_load", "load per exciter bearing", "F/nb", "N", "kN",
+        "Greatest load over a turn: the exciter force less what the frame's motion takes of it.",
+        needs=(*_NORMAL, "rotating_mass", "bearings"),
+    ),
+    Quantity(
+        "bearing_life", "rated life of an exciter bearing", "L10h", "s", "h",
+        "Hours that nine of ten bearings reach: 1e6 / (60 n) (C / (fz F))^p.",
+        needs=(*_NORMAL, "rotating_mass", "bearings", "bearing_rating"),
     ),
     Quantity(
         "dissipated_power", "dissipated power", "P", "W", "kW",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Self, get_args
+from typing import Literal, Self, get_args
 
 import numpy as np
 
@@ -19,12 +19,17 @@ from flipflow.model.arguments import (
     checked_text,
     checked_word,
 )
+from flipflow.model.constants import GRAVITY
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import Unbalance
 from flipflow.model.fields import FIELDS
 from flipflow.model.system import MechanicalSystem
 
+Measured = Literal["standing", "drawn"]
+Rotation = Literal["with-flow", "counter-flow"]
+TemperatureOf = Literal["rubber", "air"]
+_FACTORS = ("stiffness_factor", "damping_factor", "stop_stiffness_factor", "stop_damping_factor")
 DEGREES = "give a finite number of degrees Celsius, or None"
 
 
@@ -36,29 +41,38 @@ class Load:
     ----------
     stiffness_factor, damping_factor
         Factors on the shear spring's stiffness and damping.
+    stop_stiffness_factor, stop_damping_factor
+        Factors on the stop springs' stiffness and damping.
     main_mass, floating_mass
         Carried material in kg that joins each frame; the unbalance does not change.
     temperature
-        Temperature of the shear springs in degrees Celsius; needs the screen's temperature table.
+        Temperature of the rubber in degrees Celsius; needs the screen's temperature table.
+    temperature_of
+        ``"rubber"``, or ``"air"``: :func:`flipflow.assess` then adds what the shear springs are
+        warmer at working speed, where their conductance is known.
     name
         What the case is called in reports.
     """
 
     stiffness_factor: float = 1.0
     damping_factor: float = 1.0
+    stop_stiffness_factor: float = 1.0
+    stop_damping_factor: float = 1.0
     main_mass: float = 0.0
     floating_mass: float = 0.0
     temperature: float | None = None
+    temperature_of: TemperatureOf = "rubber"
     name: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("stiffness_factor", "damping_factor"):
+        for name in _FACTORS:
             object.__setattr__(self, name, checked_positive(name, getattr(self, name)))
         for name in ("main_mass", "floating_mass"):
             object.__setattr__(self, name, checked_at_least_zero(name, getattr(self, name), "kg"))
         if self.temperature is not None:
             degrees = checked_number("temperature", self.temperature, DEGREES)
             object.__setattr__(self, "temperature", degrees)
+        checked_word("temperature_of", self.temperature_of, get_args(TemperatureOf))
         checked_text("name", self.name)
 
 
@@ -87,8 +101,28 @@ class FlipFlowScreen:
         k1n in N/m and c1n in N s/m normal to the surface; None leaves that direction unchecked.
     temperature_factor
         Pairs (degrees Celsius, factor on the shear stiffness), rising in temperature.
+    stop_temperature_factor
+        The same for the stop springs; none: temperature does not change them.
+    rotation
+        ``"with-flow"``: the top of the unbalance moves down the slope, as the material does;
+        ``"counter-flow"``: up the slope.
+    clearance_measured
+        ``"standing"``: the gaps as measured on the standing, empty machine; ``"drawn"``: with
+        unstressed springs. With a ``deck_angle`` the weight of the floating frame, and of what it
+        carries, shifts them: see :attr:`gap_shift`.
+    measured_shift
+        The shift in m of a machine under a load, which :meth:`loaded` sets; None: this machine is
+        the one on which the gaps were measured.
     deck_angle, deck_area, shear_height, shear_pieces, stop_pieces, supports, bearings
         What some checks need, in SI; None leaves those checks out.
+    isolation_pieces
+        Number of isolation springs, a multiple of the supports; None: one at each support.
+    load_centre
+        Where the centre of gravity lies between the lowest supports, 0, and the highest, 1.
+    rotating_mass, bearing_rating, bearing_load_factor, bearing_life_exponent
+        What load and life of the exciter bearings need, in SI.
+    shear_conductance
+        Heat in W/K that one shear spring gives off.
 
     Raises
     ------
@@ -118,12 +152,33 @@ class FlipFlowScreen:
     stop_pieces: float | None = None
     supports: float | None = None
     bearings: float | None = None
+    clearance_measured: Measured = "standing"
+    measured_shift: float | None = None
+    rotation: Rotation = "with-flow"
+    stop_temperature_factor: tuple[tuple[float, float], ...] = ()
+    isolation_pieces: float | None = None
+    load_centre: float | None = None
+    rotating_mass: float | None = None
+    bearing_rating: float | None = None
+    bearing_load_factor: float = 1.2
+    bearing_life_exponent: float = 10.0 / 3.0
+    shear_conductance: float | None = None
 
     def __post_init__(self) -> None:
         for field in FIELDS:
             object.__setattr__(self, field.name, field.check(getattr(self, field.name)))
         checked_word("stop_law", self.stop_law, get_args(ContactLaw))
-        object.__setattr__(self, "temperature_factor", _checked_table(self.temperature_factor))
+        checked_word("clearance_measured", self.clearance_measured, get_args(Measured))
+        if self.measured_shift is not None:
+            remedy = "give a finite number of m, or None"
+            shift = checked_number("measured_shift", self.measured_shift, remedy)
+            object.__setattr__(self, "measured_shift", shift)
+        checked_word("rotation", self.rotation, get_args(Rotation))
+        for name in ("temperature_factor", "stop_temperature_factor"):
+            object.__setattr__(self, name, _checked_table(name, getattr(self, name)))
+        if self.isolation_pieces and self.supports and self.isolation_pieces % self.supports:
+            remedy = f"give a multiple of the {self.supports:g} supports"
+            raise InputError("isolation_pieces", self.isolation_pieces, remedy)
 
     def replace(self, **changes: object) -> Self:
         """Return a new screen with some fields changed; unknown names raise InputError."""
@@ -134,15 +189,48 @@ class FlipFlowScreen:
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def loaded(self, load: Load) -> Self:
-        """Return the screen as it is under ``load``: softer or stiffer, heavier, warmer."""
+        """Return the screen as it is under ``load``: softer or stiffer, heavier, warmer.
+
+        What the floating frame carries hangs on the shear springs of the load case. The weight
+        that hung there before stays where it was measured: the factors are dynamic ones.
+        """
         checked_kind("load", load, Load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
         factor = load.stiffness_factor * self.temperature_stiffness_factor(load.temperature)
+        stiffness = self.shear_stiffness * factor
+        stop_factor = load.stop_stiffness_factor * self.stop_temperature_stiffness_factor(
+            load.temperature
+        )
         return self.replace(
             main_mass=self.main_mass + load.main_mass,
             floating_mass=self.floating_mass + load.floating_mass,
-            shear_stiffness=self.shear_stiffness * factor,
+            shear_stiffness=stiffness,
             shear_damping=self.shear_damping * load.damping_factor,
+            stop_stiffness=self.stop_stiffness * stop_factor,
+            stop_damping=self.stop_damping * load.stop_damping_factor,
+            measured_shift=self.gap_shift + self._sag(load.floating_mass, stiffness),
         )
+
+    @property
+    def gap_shift(self) -> float:
+        """How far in m the weight on the shear springs shifts the rest between the stops.
+
+        A floating frame that hangs down the slope by s = m2 g sin(alpha) / k2 comes that much
+        nearer to the stop on the plus side, x1 - xf > 0, and leaves that on the minus side: x
+        points up the slope. On the standing machine on which the gaps were measured it is zero.
+        """
+        if self.measured_shift is not None:
+            return self.measured_shift
+        drawn = self.clearance_measured == "drawn"
+        return self._sag(self.floating_mass, self.shear_stiffness) if drawn else 0.0
+
+    @property
+    def weight_considered(self) -> bool:
+        """Whether it is known what the weight does to the gaps."""
+        return self.deck_angle is not None
+
+    def _sag(self, mass: float, stiffness: float) -> float:
+        """How far a mass on the floating frame hangs down the slope, in m."""
+        return mass * GRAVITY * math.sin(self.deck_angle or 0.0) / stiffness
 
     def temperature_stiffness_factor(self, temperature: float | None) -> float:
         """Factor on k2 at a temperature in degrees Celsius, linear between the table's rows."""
@@ -152,14 +240,21 @@ class FlipFlowScreen:
             raise InputError(
                 "temperature", temperature, "add shear_springs.temperature_factor to the machine"
             )
-        degrees, factors = zip(*self.temperature_factor, strict=True)
-        if not degrees[0] <= checked_number("temperature", temperature, DEGREES) <= degrees[-1]:
-            raise InputError(
-                "temperature",
-                temperature,
-                f"stay within the springs' table, {degrees[0]:g} to {degrees[-1]:g} degC",
-            )
-        return float(np.interp(temperature, degrees, factors))
+        return _factor_at(self.temperature_factor, temperature, "springs'")
+
+    def stop_temperature_stiffness_factor(self, temperature: float | None) -> float:
+        """Factor on k3 at a temperature in degrees Celsius; 1 without a table of the stops."""
+        if temperature is None or not self.stop_temperature_factor:
+            return 1.0
+        return _factor_at(self.stop_temperature_factor, temperature, "stops'")
+
+    @property
+    def normal_sense(self) -> float:
+        """+1 where the unbalance turns from up the slope to upwards (with-flow), else -1.
+
+        Motion and force normal to the surface change their sign with it, and nothing else does.
+        """
+        return 1.0 if self.rotation == "with-flow" else -1.0
 
     @property
     def has_stop(self) -> bool:
@@ -167,18 +262,25 @@ class FlipFlowScreen:
         return self.stop().acts
 
     def stop(self) -> ClearanceSpring:
-        """The stop springs as one clearance spring on the relative motion x1 - xf."""
+        """The stop springs as one clearance spring on the relative motion x1 - xf.
+
+        Its gaps count from where the machine hangs under its weight, without contact.
+        """
+        minus = self.clearance if self.clearance_minus is None else self.clearance_minus
         return ClearanceSpring(
             (1.0, -1.0),
             self.stop_stiffness,
             self.stop_damping,
-            self.clearance,
-            self.clearance_minus,
+            self.clearance - self.gap_shift,
+            minus + self.gap_shift,
             self.stop_law,
         )
 
     def system(self) -> MechanicalSystem:
-        """Return the equations of motion in (x1, xf), absolute, along the screen surface."""
+        """Return the equations of motion in (x1, xf), absolute, along the screen surface.
+
+        They count from where the machine hangs under its weight, without contact.
+        """
         m1, m2 = self.main_mass, self.floating_mass
         c1, c2 = self.isolation_damping, self.shear_damping
         k1, k2 = self.isolation_stiffness, self.shear_stiffness
@@ -192,9 +294,21 @@ class FlipFlowScreen:
         )
 
 
-def _checked_table(rows: object) -> tuple[tuple[float, float], ...]:
+def _factor_at(table: tuple[tuple[float, float], ...], temperature: float, whose: str) -> float:
+    """Factor at a temperature in degrees Celsius, linear between the rows of a table."""
+    degrees, factors = zip(*table, strict=True)
+    if not degrees[0] <= checked_number("temperature", temperature, DEGREES) <= degrees[-1]:
+        raise InputError(
+            "temperature",
+            temperature,
+            f"stay within the {whose} table, {degrees[0]:g} to {degrees[-1]:g} degC",
+        )
+    return float(np.interp(temperature, degrees, factors))
+
+
+def _checked_table(name: str, rows: object) -> tuple[tuple[float, float], ...]:
     """Pairs (degrees Celsius, factor), rising in temperature; none is a table, too."""
-    name, remedy = "temperature_factor", "give pairs (degrees Celsius, factor above 0)"
+    remedy = "give pairs (degrees Celsius, factor above 0)"
     table = checked_numbers(name, rows, remedy)
     if table.size == 0:
         return ()

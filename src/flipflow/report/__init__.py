@@ -4,8 +4,11 @@ from flipflow.report import (  # noqa: F401  they register sections
     appendix,
     details,
     first_page,
+    foundation,
+    parts,
     sensitivity,
     transients,
+    weight,
 )
 from flipflow.report.html import write_html
 from flipflow.report.terminal import summary

@@ -144,11 +144,17 @@ def _derived(check: Check) -> Table:
     return Table("Speeds that follow", columns, rows, "Empty machine, no stop touched.")
 
 
+def _of_air(case: Case) -> str:
+    return " (air)" if case.temperature_of == "air" else ""
+
+
 def _load_cases(cases: tuple[Case, ...]) -> Table:
     columns = (
         Column("Load case"),
         Column("Stiffness", "x k2", numeric=True),
         Column("Damping", "x c2", numeric=True),
+        Column("Stops", "x k3", numeric=True),
+        Column("Stops", "x c3", numeric=True),
         Column("Main frame", "+ kg", numeric=True),
         Column("Floating frame", "+ kg", numeric=True),
         Column("Temperature", "degC", numeric=True),
@@ -158,11 +164,15 @@ def _load_cases(cases: tuple[Case, ...]) -> Table:
         cells(
             case.name,
             *(f"{x:.4g}" for x in (case.stiffness_factor, case.damping_factor)),
+            *(f"{x:.4g}" for x in (case.stop_stiffness_factor, case.stop_damping_factor)),
             *(f"{x:.4g}" for x in (case.main_mass, case.floating_mass)),
-            "-" if case.temperature is None else f"{case.temperature:.4g}",
+            "-" if case.temperature is None else f"{case.temperature:.4g}{_of_air(case)}",
             case.source or "no source given",
         )
         for case in cases
     )
-    caption = "What each case does to the shear springs (k2, c2) and adds to the frames."
+    caption = (
+        "What each case does to the shear springs (k2, c2) and the stops (k3, c3), and adds to the "
+        "frames. A temperature is the rubber's unless it says air."
+    )
     return Table("Load cases", columns, rows, caption)

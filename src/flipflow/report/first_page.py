@@ -178,15 +178,16 @@ def _cases_table(assessment: Assessment) -> Table:
 
 @section(Assessment, Part.FIRST_PAGE, 70)
 def surroundings(assessment: Assessment) -> Iterator[Block]:
-    """One line each on foundation, springs, exciter and bearings."""
+    """What goes into the ground; one line each on springs, exciter and bearings."""
     if assessment.omega is None:
         return
+    loads, screen = assessment.foundation, assessment.project.screen
+    bearing = "bearing_force" if QUANTITIES["bearing_load"].missing(screen) else "bearing_load"
     yield Values(
         (
-            ("Foundation", _line(assessment, "foundation_force", "support_force")),
-            ("Shear springs", _line(assessment, "shear_strain")),
-            ("Stop springs", _line(assessment, "stop_force", "stop_piece_force")),
-            ("Exciter, bearings", _line(assessment, "exciter_force", "bearing_force")),
+            ("Into the ground", "not known" if loads is None else loads.sentence),
+            ("Springs", _springs(assessment)),
+            ("Exciter, bearings", _line(assessment, "exciter_force", bearing)),
             ("Power, throw", _power_and_throw(assessment)),
         )
     )
@@ -330,7 +331,7 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
         return f"not checked, {missing_words(missing)}" if missing else "not checked"
     _, case = (min if lowest else max)(found, key=lambda one: one[0])
     if first == "stop_force" and not case.stop_reached:
-        return "stop not reached" if case.screen.has_stop else "none fitted"
+        return "stop not reached" if case.screen.has_stop else "no stops fitted"
     parts = [
         f"{QUANTITIES[name].label} {named(name, case.values[name])}"
         for name in names
@@ -338,6 +339,11 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     ]
     where = f" (case {case.name})" if len(assessment.cases) > 1 else ""
     return f"{', '.join(parts)}{where}"
+
+
+def _springs(assessment: Assessment) -> str:
+    shear, stop = _line(assessment, "shear_piece_force"), _line(assessment, "stop_force")
+    return f"{shear}; {stop}"
 
 
 def _power_and_throw(assessment: Assessment) -> str:

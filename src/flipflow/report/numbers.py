@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flipflow.io.units import in_unit
+from flipflow.model.numerals import digits
 from flipflow.model.quantities import QUANTITIES
 
 NOTHING = "-"
@@ -68,7 +69,7 @@ def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:
     """A limit in words: "5 to 8 mm", "at most 3 g", "at least 20 %"."""
 
     def end(value: float) -> str:
-        return f"{in_unit(value, shown_unit, unit):.4g}"
+        return digits(in_unit(value, shown_unit, unit), 4)
 
     if math.isfinite(low) and math.isfinite(high):
         return f"{end(low)} to {end(high)} {shown_unit}".strip()
@@ -78,11 +79,11 @@ def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:
 
 
 def percent(share: float | None) -> str:
-    """A margin with its sign."""
+    """A margin with its sign; where there is no end to be near to, nothing."""
     if share is None:
         return NOTHING
     if not math.isfinite(share):
-        return "no end"
+        return NOTHING
     return f"{'+' if share > 0.0 else ''}{number(100.0 * share)} %"
 
 

@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from flipflow import __version__
 from flipflow.continuation.branch import Branch
@@ -17,15 +18,20 @@ from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
 from flipflow.model.monitor import Monitor
+from flipflow.model.numerals import digits
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
+from flipflow.results.frozen import Frozen
 from flipflow.studies.feasible import working_motion
+from flipflow.studies.foundation_loads import FoundationLoads, foundation_loads
+from flipflow.studies.gaps_under_weight import GapsUnderWeight, gaps_under_weight
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.operating_region import OperatingRegion, operating_region
 from flipflow.studies.quantity_values import Working
+from flipflow.studies.rubber_temperature import warmed_load
 from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
 from flipflow.studies.start_and_blows import Transients, transients
 
@@ -70,7 +76,7 @@ class LimitRow:
 
 
 @dataclass(frozen=True, eq=False)
-class CaseAssessment:
+class CaseAssessment(Frozen):
     """One load case at working speed.
 
     Parameters
@@ -109,6 +115,11 @@ class CaseAssessment:
         """The motion normal to the surface at working speed."""
         return None if self.working is None else self.working.normal
 
+    @cached_property
+    def gaps(self) -> GapsUnderWeight:
+        """The gaps under the weight, and how the two sides of the stops differ."""
+        return gaps_under_weight(self.screen, self.branch, self.orbit)
+
     @property
     def stop_reached(self) -> bool:
         """Whether a stop is touched at working speed."""
@@ -142,6 +153,8 @@ class Assessment:
         What was not checked or not finished.
     method, version, input_hash
         How, by which version, from which input.
+    foundation
+        What goes into the ground; None without a motion or a run.
     """
 
     project: Project
@@ -156,6 +169,7 @@ class Assessment:
     method: Method
     version: str
     input_hash: str
+    foundation: FoundationLoads | None = None
 
     def __repr__(self) -> str:
         name = self.project.document.name or self.project.name
@@ -189,19 +203,24 @@ def assess(
         remedy = "give a project, such as ff.load_project('ffs0827')"
         raise InputError("project", type(project).__name__, remedy)
     span = analysed_range(project.screen, project.speed)
+    warmed = [
+        warmed_load(project.screen, load, project.speed, method) for load in project.load_cases
+    ]
+    loads = [one.load for one in warmed]
     region = operating_region(
         project.screen,
         project.limits,
-        project.load_cases,
+        loads,
         monitor,
         omega=span if omega is None else omega,
         method=method,
     )
     cases = tuple(
         assess_case(project.screen.loaded(load), load, branch, project.speed)
-        for load, branch in zip(project.load_cases, region.branches, strict=True)
+        for load, branch in zip(loads, region.branches, strict=True)
     )
     rows = tuple(limit_row(project, cases, limit.name) for limit in LIMIT_FIELDS)
+    found = None if project.speed is None else transients(project, project.speed)
     return Assessment(
         project=project,
         region=region,
@@ -210,12 +229,28 @@ def assess(
         limits_table=rows,
         verdict=verdict(project.speed, rows, cases, region),
         tornado=None if project.speed is None else tornado(project.screen, project.speed),
-        transients=None if project.speed is None else transients(project, project.speed),
-        notes=(*project.warnings, *region.notes, *coexisting(cases)),
+        transients=found,
+        notes=(
+            *project.warnings,
+            *region.notes,
+            *coexisting(cases),
+            *(one.note for one in warmed if one.note),
+        ),
         method=checked_method(method),
         version=__version__,
         input_hash=input_hash(project),
+        foundation=loads_of(cases, found),
     )
+
+
+def loads_of(cases: tuple[CaseAssessment, ...], found: Transients | None) -> FoundationLoads | None:
+    """What goes into the ground in every load case, at start and coast-down."""
+    motions = {case.name: case.orbit for case in cases if case.orbit is not None}
+    runs = {}
+    if found is not None:
+        named = {"start (empty)": found.start, "coast-down (empty)": found.coast_down}
+        runs = {name: run for name, run in named.items() if run is not None}
+    return foundation_loads(motions, runs) if motions or runs else None
 
 
 def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:
@@ -380,7 +415,8 @@ def _against(row: LimitRow) -> str:
     end, word = (low, "least") if at_low else (high, "most")
     case = f", {row.case}" if row.name != "speed" else ""
     unit = row.shown_unit
-    return f"{row.label}{case}, {worst * factor:.3g} {unit} of {end * factor:.3g} {unit} {word}"
+    worst_digits, end_digits = digits(worst * factor), digits(end * factor)
+    return f"{row.label}{case}, {worst_digits} {unit} of {end_digits} {unit} {word}"
 
 
 def input_hash(project: Project) -> str:

@@ -75,6 +75,22 @@ class Motions(Protocol):
         """Greatest force of the stop springs of one side in N."""
         ...
 
+    def shear_force(self) -> Values:
+        """Greatest dynamic force of all shear springs in N."""
+        ...
+
+    def shear_power(self) -> Values:
+        """Mean power of all shear springs in W."""
+        ...
+
+    def approach_speed(self) -> Values:
+        """Greatest relative speed in m/s at which a contact begins; 0 without contact."""
+        ...
+
+    def bearing_load(self) -> Values:
+        """Greatest load on all exciter bearings together in N, with the frame's motion."""
+        ...
+
     def dissipated_power(self) -> Values:
         """Mean power that all dampers take, both directions together, in W."""
         ...
@@ -97,17 +113,49 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     "floating_frame_acceleration": lambda m: m.peak_acceleration("floating"),
     "shear_strain": lambda m: m.reach() / m.field("shear_height"),
     "stop_force": lambda m: m.stop_force(),
+    "shear_piece_force": lambda m: m.shear_force() / m.field("shear_pieces"),
+    "shear_piece_power": lambda m: m.shear_power() / m.field("shear_pieces"),
+    "shear_temperature_rise": lambda m: (
+        m.shear_power() / (m.field("shear_pieces") * m.field("shear_conductance"))
+    ),
     "stop_piece_force": lambda m: m.stop_force() / m.field("stop_pieces"),
+    "stop_approach_speed": lambda m: m.approach_speed(),
     "foundation_force": lambda m: m.foundation_force(),
     "support_force": lambda m: m.foundation_force() / m.field("supports"),
     "exciter_force": lambda m: m.field("eccentric_moment") * m.omega**2,
     "bearing_force": lambda m: m.field("eccentric_moment") * m.omega**2 / m.field("bearings"),
+    "bearing_load": lambda m: m.bearing_load() / m.field("bearings"),
+    "bearing_life": lambda m: rated_life(
+        m.field("bearing_rating"),
+        m.field("bearing_load_factor") * m.bearing_load() / m.field("bearings"),
+        m.field("bearing_life_exponent"),
+        m.omega,
+    ),
     "dissipated_power": lambda m: m.dissipated_power(),
     "jump_margin": lambda m: m.jump_margin(),
     "throw_number": lambda m: (
         m.omega**2 * m.normal_amplitude() / (GRAVITY * np.cos(m.field("deck_angle")))
     ),
 }
+
+
+def rated_life(rating: Values, load: Values, exponent: Values, omega: Values) -> Values:
+    r"""Basic rated life in s of a rolling bearing, ISO 281: 1e6 turns (C / P)^p.
+
+    With the speed n in rpm this is :math:`L_{10h} = 10^6 / (60 n) (C / P)^p` hours.
+
+    Parameters
+    ----------
+    rating, load
+        C and the equivalent load P in N.
+    exponent
+        p.
+    omega
+        Speed of the shaft in rad/s.
+    """
+    with np.errstate(divide="ignore"):
+        share = np.divide(rating, load)
+    return np.asarray(1e6 * (2.0 * math.pi / omega) * share**exponent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,6 +234,35 @@ class Working(Frozen):
 
     def stop_force(self) -> float:
         return max((self.orbit.stop_force_peak(j) for j in self.stops), default=0.0)
+
+    def shear_force(self) -> float:
+        k, c = self.screen.shear_stiffness, self.screen.shear_damping
+        return self.orbit.peak(
+            lambda _t, x, v, _a: k * (x[:, 0] - x[:, 1]) + c * (v[:, 0] - v[:, 1])
+        )
+
+    def shear_power(self) -> float:
+        return self.screen.shear_damping * self.orbit.mean_square_velocity("relative")
+
+    def approach_speed(self) -> float:
+        begins = [touch.start for touch in self.orbit.contact_intervals]
+        speeds = np.abs(self.orbit.velocity("relative", begins)) if begins else np.zeros(1)
+        return float(speeds.max())
+
+    def bearing_load(self) -> float:
+        normal, mass = self.normal, self.field("rotating_mass")
+        if normal is None or math.isnan(mass):
+            return math.nan
+        force = self.screen.eccentric_moment * self.omega**2
+        sense = self.screen.normal_sense
+
+        def load(t: Real, _x: Real, _v: Real, a: Real) -> Real:
+            # The frame's acceleration of the rotating mass comes through the bearings, too.
+            along = force * np.cos(self.omega * t) - mass * a[:, 0]
+            across = sense * force * np.sin(self.omega * t) - mass * normal.acceleration(t)
+            return np.hypot(along, across)
+
+        return self.orbit.peak(load)
 
     def dissipated_power(self) -> float:
         if self.screen is None:
@@ -295,6 +372,23 @@ class ContactFree(Frozen):
 
     def stop_force(self) -> Real:
         return np.zeros(self.force.shape)
+
+    def shear_force(self) -> Real:
+        f = self.fields
+        stiffness = f["shear_stiffness"] + 1j * self.omega * f["shear_damping"]
+        return np.abs(stiffness * self.relative)
+
+    def shear_power(self) -> Real:
+        speed = self.omega * np.abs(self.relative)
+        return np.asarray(0.5 * self.fields["shear_damping"] * speed**2)
+
+    def approach_speed(self) -> Real:
+        return np.zeros(self.force.shape)
+
+    def bearing_load(self) -> Real:
+        inertia = self.fields["rotating_mass"] * self.omega**2
+        along = self.force + inertia * self.main
+        return peak_of_both(along, -1j * self.force + inertia * self.normal)
 
     def dissipated_power(self) -> Real:
         parts = (

@@ -18,6 +18,7 @@ from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
 from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
+from flipflow.model.numerals import digits
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.transient.history import History
@@ -286,7 +287,7 @@ def default_drive(machine: Machine, speed: float | None, method: RungeKutta | No
     steady, settled = steady_power(machine, speed, method)
     power = POWER_FACTOR * steady
     drive = assumed_drive(machine.eccentric_moment, speed, power)
-    rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
+    rated = f"{digits(power / 1e3)} kW" if power >= 100.0 else f"{power:.3g} W"
     word = f"rated power {rated}, four times what the dampers take at working speed"
     word += "" if settled else f", in the mean over 20 turns of a motion that {NOT_SETTLED}"
     return replace(drive, assumed=(word, *drive.assumed))

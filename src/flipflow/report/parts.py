@@ -1,0 +1,109 @@
+"""Loads of single parts for those who buy them: value, formula and source side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from flipflow.model.fields import FIELD
+from flipflow.model.quantities import QUANTITIES, missing_words
+from flipflow.report.blocks import Block, Cell, Column, Note, Table
+from flipflow.report.numbers import NOTHING, named, number
+from flipflow.report.registry import Part, section
+from flipflow.studies.assessment import Assessment, CaseAssessment
+
+EQUATION = "Minerals 2024, 14, 406, Eq. (1)"
+STOP_LAW = "Minerals 2024, 14, 406, Eq. (2), and the law chosen"
+VIBRATORY = "FAG, Special spherical roller bearings for vibratory machinery, TPI 197"
+
+
+class PartRow(NamedTuple):
+    """One line: the part, the quantity, by what formula, and who says so."""
+
+    part: str
+    name: str
+    formula: str
+    source: str
+    least_is_worst: bool = False
+
+
+ROWS = (
+    PartRow("Shear spring", "shear_piece_force", "max |k2 x2 + c2 x2'| / n2", EQUATION),
+    PartRow("Shear spring", "shear_strain", "max |x2| / h2", "engineering strain"),
+    PartRow("Shear spring", "shear_piece_power", "c2 mean(x2'^2) / n2", EQUATION),
+    PartRow(
+        "Shear spring", "shear_temperature_rise", "P2 / (n2 G2)",
+        "heat balance with the conductance of the machine file",
+    ),
+    PartRow("Stop spring", "stop_piece_force", "max |H| / n3", STOP_LAW),
+    PartRow("Stop spring", "stop_approach_speed", "|x2'| where the gap closes", EQUATION),
+    PartRow(
+        "Bearing", "bearing_load", "max |m0r w^2 e - mr a1| / nb",
+        f"the rotating mass mr moves with the frame; {VIBRATORY}, circle throw",
+    ),
+    PartRow(
+        "Bearing", "bearing_life", "1e6 / (60 n) (C / P)^p, P = fz F",
+        f"ISO 281; factor fz: {VIBRATORY}", least_is_worst=True,
+    ),
+)  # fmt: skip
+
+
+@section(Assessment, Part.DETAILS, 75)
+def parts(assessment: Assessment) -> Iterator[Block]:
+    """Every part's load in its worst case."""
+    cases = [case for case in assessment.cases if case.values]
+    if not cases:
+        return
+    columns = (
+        Column("One part"),
+        Column("Quantity"),
+        Column("Worst", numeric=True),
+        Column("Case"),
+        Column("Formula and source"),
+    )
+    rows = tuple(
+        _row(assessment, cases, one) for one in ROWS
+        if assessment.project.screen.has_stop or not QUANTITIES[one.name].of_stops
+    )  # fmt: skip
+    screen = assessment.project.screen
+    caption = (
+        "At working speed, every case in the table of quantities. "
+        f"fz = {number(screen.bearing_load_factor)}, p = {number(screen.bearing_life_exponent)}."
+    )
+    yield Table("Parts", columns, rows, caption)
+    yield from (Note(text) for text in _notes(assessment, cases))
+
+
+def _row(assessment: Assessment, cases: list[CaseAssessment], one: PartRow) -> tuple[Cell, ...]:
+    quantity = QUANTITIES[one.name]
+    label = quantity.label[:1].upper() + quantity.label[1:]
+    formula = Cell(one.formula, one.source)
+    known = [(value, case) for case in cases if (value := case.values.get(one.name)) is not None]
+    if not known:
+        missing = missing_words(quantity.missing(assessment.project.screen))
+        return Cell(one.part), Cell(label), Cell(NOTHING), Cell(missing), formula
+    choose = min if one.least_is_worst else max
+    value, case = choose(known, key=lambda pair: pair[0])
+    return Cell(one.part), Cell(label), Cell(named(one.name, value)), Cell(case.name), formula
+
+
+def _notes(assessment: Assessment, cases: list[CaseAssessment]) -> Iterator[str]:
+    screen = assessment.project.screen
+    if screen.weight_considered and screen.shear_pieces:
+        yield (
+            "The weight of the floating frame, which the shear springs bear at rest, is not part "
+            "of their force and strain."
+        )
+    given = {load.name: load for load in assessment.project.load_cases}
+    for case in cases:
+        load, rubber = given.get(case.load.name), case.load.temperature
+        if load is None or rubber is None:
+            continue
+        whose = "the air's" if load.temperature_of == "air" else "the rubber's"
+        text = f"Case {case.name}: {number(load.temperature or 0.0)} degC is {whose} temperature"
+        if load.temperature_of == "air" and rubber != load.temperature:
+            text += f"; the rubber settles at {number(rubber)} degC"
+        yield f"{text}."
+    if screen.shear_conductance is None:
+        key = FIELD["shear_conductance"].key
+        yield f"How warm the shear springs get is not calculated: {key} is missing."
