@@ -53,6 +53,8 @@ _HOME = {
     "Motor": "flipflow.model.drive",
     "Drive": "flipflow.model.drive",
     "SpeedProfile": "flipflow.model.drive",
+    "StarDelta": "flipflow.model.starter",
+    "Converter": "flipflow.model.starter",
     "Limits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
@@ -81,6 +83,8 @@ if TYPE_CHECKING:
     from flipflow.model.drive import Drive as Drive
     from flipflow.model.drive import Motor as Motor
     from flipflow.model.drive import SpeedProfile as SpeedProfile
+    from flipflow.model.starter import Converter as Converter
+    from flipflow.model.starter import StarDelta as StarDelta
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.excitation import HarmonicForce as HarmonicForce
     from flipflow.model.excitation import MovingBase as MovingBase
