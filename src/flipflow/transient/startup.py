@@ -13,12 +13,18 @@ from numpy.typing import NDArray
 from flipflow.compiled import status
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_monitor, checked_positive, checked_speed
+from flipflow.model.arguments import (
+    checked_monitor,
+    checked_number,
+    checked_positive,
+    checked_speed,
+)
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
 from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.starter import Converter
 from flipflow.model.system import Machine
 from flipflow.transient.history import History
 from flipflow.transient.shaft_equations import SHAFT_STATES
@@ -26,6 +32,7 @@ from flipflow.transient.speed_run import (
     MOST_TURNS,
     STATUS,
     at_rest,
+    hanging_angle,
     movable,
     normal_direction,
     run_history,
@@ -33,8 +40,9 @@ from flipflow.transient.speed_run import (
     steady_power,
     swings,
     turn_means,
+    unbalance_weight,
 )
-from flipflow.transient.time_stepping import RungeKutta, Stretch
+from flipflow.transient.time_stepping import CREEP, RungeKutta, Stretch
 
 Outcome = Literal[
     "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
@@ -71,9 +79,10 @@ class RunUp:
     history
         The motion in time.
     outcome
-        "reached", "captured" (the speed stays near a natural frequency), "short" (it stays below
-        the working speed elsewhere), "not started", "unfinished" (still changing when the time was
-        up), "stopped" (coast-down), "followed" (a given speed over time).
+        "reached" (the speed ends within 5 % of the working speed, or above), "captured" (it stays
+        near a natural frequency, the motor overloaded), "short" (it stays below the working speed
+        elsewhere), "not started", "unfinished" (still changing when the time was up), "stopped"
+        (coast-down), "followed" (a given speed over time).
     final_speed
         Speed at the end in rad/s; with a motor the mean over the last turns.
     near
@@ -83,14 +92,18 @@ class RunUp:
     passing
         Time in s between 0.8 and 1.25 times w01; None where it is not passed.
     peaks
-        ``"main_amplitude"``, ``"relative_amplitude"`` (half the way from one turning point to the
-        next, m), ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has
-        them.
+        ``"main_amplitude"`` (m; the greatest distance from rest in any direction, or along the
+        surface half the way from one turning point to the next, where that direction alone is
+        known), ``"relative_amplitude"`` (m; half the way from one turning point to the next),
+        ``"shear_strain"``, ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the
+        machine has them.
     power
         Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
         the speed is given or changes.
     notes
         What was assumed or left out.
+    angle
+        Shaft angle in rad in which it began.
     """
 
     machine: Machine
@@ -105,6 +118,7 @@ class RunUp:
     peaks: Mapping[str, Peak]
     power: Mapping[str, float]
     notes: tuple[str, ...]
+    angle: float = 0.0
 
     def __repr__(self) -> str:
         return f"RunUp({self.outcome}, {self.final_speed:.6g} rad/s after {self.duration:.4g} s)"
@@ -116,11 +130,20 @@ class RunUp:
 
     @property
     def time_to_speed(self) -> float | None:
-        """Time in s at which the shaft first has the working speed, within five per cent."""
-        reached = np.flatnonzero(self.history.omega >= AT_SPEED * self.speed)
-        if self.outcome == "stopped" or reached.size == 0:
+        """Time in s at which the shaft first has the working speed; None where it never has."""
+        return None if self.outcome == "stopped" else self._time_at(self.speed)
+
+    def _time_at(self, speed: float) -> float | None:
+        """Time in s at which the shaft first has a speed in rad/s, between two steps."""
+        omega, t = self.history.omega, self.history.t
+        reached = np.flatnonzero(omega >= speed)
+        if reached.size == 0:
             return None
-        return float(self.history.t[reached[0]])
+        k = int(reached[0])
+        if k == 0 or omega[k] == omega[k - 1]:
+            return float(t[k])
+        share = (speed - omega[k - 1]) / (omega[k] - omega[k - 1])
+        return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
     @property
     def verdict(self) -> str:
@@ -131,14 +154,29 @@ class RunUp:
             held = f"{self.near.name} = {self.near.omega * RPM:.0f} rpm"
             return f"captured at {now}, near the natural frequency {held}"
         sentences = {
-            "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
-            "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",
+            "reached": f"reaches {self._reached(wanted)}, then runs at {now}",
+            "short": f"stays at {now}, below the working speed of {wanted}: {self._why_short}",
             "not started": "does not start: the torque at rest does not turn the shaft",
             "unfinished": f"at {now} after {seconds}, still changing; calculate a longer time",
             "stopped": f"comes down from {wanted} in {seconds}",
             "followed": f"follows the given speed for {seconds}, ending at {now}",
         }
         return sentences[self.outcome]
+
+    def _reached(self, wanted: str) -> str:
+        """When it has its speed; 95 % of it, where it never has the whole."""
+        time = self.time_to_speed
+        if time is not None:
+            return f"{wanted} in {time:.3g} s"
+        time = self._time_at(AT_SPEED * self.speed) or 0.0
+        return f"{100.0 * AT_SPEED:.0f} % of {wanted} in {time:.3g} s"
+
+    @property
+    def _why_short(self) -> str:
+        end = self.drive.end_speed if isinstance(self.drive, Drive) else None
+        if end is not None and end <= self.speed:
+            return f"its synchronous speed is {end * RPM:.0f} rpm"
+        return "the drive is too weak"
 
 
 Real = NDArray[np.float64]
@@ -167,17 +205,21 @@ def start_up(
     *,
     speed: float | None = None,
     duration: float | None = None,
+    angle: float | None = None,
     method: RungeKutta | None = None,
     monitor: Monitor | None = None,
 ) -> RunUp:
     r"""Start a machine from rest.
 
-    With the shaft's angle phi, inertia J, motor torque T and friction T_f,
+    With the shaft's angle phi from the direction up the slope, inertia J, motor torque T, friction
+    T_f and the deck's incline alpha,
 
     .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
-              - \ddot y_1 \cos\varphi) .
+              - \ddot y_1 \cos\varphi) - m_0 r g \cos(\varphi + \alpha) .
 
-    Gravity on the unbalance, a torque of up to m0 r g, is left out; a note says so.
+    The last term, gravity on the unbalance, is left out for a machine without ``deck_angle``; a
+    note says so. Where the ratio of the drive is open, or the end of a converter's ramp, it is
+    chosen such that the shaft settles at working speed; the result's drive has it.
 
     Parameters
     ----------
@@ -190,6 +232,9 @@ def start_up(
         Working speed in rad/s; None: the drive's rated speed, or the profile's highest.
     duration
         Longest time in s; None: 60 s or the profile's; a run ends when nothing changes any more.
+    angle
+        Shaft angle at rest in rad; None: the unbalance hangs, at -pi/2 - alpha, or 0 where gravity
+        is left out.
     method
         How it is stepped.
     monitor
@@ -210,8 +255,11 @@ def start_up(
     checked_monitor(monitor)
     shaft = _shaft(machine, drive, given, method)
     wanted = given or _working_speed(shaft)
+    begin = hanging_angle(machine)
+    if angle is not None:
+        begin = checked_number("angle", angle, "give a finite angle in rad")
     history = run_history(
-        machine, shaft, at_rest(machine), _longest(shaft, duration, START_SECONDS),
+        machine, shaft, at_rest(machine, begin), _longest(shaft, duration, START_SECONDS),
         fastest=_fastest(shaft, wanted), method=method, monitor=monitor,
         enough=None if isinstance(shaft, SpeedProfile) else _steady,
     )  # fmt: skip
@@ -229,8 +277,8 @@ def coast_down(
 ) -> RunUp:
     """Let a machine come down from its settled motion at ``speed``, the motor switched off.
 
-    Gravity on the unbalance is left out, so that the last turns come out longer than they are; a
-    note tells the speed below which the shaft would swing.
+    Gravity on the unbalance is considered as in :func:`start_up`. A free run ends where the speed
+    first falls to 2 % of ``speed``: the shaft stops, or begins to swing.
 
     Parameters
     ----------
@@ -289,7 +337,39 @@ def default_drive(machine: Machine, speed: float | None, method: RungeKutta | No
     rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
     word = f"rated power {rated}, four times what the dampers take at working speed"
     word += "" if settled else f", in the mean over 20 turns of a motion that {NOT_SETTLED}"
-    return replace(drive, assumed=(word, *drive.assumed))
+    drive = replace(
+        drive, assumed=(word, *drive.assumed), assumed_fields=("rated_power", *drive.assumed_fields)
+    )
+    return _settling(drive, speed, steady)
+
+
+def fitted_drive(
+    machine: Machine, drive: Drive, speed: float, method: RungeKutta | None = None
+) -> Drive:
+    """The drive with what is open of it chosen: its shaft settles at ``speed`` in rad/s.
+
+    That is an assumed ratio, or the end of a converter's ramp. A motor that has not the torque
+    for it keeps the ratio with which it has its rated speed there.
+    """
+    starter = drive.starter
+    ramp = isinstance(starter, Converter) and starter.end_speed is None
+    if drive.motor is None or not (drive.open_ratio or ramp):
+        return drive
+    steady, _ = steady_power(machine, speed, method)
+    return _settling(drive, speed, steady)
+
+
+def _settling(drive: Drive, speed: float, power: float) -> Drive:
+    """The drive whose shaft settles at a speed at which the dampers take a power in W."""
+    torque = power / speed + float(drive.friction_torque(speed))
+    starter = drive.starter
+    if isinstance(starter, Converter):
+        slope, _ = drive.converter_slope_and_limit(starter)
+        end = drive.ratio * (speed + torque / slope)
+        given = starter.end_speed or end
+        return replace(drive, starter=replace(starter, end_speed=given), open_ratio=False)
+    ratio = drive.ratio_for(speed, torque)
+    return replace(drive, ratio=ratio or drive.ratio, open_ratio=False)
 
 
 def _shaft(
@@ -305,7 +385,9 @@ def _shaft(
         return default_drive(machine, speed, method)
     if not isinstance(drive, (Drive, SpeedProfile)):
         raise InputError("drive", drive, "give an ff.Drive or an ff.SpeedProfile")
-    return drive
+    if speed is None or isinstance(drive, SpeedProfile):
+        return drive
+    return fitted_drive(machine, drive, speed, method)
 
 
 def _longest(shaft: Drive | SpeedProfile, duration: float | None, usual: float) -> float:
@@ -330,12 +412,14 @@ def _working_speed(drive: Drive | SpeedProfile) -> float:
 def _fastest(drive: Drive | SpeedProfile, speed: float) -> float:
     if isinstance(drive, SpeedProfile):
         return max(*drive.speeds, speed)
-    return max(drive.synchronous_speed or 0.0, speed)
+    return max(drive.synchronous_speed or 0.0, drive.end_speed or 0.0, speed)
 
 
 def _steady(done: list[Stretch]) -> bool:
-    """Whether the mean speed is the same over the last turns and over those before."""
+    """Whether the shaft stands, or has the same mean speed over the last turns and those before."""
     recent = done[-RECENT:]
+    if len(recent) == RECENT and _stands(recent[-1].states[:, 1 - SHAFT_STATES]):
+        return True
     t = np.concatenate([one.t for one in recent])
     angle = np.concatenate([one.states[:, -SHAFT_STATES] for one in recent])
     marks = angle[-1] - 2.0 * np.pi * LAST_TURNS * np.array([0.0, 1.0, 2.0])
@@ -344,6 +428,11 @@ def _steady(done: list[Stretch]) -> bool:
     times = np.interp(marks, angle, t)
     spans = times[:-1] - times[1:]
     return bool(abs(spans[0] / spans[1] - 1.0) < STEADY)
+
+
+def _stands(speeds: Real) -> bool:
+    """Whether a shaft only creeps, held by friction that fades with its speed."""
+    return bool(np.abs(speeds).max() < CREEP)
 
 
 def _judged(
@@ -365,6 +454,7 @@ def _judged(
         _passing(history, first), _peaks(machine, history),
         _power(history) if steady and isinstance(drive, Drive) else {},
         (*_ended_early(history), *notes, *_notes(machine, drive)),
+        float(history.angle[0]),
     )  # fmt: skip
 
 
@@ -386,24 +476,37 @@ def _outcome(
     if drive.motor is None:
         down = history.omega[-1] <= 1.001 * STOPPED * speed
         return ("stopped" if down else "unfinished"), None
-    if final < AT_REST * speed and float(drive.torque(0.0)) <= drive.friction:
+    if final < AT_REST * speed and (drive.torque_at_rest <= drive.friction or _turned_back(history)):
         return "not started", None
     if not _is_steady(history):
         return "unfinished", None
-    return _steady_outcome(speed, final, frequencies)
+    return _steady_outcome(drive, speed, final, frequencies)
+
+
+def _turned_back(history: History) -> bool:
+    """Whether the shaft has stood still or swung back within its first turn, and got no farther."""
+    moved = history.t > history.t[0]
+    within = float(history.angle.max() - history.angle[0]) < 2.0 * np.pi
+    return within and bool((history.omega[moved] <= CREEP).any())
 
 
 def _steady_outcome(
-    speed: float, final: float, frequencies: Mapping[str, float]
+    drive: Drive, speed: float, final: float, frequencies: Mapping[str, float]
 ) -> tuple[Outcome, NaturalFrequency | None]:
+    """A motor that gives no more than its rated torque is not held by anything: it runs."""
     if final >= AT_SPEED * speed:
         return "reached", None
-    if not frequencies:
+    rated = drive.motor.rated_torque * drive.ratio if drive.motor else 0.0
+    if not frequencies or (float(drive.torque(final)) <= rated and final > 0.5 * _end(drive)):
         return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
         return "captured", NaturalFrequency(name, frequencies[name])
     return "short", None
+
+
+def _end(drive: Drive) -> float:
+    return drive.end_speed or 0.0
 
 
 def _is_steady(history: History) -> bool:
@@ -436,13 +539,20 @@ def _passing(history: History, omega: float) -> float | None:
 
 def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
     found = {}
-    names = ("main", "relative") if isinstance(machine, FlipFlowScreen) else history.system.named
-    for which in names:
+    screen = machine if isinstance(machine, FlipFlowScreen) else None
+    for which in ("main", "relative") if screen else history.system.named:
         times, sizes = swings(history.t, history.displacement(which), history.velocity(which))
         if sizes.size:
             found[f"{which}_amplitude"] = _peak(history, times, sizes)
-    if isinstance(machine, FlipFlowScreen):
-        found["foundation_force"] = _peak(history, history.t, foundation_force(machine, history))
+    if screen is not None:
+        if history.normal is not None:
+            reach = np.hypot(history.displacement("main"), history.normal[:, 0])
+            found["main_amplitude"] = _peak(history, history.t, reach)
+        relative = found.get("relative_amplitude")
+        if relative is not None and screen.shear_height is not None:
+            strain = relative.value / screen.shear_height
+            found["shear_strain"] = replace(relative, value=strain)
+        found["foundation_force"] = _peak(history, history.t, foundation_force(screen, history))
     for j in range(history.force.shape[1]):
         name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"
         found[name] = _peak(history, history.t, np.abs(history.stop_force(j)))
@@ -481,7 +591,8 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
     if isinstance(machine, FlipFlowScreen) and normal_direction(machine) is None:
         notes.append(
             "Normal direction not checked, for want of isolation.normal_stiffness and "
-            "normal_damping: amplitudes and forces are those along the surface."
+            "normal_damping: amplitudes and forces are those along the surface, the force on the "
+            "foundation is larger."
         )
     if isinstance(drive, Drive):
         notes += [*_gravity(machine, drive), *(f"Assumed: {text}." for text in drive.assumed)]
@@ -489,19 +600,24 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
 
 
 def _gravity(machine: Machine, drive: Drive) -> list[str]:
-    """What the weight of the unbalance, which the equations leave out, would change."""
+    """What the weight of the unbalance would change, where the equations leave it out."""
+    if unbalance_weight(machine).torque > 0.0:
+        return []
     forces = machine.system().excitations
     moment = sum(float(np.abs(f.vector).max()) for f in forces if isinstance(f, Unbalance))
     torque = moment * GRAVITY
     if torque == 0.0:
         return []
-    left_out = f"Gravity on the unbalance, up to {torque:.3g} N m at the shaft, is not calculated."
+    left_out = (
+        f"Weight not considered: gravity on the unbalance, up to {torque:.3g} N m at the shaft, "
+        "is not calculated."
+    )
     if drive.motor is None:
         over = 2.0 * math.sqrt(torque / drive.inertia) * RPM
         swings = f"Coasting below about {over:.0f} rpm, the shaft would swing instead of turning."
         return [left_out, swings]
-    at_rest = float(drive.torque(0.0))
+    at_rest = drive.torque_at_rest
     if at_rest < torque:
-        lift = f"The motor's torque at rest, {at_rest:.3g} N m, may not lift the unbalance."
+        lift = f"The torque at rest, {at_rest:.3g} N m at the shaft, may not lift the unbalance."
         return [left_out, lift]
     return [left_out]
