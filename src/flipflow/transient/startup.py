@@ -559,10 +559,18 @@ def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
     return found
 
 
-def _peak(history: History, t: Real, values: Real) -> Peak:
+def _peak(history: History, times: Real, values: Real) -> Peak:
+    """The greatest value; between rows, the top of the parabola through it and its neighbours."""
     k = int(values.argmax())
-    omega = float(np.interp(t[k], history.t, history.omega))
-    return Peak(float(values[k]), omega, float(t[k]))
+    t, value = float(times[k]), float(values[k])
+    if 0 < k < times.size - 1 and times[k - 1] < t < times[k + 1]:
+        rows = slice(k - 1, k + 2)
+        bend, slope, _ = np.polyfit(times[rows] - t, values[rows], 2)
+        if bend < 0.0:
+            away = float(np.clip(-0.5 * slope / bend, times[k - 1] - t, times[k + 1] - t))
+            t, value = t + away, max(value, value + away * (slope + bend * away))
+    omega = float(np.interp(t, history.t, history.omega))
+    return Peak(value, omega, t)
 
 
 def foundation_force(screen: FlipFlowScreen, history: History) -> Real:
