@@ -22,6 +22,7 @@ from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
+from flipflow.studies.drive_check import Demand
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.operating_region import OperatingRegion, operating_region
@@ -137,7 +138,7 @@ class Assessment:
         The empty machine's relative amplitude with one field at a time 5 % lower and higher; None
         without a working speed.
     transients
-        Start, coast-down and jump risk of the empty machine; None without a working speed.
+        Start, coast-down and jump risk of every load case; None without a working speed.
     notes
         What was not checked or not finished.
     method, version, input_hash
@@ -210,12 +211,33 @@ def assess(
         limits_table=rows,
         verdict=verdict(project.speed, rows, cases, region),
         tornado=None if project.speed is None else tornado(project.screen, project.speed),
-        transients=None if project.speed is None else transients(project, project.speed),
+        transients=None if project.speed is None else passing(project, project.speed, cases, region),
         notes=(*project.warnings, *region.notes, *coexisting(cases)),
         method=checked_method(method),
         version=__version__,
         input_hash=input_hash(project),
     )
+
+
+def passing(
+    project: Project, omega: float, cases: tuple[CaseAssessment, ...], region: OperatingRegion
+) -> Transients:
+    """Start, coast-down and jump risk of every load case, and the drive against the machine."""
+    screens = {case.name: case.screen for case in cases}
+    powers = {case.name: total_power(case.energy) for case in cases if case.energy}
+    first = cases[0]
+
+    def power_at(speed: float) -> float | None:
+        working = working_motion(first.screen, first.branch, speed)
+        return None if working is None else total_power(energy_balance(working))
+
+    demand = Demand(first.screen, omega, region.feasible, powers, power_at)
+    return transients(project, omega, screens, demand)
+
+
+def total_power(energy: Mapping[str, float]) -> float:
+    """Mean power in W that the dampers take of a motion in both directions."""
+    return energy["input"] + energy.get("normal", 0.0)
 
 
 def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:

@@ -66,6 +66,20 @@ class NaturalFrequency(NamedTuple):
     omega: float
 
 
+@dataclass(frozen=True)
+class RunSummary:
+    """A start or a coast-down without its motion; the fields are those of :class:`RunUp`."""
+
+    outcome: Outcome
+    verdict: str
+    angle: float
+    final_speed: float
+    time_to_speed: float | None
+    duration: float
+    passing: float | None
+    peaks: Mapping[str, Peak]
+
+
 @dataclass(frozen=True, eq=False)
 class RunUp:
     """A start or a coast-down, and what it does to the machine.
@@ -170,6 +184,14 @@ class RunUp:
             return f"{wanted} in {time:.3g} s"
         time = self._time_at(AT_SPEED * self.speed) or 0.0
         return f"{100.0 * AT_SPEED:.0f} % of {wanted} in {time:.3g} s"
+
+    @property
+    def summary(self) -> RunSummary:
+        """The run without its motion."""
+        return RunSummary(
+            self.outcome, self.verdict, self.angle, self.final_speed, self.time_to_speed,
+            self.duration, self.passing, self.peaks,
+        )  # fmt: skip
 
     @property
     def _why_short(self) -> str:
