@@ -56,6 +56,7 @@ _HOME = {
     "StarDelta": "flipflow.model.starter",
     "Converter": "flipflow.model.starter",
     "Limits": "flipflow.model.limits",
+    "PassingLimits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
@@ -90,6 +91,7 @@ if TYPE_CHECKING:
     from flipflow.model.excitation import MovingBase as MovingBase
     from flipflow.model.excitation import Unbalance as Unbalance
     from flipflow.model.limits import Limits as Limits
+    from flipflow.model.limits import PassingLimits as PassingLimits
     from flipflow.model.project import Project as Project
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load

@@ -5,7 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+
 from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
+
+DOES_NOT_START = 5  # exit code of a start that fails, or a drive that does not fit, as given
 
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
@@ -23,7 +27,10 @@ def analyze(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Analyze a machine: verdict, allowed speed range, report."""
+    """Analyze a machine: verdict, allowed speed range, report.
+
+    Ends with code 5 where the machine does not start, or its drive does not fit, as given.
+    """
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
@@ -40,6 +47,8 @@ def analyze(
 
         assessment = with_progress(lambda monitor: assess(project, monitor, **options))
         _write(assessment, target)
+    if assessment.start_fails:
+        raise typer.Exit(DOES_NOT_START)
 
 
 def _write(assessment: Assessment, target: Destination) -> None:

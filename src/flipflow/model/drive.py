@@ -117,7 +117,7 @@ DRIVE_FIELDS: tuple[Field, ...] = (
         "Speed of the motor over that of the shaft; left out, such that the shaft settles at "
         "working speed.",
         lower_open=True, default=None, plausible=(0.2, 10.0),
-        example=1.7,
+        example=1.75,
     ),
     Field(
         "inertia", "J", "kg m^2", "kg m^2", "drive.inertia",

@@ -70,6 +70,8 @@ class Quantity:
         Whether the folds of the motion's branch must be known, too.
     limit
         The limit that may be set on it; None where there is none.
+    passing
+        The limit that may be set on it while the machine starts and stops.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Quantity:
     of_stops: bool = False
     of_folds: bool = False
     limit: Limit | None = None
+    passing: Limit | None = None
 
     def missing(self, screen: FlipFlowScreen) -> tuple[str, ...]:
         """Fields that it needs and the screen does not have, in the order of the alphabet."""
@@ -102,6 +105,9 @@ _ALL = (
             "between", "Least and greatest relative amplitude, half peak to peak.",
             ("4 mm", "8 mm"), (0.0, 0.1),
         ),
+        passing=Limit(
+            "at most", "Greatest relative amplitude on the way.", "15 mm", (1e-3, 0.2),
+        ),
     ),
     Quantity(
         "stroke", "stroke", "2|x2|", "m", "mm",
@@ -110,6 +116,10 @@ _ALL = (
     Quantity(
         "main_amplitude", "main frame amplitude", "|x1|", "m", "mm",
         "Half the peak-to-peak motion of the main frame along the surface.",
+        passing=Limit(
+            "at most", "Greatest displacement of the main frame on the way, in any direction.",
+            "25 mm", (1e-3, 0.3),
+        ),
     ),
     Quantity(
         "floating_amplitude", "floating frame amplitude", "|xf|", "m", "mm",
@@ -154,6 +164,10 @@ _ALL = (
             "at most", "Greatest relative amplitude over the rubber height of a shear spring.",
             "20 %", (0.005, 3.0),
         ),
+        passing=Limit(
+            "at most", "Greatest relative amplitude over the rubber height on the way.",
+            "30 %", (0.005, 3.0),
+        ),
     ),
     Quantity(
         "stop_force", "stop force", "H", "N", "kN",
@@ -162,6 +176,10 @@ _ALL = (
         limit=Limit(
             "at most", "Greatest force on the stop springs of one side together, peak.",
             "15 kN", (100.0, 10e6),
+        ),
+        passing=Limit(
+            "at most", "Greatest force on the stop springs of one side on the way, peak.",
+            "30 kN", (100.0, 10e6),
         ),
     ),
     Quantity(
@@ -176,6 +194,10 @@ _ALL = (
         limit=Limit(
             "at most", "Greatest dynamic force on the foundation, peak, in any direction.",
             "8 kN", (50.0, 5e6),
+        ),
+        passing=Limit(
+            "at most", "Greatest dynamic force on the foundation on the way, in any direction.",
+            "20 kN", (50.0, 5e6),
         ),
     ),
     Quantity(

@@ -15,7 +15,14 @@ from flipflow.dynamics.normal import NormalMotion
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
-from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
+from flipflow.model.limits import (
+    LIMIT_FIELDS,
+    PASSAGES,
+    PASSING_FIELDS,
+    LimitField,
+    Passage,
+    limit_bounds,
+)
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
@@ -143,6 +150,8 @@ class Assessment:
         What was not checked or not finished.
     method, version, input_hash
         How, by which version, from which input.
+    passing_table
+        The limits on start and stop, and what is greatest there where no limit is given.
     """
 
     project: Project
@@ -157,6 +166,26 @@ class Assessment:
     method: Method
     version: str
     input_hash: str
+    passing_table: tuple[LimitRow, ...] = ()
+
+    @property
+    def state(self) -> str:
+        """The worst state of limits and drive; fail without a motion that returns."""
+        if self.omega is None:
+            return NOT_CHECKED
+        if any(one.orbit is None or one.orbit.stability == "unstable" for one in self.cases):
+            return FAIL
+        rows = (*self.limits_table, *self.passing_table)
+        states = {row.state for row in rows if row.limit != NO_LIMIT}
+        if self.transients is not None and self.transients.cases:
+            states.add(self.transients.state)
+        order = (FAIL, NOT_CHECKED, ATTENTION, PASS)
+        return next((state for state in order if state in states), NOT_CHECKED)
+
+    @property
+    def start_fails(self) -> bool:
+        """Whether the machine does not start, or runs where it may not, by the drive given."""
+        return self.transients is not None and self.transients.state == FAIL
 
     def __repr__(self) -> str:
         name = self.project.document.name or self.project.name
@@ -203,19 +232,22 @@ def assess(
         for load, branch in zip(project.load_cases, region.branches, strict=True)
     )
     rows = tuple(limit_row(project, cases, limit.name) for limit in LIMIT_FIELDS)
+    found = None if project.speed is None else passing(project, project.speed, cases, region)
+    on_the_way = () if found is None else passing_rows(project, found)
     return Assessment(
         project=project,
         region=region,
         cases=cases,
         omega=project.speed,
         limits_table=rows,
-        verdict=verdict(project.speed, rows, cases, region),
+        verdict=with_start(verdict(project.speed, rows, cases, region), found, on_the_way),
         tornado=None if project.speed is None else tornado(project.screen, project.speed),
-        transients=None if project.speed is None else passing(project, project.speed, cases, region),
+        transients=found,
         notes=(*project.warnings, *region.notes, *coexisting(cases)),
         method=checked_method(method),
         version=__version__,
         input_hash=input_hash(project),
+        passing_table=on_the_way,
     )
 
 
@@ -317,6 +349,73 @@ def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) ->
     margin, worst, case_name = min(judged, key=lambda one: one[0])
     state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
     return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
+
+
+def passing_rows(project: Project, found: Transients) -> tuple[LimitRow, ...]:
+    """The limits on start and stop with their worst case, and what has none there."""
+    rows = (
+        passing_row(project, found, passage, field)
+        for passage in PASSAGES
+        for field in PASSING_FIELDS[passage]
+    )
+    return tuple(row for row in rows if row is not None)
+
+
+def passing_row(
+    project: Project, found: Transients, passage: Passage, field: LimitField
+) -> LimitRow | None:
+    """The worst case of one quantity on the way; None where it has neither value nor limit."""
+    quantity = QUANTITIES[field.name]
+    label = f"{quantity.label}, {passage}"
+    row = LimitRow(field.key, label, quantity.unit, quantity.shown_unit, NO_LIMIT)
+    most = getattr(getattr(project.limits, passage), field.name)
+    worst = [
+        (peak.value, case.case)
+        for case in found.cases
+        if (peak := case.peaks_of(passage).get(field.name)) is not None
+    ]
+    if most is not None:
+        row = dataclasses.replace(row, limit=(-math.inf, most))
+    missing = quantity.missing(project.screen)
+    if not worst or missing:
+        reason = missing_words(missing) if missing else "the machine does not come so far"
+        return None if most is None else dataclasses.replace(row, reason=reason)
+    value, case = max(worst)
+    row = dataclasses.replace(row, worst=value, case=case)
+    if most is None:
+        return dataclasses.replace(row, reason=f"no limit given for the {passage}")
+    margin = relative_margin(value, -math.inf, most)
+    state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
+    return dataclasses.replace(row, margin=margin, state=state)
+
+
+def running_limit(project: Project, row: LimitRow) -> float | None:
+    """The greatest value that the running limit allows of what is greatest on the way, SI."""
+    name = row.name.rpartition(".")[2]
+    if getattr(project.limits, name, None) is None:
+        return None
+    return limit_bounds(project.limits, name)[1]
+
+
+def with_start(sentence: str, found: Transients | None, rows: tuple[LimitRow, ...]) -> str:
+    """The verdict with what start, stop and drive add to it."""
+    if found is None or not found.cases:
+        return sentence
+    broken = sum(row.state == FAIL for row in rows)
+    parts = []
+    if found.failed:
+        rests = "; drive assumed" if found.rests_on_assumed else ""
+        parts.append(f"it does not start ({in_cases(found)}{rests})")
+    elif any(one.state == FAIL for one in found.findings):
+        parts.append("the drive does not fit")
+    if broken:
+        parts.append(f"{broken} {'limit' if broken == 1 else 'limits'} on start and stop broken")
+    return f"{sentence.rstrip('.')}; {' and '.join(parts)}." if parts else sentence
+
+
+def in_cases(found: Transients) -> str:
+    """In how many load cases the start fails."""
+    return f"{len(found.failed)} of {len(found.cases)} load cases"
 
 
 def relative_margin(value: float, low: float, high: float) -> float:

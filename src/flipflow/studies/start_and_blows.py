@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
+from flipflow.model.limits import Passage
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.studies.drive_check import (
@@ -62,6 +63,12 @@ class CaseRuns:
     peaks: Mapping[str, Peak]
     jump: JumpRisk | None
     reasons: dict[str, str]
+
+    def peaks_of(self, passage: Passage) -> Mapping[str, Peak]:
+        """The greatest peaks while it starts, or stops."""
+        if passage == "start":
+            return self.peaks
+        return {} if self.coast_down is None else self.coast_down.peaks
 
 
 @dataclass(frozen=True, eq=False)
