@@ -9,8 +9,6 @@ import typer
 
 from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
 
-DOES_NOT_START = 5  # exit code of a start that fails, or a drive that does not fit, as given
-
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
     from flipflow.studies.assessment import Assessment
@@ -48,6 +46,8 @@ def analyze(
         assessment = with_progress(lambda monitor: assess(project, monitor, **options))
         _write(assessment, target)
     if assessment.start_fails:
+        from flipflow.cli.output import DOES_NOT_START  # noqa: PLC0415
+
         raise typer.Exit(DOES_NOT_START)
 
 

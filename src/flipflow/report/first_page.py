@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 
+from flipflow.model.limits import PASSAGES
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
@@ -26,7 +27,6 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, rpm, span, speed
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import (
-    NO_LIMIT,
     Assessment,
     CaseAssessment,
     LimitRow,
@@ -129,12 +129,24 @@ def limits(assessment: Assessment) -> Iterator[Block]:
         Column("State"),
     )
     caption = (
-        "Worst value over all load cases. Margin: distance from the limit as a share of it. "
-        "Attention: met by less than 5 %."
+        "Worst value over all load cases; of start and stop the tightest limit each. Margin: "
+        "distance from the limit as a share of it. Attention: met by less than 5 %."
     )
-    passing = (row for row in assessment.passing_table if row.limit != NO_LIMIT)
+    passing = tightest_on_the_way(assessment)
     rows = tuple(_limit_row(row) for row in (*assessment.limits_table, *passing))
     yield Table("", columns, rows, caption)
+
+
+def tightest_on_the_way(assessment: Assessment) -> Iterator[LimitRow]:
+    """Of the limits on the start, and of those on the stop, the one that leaves least."""
+    for passage in PASSAGES:
+        rows = [
+            row
+            for row in assessment.passing_table
+            if row.margin is not None and row.name.startswith(f"limits.{passage}.")
+        ]
+        if rows:
+            yield min(rows, key=lambda row: row.margin or 0.0)
 
 
 @section(Assessment, Part.FIRST_PAGE, 60, brief=True)
@@ -211,7 +223,7 @@ def _other_lines(assessment: Assessment) -> int:
         max(legend_lines(names) - LEGEND_WITHIN, 0)
         + bool(contact_sentence(assessment.region))
         + (not any(case.normal for case in assessment.cases))
-        + _note_lines(does_it_start(assessment.transients))
+        + _note_lines(f"Does it start: {does_it_start(assessment.transients)}")
         - 1
     )
 

@@ -203,7 +203,7 @@ def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
 
 
 def _outcome(run: RunSummary) -> str:
-    return "reaches its speed" if run.outcome == "reached" else run.outcome
+    return run.outcome
 
 
 def _limits_table(assessment: Assessment) -> Table:

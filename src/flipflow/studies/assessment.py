@@ -36,11 +36,13 @@ from flipflow.studies.operating_region import OperatingRegion, operating_region
 from flipflow.studies.quantity_values import Working
 from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
 from flipflow.studies.start_and_blows import Transients, transients
+from flipflow.studies.start_sentence import ASSUMED, in_cases
 
 TORNADO_SHARE = 0.05  # change of each field, down and up, relative to its value
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
 CLOSE = 0.05  # margin to a limit, relative, below which it asks for attention
 NO_LIMIT = (-math.inf, math.inf)
+NOT_SO_FAR = "the machine does not come so far"  # what is not judged on the way
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,8 @@ class Assessment:
         if any(one.orbit is None or one.orbit.stability == "unstable" for one in self.cases):
             return FAIL
         rows = (*self.limits_table, *self.passing_table)
-        states = {row.state for row in rows if row.limit != NO_LIMIT}
+        judged = (row for row in rows if row.limit != NO_LIMIT and row.reason != NOT_SO_FAR)
+        states = {row.state for row in judged}
         if self.transients is not None and self.transients.cases:
             states.add(self.transients.state)
         order = (FAIL, NOT_CHECKED, ATTENTION, PASS)
@@ -378,7 +381,7 @@ def passing_row(
         row = dataclasses.replace(row, limit=(-math.inf, most))
     missing = quantity.missing(project.screen)
     if not worst or missing:
-        reason = missing_words(missing) if missing else "the machine does not come so far"
+        reason = missing_words(missing) if missing else NOT_SO_FAR
         return None if most is None else dataclasses.replace(row, reason=reason)
     value, case = max(worst)
     row = dataclasses.replace(row, worst=value, case=case)
@@ -404,18 +407,14 @@ def with_start(sentence: str, found: Transients | None, rows: tuple[LimitRow, ..
     broken = sum(row.state == FAIL for row in rows)
     parts = []
     if found.failed:
-        rests = "; drive assumed" if found.rests_on_assumed else ""
-        parts.append(f"it does not start ({in_cases(found)}{rests})")
+        where = in_cases([one.case for one in found.failed], len(found.cases))
+        rests = f" ({ASSUMED})" if found.rests_on_assumed else ""
+        parts.append(f"the start fails {where}{rests}")
     elif any(one.state == FAIL for one in found.findings):
         parts.append("the drive does not fit")
     if broken:
         parts.append(f"{broken} {'limit' if broken == 1 else 'limits'} on start and stop broken")
     return f"{sentence.rstrip('.')}; {' and '.join(parts)}." if parts else sentence
-
-
-def in_cases(found: Transients) -> str:
-    """In how many load cases the start fails."""
-    return f"{len(found.failed)} of {len(found.cases)} load cases"
 
 
 def relative_margin(value: float, low: float, high: float) -> float:

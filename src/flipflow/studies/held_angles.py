@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from flipflow.model.drive import Drive
+from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.transient.speed_run import hanging_angle, unbalance_weight
 from flipflow.transient.startup import RunUp, start_up
@@ -33,9 +34,22 @@ def held_angles(screen: FlipFlowScreen, drive: Drive) -> tuple[float, ...]:
     return (hanging, hanging - held, hanging + held, top - held, top, top + held)
 
 
-def starts_from_rest(screen: FlipFlowScreen, drive: Drive, speed: float) -> tuple[RunUp, ...]:
-    """A start from each of those angles, the worst first: what fails, else the greatest force."""
-    runs = [start_up(screen, drive, speed=speed, angle=one) for one in held_angles(screen, drive)]
+def starts_from_rest(
+    screen: FlipFlowScreen,
+    drive: Drive,
+    speed: float,
+    duration: float | None = None,
+    monitor: Monitor | None = None,
+) -> tuple[RunUp, ...]:
+    """A start from each of those angles, the worst first: what fails, else the greatest force.
+
+    What is open of the drive must be chosen; ``duration`` and ``monitor`` as of
+    :func:`~flipflow.start_up`.
+    """
+    runs = [
+        start_up(screen, drive, speed=speed, duration=duration, angle=angle, monitor=monitor)
+        for angle in held_angles(screen, drive)
+    ]
     return tuple(sorted(runs, key=badness))
 
 

@@ -60,9 +60,9 @@ def _success(found: Transients) -> str:
     else:
         reached = f"reaches {wanted} in at most {max(known):.3g} s"
         low, high = (f"{end * RPM:.0f}" for end in (min(last, default=0.0), max(last, default=0.0)))
-        reached += f", then runs at {low if low == high else f'{low} to {high}'} rpm"
-    cases = ", in every load case" if len(found.cases) > 1 else ""
-    return f"from rest it {reached}{cases}"
+        reached += f", then {low if low == high else f'{low} to {high}'} rpm"
+    cases = " in every load case" if len(found.cases) > 1 else ""
+    return f"it {reached}{cases}"
 
 
 def _remedies(findings: tuple[Finding, ...]) -> str:
