@@ -9,7 +9,6 @@ import sys
 
 import numpy as np
 import pytest
-from reference.full_start import run
 
 import flipflow as ff
 from flipflow.cli.main import main
@@ -23,6 +22,7 @@ from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess
 from flipflow.studies.drive_check import SWING
 from flipflow.studies.held_angles import held_angles, starts_from_rest
+from reference.full_start import run
 
 pytestmark = pytest.mark.numerical
 RPM = np.pi / 30.0
@@ -30,12 +30,11 @@ WORKING = 850.0 * RPM
 SAME_PEAK, SAME_TIME = 1e-3, 1e-3
 
 
-def given(power=5500.0, speed=WORKING, **changes):
+def given(power=5500.0, **changes):
     """A drive without an assumption: cage motor of 1500 rpm, ratio 1.75 unless changed."""
-    motor = {
-        "synchronous_speed": 1500.0 * RPM, "rated_power": power,
-        "starting_ratio": 2.0, "pull_up_ratio": 1.6,
-    } | {k: changes.pop(k) for k in tuple(changes) if k in ff.Motor.__dataclass_fields__}  # fmt: skip
+    own = {k: changes.pop(k) for k in tuple(changes) if k in ff.Motor.__dataclass_fields__}
+    motor = {"synchronous_speed": 1500.0 * RPM, "rated_power": power}
+    motor |= {"starting_ratio": 2.0, "pull_up_ratio": 1.6} | own
     shaft = {"inertia": 0.9, "ratio": 1.75, "friction": 3.0} | changes
     return ff.Drive(motor=ff.Motor(**motor), **shaft)
 
@@ -184,10 +183,10 @@ def test_angles_that_friction_holds(screen):
 
 
 def test_the_worst_angle_counts(screen):
-    """Just enough torque swings the unbalance over from hanging, not from where friction holds."""
+    """Torque just enough to swing over from hanging is not from where friction holds the shaft."""
     weight, friction = screen.eccentric_moment * 9.80665, 3.0
     motor = given().motor
-    share = (1.03 * SWING * weight + friction) / (1.75 * motor.rated_torque)
+    share = (0.98 * SWING * weight + friction) / (1.75 * motor.rated_torque)
     drive = given(starting_ratio=share, pull_up_ratio=None, breakdown_ratio=2.5)
     ahead = ff.start_up(screen, drive, speed=WORKING, angle=held_angles(screen, drive)[2])
     assert ff.start_up(screen, drive, speed=WORKING).outcome == "reached"
@@ -292,17 +291,18 @@ def test_fault_1_a_motor_that_is_too_weak(tmp_path):
 
 def test_fault_1_what_is_captured_is_told_what_passes(tmp_path):
     """Without the deck's angle gravity is left out; by Kloss 1.5 kW hang at 205 rpm."""
-    lines = ('deck_angle = "15 deg"', ""), ("throw", "throw")
-    project = project_of(tmp_path, lines[0], RATIO, ('"5.5 kW"', '"1.5 kW"'))
+    angle = ('deck_angle = "15 deg"', "")
+    project = project_of(tmp_path, angle, RATIO, ('"5.5 kW"', '"1.5 kW"'))
     drive = project.drive
     plain = dataclasses.replace(drive.motor, starting_ratio=None, pull_up_ratio=None)
     found = assess(dataclasses.replace(project, drive=dataclasses.replace(drive, motor=plain)))
     assert agree(found) == "fail"
     run_up = found.transients.start
     assert run_up.outcome == "captured"
-    assert run_up.final_speed / RPM == pytest.approx(205.0, abs=3.0)
+    empty = found.transients.cases[0].start
+    assert empty.final_speed / RPM == pytest.approx(205.0, abs=1.5)
     (one,) = (f for f in found.transients.findings if f.subject == "resonance")
-    power = 1e3 * float(one.sentence.split()[0])
+    power = 1e3 * float(one.sentence.split()[0])  # kW, as the sentence begins
     strong = dataclasses.replace(plain, rated_power=power)
     passes = dataclasses.replace(drive, motor=strong)
     assert ff.start_up(project.screen, passes, speed=project.speed).outcome == "reached"
@@ -332,13 +332,13 @@ def test_fault_3_a_drive_that_runs_elsewhere(tmp_path):
     (one,) = found.transients.findings
     assert "settles at 872.6 rpm, above the allowed 870.4 rpm" in one.sentence
     assert "790 rpm needs a ratio of 1.88" in one.sentence
-    assert found.transients.start.final_speed / RPM == pytest.approx(872.6, abs=0.5)
+    assert found.transients.cases[0].start.final_speed / RPM == pytest.approx(872.6, abs=0.5)
     assert "the drive does not fit" in found.verdict
 
 
-def test_fault_3_within_the_allowed_range_asks_for_attention(tmp_path):
-    wide = project_of(tmp_path, ("ratio = 1.75", "ratio = 1.8"))
-    found = assess(wide)
+@pytest.mark.parametrize("ratio", [1.72, 1.8])
+def test_fault_3_within_the_allowed_range_asks_for_attention(tmp_path, ratio):
+    found = assess(project_of(tmp_path, ("ratio = 1.75", f"ratio = {ratio}")))
     (one,) = found.transients.findings
     assert one.state == "attention"
     assert agree(found) == "attention"
@@ -557,7 +557,7 @@ def test_a_torque_table_in_newton_metres_is_one_in_shares(tmp_path):
     ('torque_table = [["0 rpm", 2.0], ["1440 rpm", "1 N m"]]', ("drive.torque_table",)),
     ('torque_table = [["0 rpm", 2.0]]', ("drive.torque_table", "rows")),
     ('torque_table = [["9 rpm", 2.0], ["1440 rpm", 1.0]]', ("drive.torque_table", "standstill")),
-    ('pull_up_torque_ratio = 3.0', ("pull_up",)),
+    ("pull_up_torque_ratio = 3.0", ("pull_up",)),
 ])  # fmt: skip
 def test_drives_that_contradict_themselves(tmp_path, lines, told):
     with pytest.raises(InputError) as caught:

@@ -79,11 +79,11 @@ def run(
         ])  # fmt: skip
         return np.concatenate([s[4:], np.linalg.solve(M, f)])
 
-    def crossing(t: float, s: Real, side: int) -> float:
+    def crossing(_t: float, s: Real, side: int) -> float:
         x2 = s[0] - s[1]
         return gap - abs(x2) if side == 0 else side * x2 - gap
 
-    def slow(t: float, s: Real, side: int) -> float:
+    def slow(_t: float, s: Real, _side: int) -> float:
         return s[7] - stop_below if stop_below is not None else 1.0
 
     crossing.terminal = slow.terminal = True

@@ -85,9 +85,7 @@ def _spans(history: History, blows: Sequence[Impulse]) -> dict[str, slice]:
     return {"start": slice(0, max(first, 1)), "blow": slice(first, None)}
 
 
-def _show(
-    project: Project, history: History, blows: Sequence[Impulse], out: Console
-) -> None:
+def _show(project: Project, history: History, blows: Sequence[Impulse], out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
     omega = float(history.omega[-1])

@@ -185,11 +185,8 @@ def _start(
     """The worst start from rest; the one start of a given speed over time."""
     from flipflow.model.drive import SpeedProfile  # noqa: PLC0415  keeps --help quick
     from flipflow.studies.held_angles import starts_from_rest  # noqa: PLC0415
-    from flipflow.transient.startup import (  # noqa: PLC0415
-        default_drive,
-        fitted_drive,
-        start_up,
-    )
+    from flipflow.transient.chosen_drive import default_drive, fitted_drive  # noqa: PLC0415
+    from flipflow.transient.startup import start_up  # noqa: PLC0415
 
     screen, speed = project.screen, project.speed
     if speed is None or isinstance(drive, SpeedProfile):

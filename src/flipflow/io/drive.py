@@ -21,8 +21,8 @@ from flipflow.model.drive import (
     Drive,
     SpeedProfile,
     assumed_drive,
-    checked_torque_table,
 )
+from flipflow.model.motor import checked_torque_table
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.torque_curve import rated_point
 
@@ -79,7 +79,9 @@ def _check_start(table: Table, values: dict[str, float], start: str) -> None:
         if name in values and start != way:
             key = entry_of(fields[name]).key
             raise InputError(
-                fields[name].key, table[key], f'write drive.start = "{way}" with it, or leave it out'
+                fields[name].key,
+                table[key],
+                f'write drive.start = "{way}" with it, or leave it out',
             )
     for one, other in (("switch_over_speed", "switch_over_time"), ("ramp", "ramp_time")):
         if one in values and other in values:
@@ -100,7 +102,9 @@ def _torque_table(
     for field in DRIVE_FIELDS:
         if field.name in OF_RATIOS and field.name in values:
             key = entry_of(field).key
-            raise InputError(field.key, table[key], "the torque table says it, leave one of them out")
+            raise InputError(
+                field.key, table[key], "the torque table says it, leave one of them out"
+            )
     read, in_torque = read_torques(written, TORQUE_TABLE.label)
     rows = checked_torque_table(TORQUE_TABLE.label, read)
     synchronous = values.get("synchronous_speed", SYNCHRONOUS_SPEED)

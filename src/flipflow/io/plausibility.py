@@ -76,7 +76,9 @@ def _drive_values(drive: Drive | None, written: Mapping[str, object]) -> Iterato
         return
     parts = (drive, drive.motor, drive.starter)
     for field in DRIVE_FIELDS:
-        owner = next((part for part in parts if hasattr(part, OWN.get(field.name, field.name))), None)
+        owner = next(
+            (part for part in parts if hasattr(part, OWN.get(field.name, field.name))), None
+        )
         if field.key in written and owner is not None:
             value = getattr(owner, OWN.get(field.name, field.name))
             yield from _question(field, value, written)

@@ -20,8 +20,8 @@ from flipflow.model.limits import (
     LIMIT_FIELDS,
     PASSAGES,
     PASSING_FIELDS,
-    Limits,
     LimitField,
+    Limits,
     PassingLimits,
 )
 from flipflow.model.project import Document, Project
@@ -139,7 +139,7 @@ def _check_format(tables: Mapping[str, object], notes: Notes) -> None:
 
 
 def _limits(tables: Tables, notes: Notes) -> Limits:
-    passing = {
+    passing: dict[str, Any] = {
         passage: PassingLimits(
             **_limit_values(tables.get(f"limits.{passage}", {}), PASSING_FIELDS[passage], notes)
         )

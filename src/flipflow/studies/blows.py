@@ -101,7 +101,7 @@ class Blows:
         index = np.array([one.index for one in self.rows])[row]
         mobility = np.array([one.mobility for one in self.rows])[row]
         own = velocity[np.arange(row.size), index]
-        return np.where(lump, -share * own / mobility, signs * most * share)
+        return np.asarray(np.where(lump, -share * own / mobility, signs * most * share))
 
     def lump(self, row: int, share: float) -> float:
         """The lump's mass in kg."""

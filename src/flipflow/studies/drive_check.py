@@ -8,17 +8,20 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flipflow.dynamics.linear_response import linear_response
-from flipflow.dynamics.normal import normal_motion
+from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import Converter
 from flipflow.transient.speed_run import unbalance_weight
+from flipflow.transient.startup import AT_SPEED
 
 Interval = tuple[float, float]
+Real = NDArray[np.float64]
 Subject = Literal["speed", "torque at rest", "power", "resonance"]
 ELSEWHERE = 0.01  # of the working speed: farther away a drive settles at another speed
 SWING = 0.724611  # largest (1 - cos a) / a: a torque, over m0r g, that swings the unbalance over
@@ -118,7 +121,7 @@ def power_that_passes(drive: Drive, screen: FlipFlowScreen, omega: float) -> flo
     if motor is None or omega <= 0.0:
         return None
     speeds = omega * np.linspace(*AROUND, SPEEDS)
-    asked = np.array([free_power(screen, float(one)) / one for one in speeds])
+    asked = free_power(screen, speeds) / speeds
     given = drive.torque(speeds)
     if (given <= 0.0).any():
         return None
@@ -130,15 +133,18 @@ def power_that_passes(drive: Drive, screen: FlipFlowScreen, omega: float) -> flo
     return motor.power * most if math.isfinite(most) and most > 0.0 else None
 
 
-def free_power(screen: FlipFlowScreen, omega: float) -> float:
+def free_power(screen: FlipFlowScreen, omega: Real) -> Real:
     """Mean power in W that the dampers take without contact, both directions where known."""
     found = linear_response(screen, omega)
-    main, relative = found.amplitude("main"), found.amplitude("relative")
-    along = screen.isolation_damping * float(main) ** 2 + screen.shear_damping * float(
-        relative
-    ) ** 2
-    normal = normal_motion(screen, omega)
-    return 0.5 * omega**2 * along + (0.0 if normal is None else normal.power)
+    along = screen.isolation_damping * found.amplitude("main") ** 2
+    between = screen.shear_damping * found.amplitude("relative") ** 2
+    power = 0.5 * omega**2 * (along + between)
+    k, c = screen.normal_stiffness, screen.normal_damping
+    if k is not None and c is not None:
+        mass = screen.main_mass + screen.floating_mass
+        across = normal_amplitude(mass, c, k, screen.eccentric_moment, omega)
+        power = power + 0.5 * c * (omega * np.abs(across)) ** 2
+    return np.asarray(power)
 
 
 def _state(drive: Drive, subject: Subject) -> Literal["attention", "fail"]:
@@ -151,10 +157,12 @@ def _speed(drive: Drive, demand: Demand) -> Finding | None:
     end, speed = drive.end_speed, demand.speed
     if end is None or drive.motor is None:
         return None
-    if end <= speed:
-        told = f"the synchronous speed of the shaft is {_rpm(end)}"
-        return Finding("speed", _state(drive, "speed"), f"{told}; {_remedy(drive, demand)}.")
     settled = settled_speed(drive, demand)
+    if end <= speed:
+        near = settled is not None and settled >= AT_SPEED * speed
+        runs = near and not _beyond(settled or 0.0, demand.allowed)
+        told = f"the synchronous speed of the shaft is {_rpm(end)}; {_remedy(drive, demand)}."
+        return Finding("speed", "attention" if runs else _state(drive, "speed"), told)
     if settled is None:
         return None
     beyond = _beyond(settled, demand.allowed)

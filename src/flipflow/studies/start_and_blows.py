@@ -21,14 +21,13 @@ from flipflow.studies.drive_check import (
 )
 from flipflow.studies.held_angles import badness, starts_from_rest
 from flipflow.studies.jump_risk import JumpRisk, jump_risk
+from flipflow.transient.chosen_drive import default_drive, fitted_drive
 from flipflow.transient.startup import (
     Outcome,
     Peak,
     RunSummary,
     RunUp,
     coast_down,
-    default_drive,
-    fitted_drive,
 )
 
 NOT_REACHED = "the start does not reach the working speed"
@@ -119,7 +118,7 @@ class Transients:
 
     @property
     def state(self) -> str:
-        """"pass", "attention", "fail" on given values, or "not checked"."""
+        """Pass, attention, fail on given values, or "not checked"."""
         if self.start is None:
             return "not checked"
         states = {one.state for one in self.findings}
@@ -188,9 +187,7 @@ def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float) -> _Runs:
     return _Runs(starts, coast_down(screen, starts[0].final_speed, drive))
 
 
-def _case(
-    name: str, runs: _Runs, jump: JumpRisk | str, nothing: Mapping[str, str]
-) -> CaseRuns:
+def _case(name: str, runs: _Runs, jump: JumpRisk | str, nothing: Mapping[str, str]) -> CaseRuns:
     reasons = dict(nothing)
     if runs.coast_down is None:
         reasons["coast_down"] = NOT_REACHED

@@ -1,8 +1,8 @@
 """Equations of motion at varying shaft speed: masses, stops, and the shaft with its torques.
 
-The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction, speed
-of a converter's field). Shaft angle and field are part of it, so that the equations do not depend
-on time explicitly.
+The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction,
+speed of a converter's field). Shaft angle and field are part of it, so that the equations do not
+depend on time explicitly.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
-from flipflow.model.contact_law import engaged_side
 from flipflow.model.constants import GRAVITY
+from flipflow.model.contact_law import engaged_side
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen

@@ -20,16 +20,15 @@ from flipflow.model.arguments import (
     checked_speed,
 )
 from flipflow.model.constants import GRAVITY, RPM
-from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
+from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.starter import Converter
 from flipflow.model.system import Machine
+from flipflow.transient.chosen_drive import NOT_SETTLED, default_drive, fitted_drive
 from flipflow.transient.history import History
 from flipflow.transient.shaft_equations import SHAFT_STATES
 from flipflow.transient.speed_run import (
-    MOST_TURNS,
     STATUS,
     at_rest,
     hanging_angle,
@@ -37,7 +36,6 @@ from flipflow.transient.speed_run import (
     normal_direction,
     run_history,
     settled_start,
-    steady_power,
     swings,
     turn_means,
     unbalance_weight,
@@ -202,7 +200,6 @@ class RunUp:
 
 
 Real = NDArray[np.float64]
-POWER_FACTOR = 4.0  # assumed rated power over the power that the dampers take at working speed
 START_SECONDS = 60.0  # longest start in s unless told otherwise
 COAST_SECONDS = 600.0  # longest coast-down in s unless told otherwise
 MOST_SECONDS = 3600.0  # longest run in s that may be asked for
@@ -214,7 +211,6 @@ STOPPED = 0.02  # share of its first speed at which a coast-down ends
 NEAR = (0.8, 1.1)  # final speed over the natural frequency by which a start is captured
 PASSING = (0.8, 1.25)  # speeds over w01 between which the time of passing is taken
 FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
-NOT_SETTLED = f"had not settled after {MOST_TURNS} turns from rest"
 UNSETTLED = (
     f"The motion in which the coast-down begins {NOT_SETTLED}: begun a turn later, it would have "
     "other peaks."
@@ -343,57 +339,6 @@ def coast_down(
     return _judged(machine, shaft, omega, history, unsettled)
 
 
-def default_drive(machine: Machine, speed: float | None, method: RungeKutta | None = None) -> Drive:
-    """A plausible drive for a screen whose drive is not known; what it assumes stands in it.
-
-    The rated power is four times what the dampers take at working speed: starting asks for more
-    than running. The rest is as in :func:`flipflow.model.drive.assumed_drive`.
-    """
-    if not isinstance(machine, FlipFlowScreen):
-        raise InputError("drive", None, "give a Drive or a SpeedProfile for this machine")
-    if speed is None:
-        raise InputError("speed", None, "give the working speed, or a drive")
-    steady, settled = steady_power(machine, speed, method)
-    power = POWER_FACTOR * steady
-    drive = assumed_drive(machine.eccentric_moment, speed, power)
-    rated = f"{power / 1e3:.3g} kW" if power >= 100.0 else f"{power:.3g} W"
-    word = f"rated power {rated}, four times what the dampers take at working speed"
-    word += "" if settled else f", in the mean over 20 turns of a motion that {NOT_SETTLED}"
-    drive = replace(
-        drive, assumed=(word, *drive.assumed), assumed_fields=("rated_power", *drive.assumed_fields)
-    )
-    return _settling(drive, speed, steady)
-
-
-def fitted_drive(
-    machine: Machine, drive: Drive, speed: float, method: RungeKutta | None = None
-) -> Drive:
-    """The drive with what is open of it chosen: its shaft settles at ``speed`` in rad/s.
-
-    That is an assumed ratio, or the end of a converter's ramp. A motor that has not the torque
-    for it keeps the ratio with which it has its rated speed there.
-    """
-    starter = drive.starter
-    ramp = isinstance(starter, Converter) and starter.end_speed is None
-    if drive.motor is None or not (drive.open_ratio or ramp):
-        return drive
-    steady, _ = steady_power(machine, speed, method)
-    return _settling(drive, speed, steady)
-
-
-def _settling(drive: Drive, speed: float, power: float) -> Drive:
-    """The drive whose shaft settles at a speed at which the dampers take a power in W."""
-    torque = power / speed + float(drive.friction_torque(speed))
-    starter = drive.starter
-    if isinstance(starter, Converter):
-        slope, _ = drive.converter_slope_and_limit(starter)
-        end = drive.ratio * (speed + torque / slope)
-        given = starter.end_speed or end
-        return replace(drive, starter=replace(starter, end_speed=given), open_ratio=False)
-    ratio = drive.ratio_for(speed, torque)
-    return replace(drive, ratio=ratio or drive.ratio, open_ratio=False)
-
-
 def _shaft(
     machine: Machine,
     drive: Drive | SpeedProfile | None,
@@ -498,7 +443,9 @@ def _outcome(
     if drive.motor is None:
         down = history.omega[-1] <= 1.001 * STOPPED * speed
         return ("stopped" if down else "unfinished"), None
-    if final < AT_REST * speed and (drive.torque_at_rest <= drive.friction or _turned_back(history)):
+    if final < AT_REST * speed and (
+        drive.torque_at_rest <= drive.friction or _turned_back(history)
+    ):
         return "not started", None
     if not _is_steady(history):
         return "unfinished", None
@@ -519,16 +466,14 @@ def _steady_outcome(
     if final >= AT_SPEED * speed:
         return "reached", None
     rated = drive.motor.rated_torque * drive.ratio if drive.motor else 0.0
-    if not frequencies or (float(drive.torque(final)) <= rated and final > 0.5 * _end(drive)):
+    if not frequencies or (
+        float(drive.torque(final)) <= rated and final > 0.5 * (drive.end_speed or 0.0)
+    ):
         return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
         return "captured", NaturalFrequency(name, frequencies[name])
     return "short", None
-
-
-def _end(drive: Drive) -> float:
-    return drive.end_speed or 0.0
 
 
 def _is_steady(history: History) -> bool:
@@ -565,34 +510,40 @@ def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
     for which in ("main", "relative") if screen else history.system.named:
         times, sizes = swings(history.t, history.displacement(which), history.velocity(which))
         if sizes.size:
-            found[f"{which}_amplitude"] = _peak(history, times, sizes)
+            found[f"{which}_amplitude"] = _greatest(history, times, sizes)
     if screen is not None:
         if history.normal is not None:
             reach = np.hypot(history.displacement("main"), history.normal[:, 0])
-            found["main_amplitude"] = _peak(history, history.t, reach)
+            found["main_amplitude"] = _peak(history, reach)
         relative = found.get("relative_amplitude")
         if relative is not None and screen.shear_height is not None:
             strain = relative.value / screen.shear_height
             found["shear_strain"] = replace(relative, value=strain)
-        found["foundation_force"] = _peak(history, history.t, foundation_force(screen, history))
+        found["foundation_force"] = _peak(history, foundation_force(screen, history))
     for j in range(history.force.shape[1]):
         name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"
-        found[name] = _peak(history, history.t, np.abs(history.stop_force(j)))
+        found[name] = _peak(history, np.abs(history.stop_force(j)))
     return found
 
 
-def _peak(history: History, times: Real, values: Real) -> Peak:
-    """The greatest value; between rows, the top of the parabola through it and its neighbours."""
+def _greatest(history: History, times: Real, values: Real) -> Peak:
+    """The greatest of single values."""
     k = int(values.argmax())
+    t = float(times[k])
+    return Peak(float(values[k]), float(np.interp(t, history.t, history.omega)), t)
+
+
+def _peak(history: History, values: Real) -> Peak:
+    """The greatest value; between steps, the top of the parabola through it and its neighbours."""
+    times, k = history.t, int(values.argmax())
     t, value = float(times[k]), float(values[k])
     if 0 < k < times.size - 1 and times[k - 1] < t < times[k + 1]:
         rows = slice(k - 1, k + 2)
         bend, slope, _ = np.polyfit(times[rows] - t, values[rows], 2)
         if bend < 0.0:
             away = float(np.clip(-0.5 * slope / bend, times[k - 1] - t, times[k + 1] - t))
-            t, value = t + away, max(value, value + away * (slope + bend * away))
-    omega = float(np.interp(t, history.t, history.omega))
-    return Peak(value, omega, t)
+            t, value = t + away, max(value, value + away * float(slope + bend * away))
+    return Peak(value, float(np.interp(t, times, history.omega)), t)
 
 
 def foundation_force(screen: FlipFlowScreen, history: History) -> Real:
