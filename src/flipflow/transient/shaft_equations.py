@@ -1,7 +1,7 @@
 """Equations of motion at varying shaft speed: masses, stops, and the shaft with its torques.
 
-The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction,
-speed of a converter's field). Shaft angle and field are part of it, so that the equations do not
+The state is s = (x, x', phi, phi', speed of a converter's field, work put in, work dissipated, work
+of the shaft's friction). Shaft angle and field are part of it, so that the equations do not
 depend on time explicitly.
 """
 
@@ -25,7 +25,7 @@ from flipflow.dynamics.law import (
 from flipflow.model.contact_law import NO_EXIT, OPEN
 
 UNBALANCE = 2  # power of omega with which its force grows
-SHAFT_STATES = 6  # phi, phi', work put in, work dissipated, work of friction, speed of the field
+SHAFT_STATES = 6  # phi, phi', speed of the field, work put in, work dissipated, work of friction
 MAINS, CONVERTER = 0, 1  # what a motor is fed by
 
 
@@ -135,7 +135,7 @@ def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> Non
         eq.answer[i] = b
         against += eq.lever[i] * a
         reach += eq.lever[i] * b
-    torque = motor_torque(eq.shaft, speed, point[2 * n + 5])
+    torque = motor_torque(eq.shaft, speed, point[2 * n + 2])
     friction = friction_torque(eq.shaft, speed)
     alpha = eq.shaft.acceleration[0]
     if eq.shaft.free == 1:
@@ -149,10 +149,10 @@ def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> Non
             work += (eq.pull[i] + eq.lever[i] * alpha) * point[n + i]
     rows[row, 2 * n] = speed
     rows[row, 2 * n + 1] = alpha
-    rows[row, 2 * n + 2] = work
-    rows[row, 2 * n + 3] = dissipated
-    rows[row, 2 * n + 4] = friction * speed
-    rows[row, 2 * n + 5] = eq.shaft.field_rate[0]
+    rows[row, 2 * n + 2] = eq.shaft.field_rate[0]
+    rows[row, 2 * n + 3] = work
+    rows[row, 2 * n + 4] = dissipated
+    rows[row, 2 * n + 5] = friction * speed
 
 
 @kernel(inline=True)
@@ -273,4 +273,4 @@ def switch(eq: Equations, regime: Int, point: Real, j: int, which: int) -> None:
     if regime[j] != OPEN:
         y, _ = gap_motion(eq, point, j)
         held = stored_energy(eq.stops, j, before, y)
-        point[2 * n + 3] += held - stored_energy(eq.stops, j, regime[j], y)
+        point[2 * n + 4] += held - stored_energy(eq.stops, j, regime[j], y)

@@ -227,7 +227,7 @@ def _history(
     across = [s[:, n], s[:, size + n], slope[:, size + n]] if size > n else None
     columns = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
     stored = [stepper.stored_energy(s[k], contacts[k]) for k in (0, -1)]
-    worked, damped, rubbed, field = s[:, 2 * size + 2 :].T
+    field, worked, damped, rubbed = s[:, 2 * size + 2 :].T
     return History(
         system, t, x, v, slope[:, size : size + n], stop_forces(system, x, v, contacts),
         speed, s[:, 2 * size],

@@ -106,9 +106,8 @@ class RunUp:
     peaks
         ``"main_amplitude"`` (m; the greatest distance from rest in any direction, or along the
         surface half the way from one turning point to the next, where that direction alone is
-        known), ``"relative_amplitude"`` (m; half the way from one turning point to the next),
-        ``"shear_strain"``, ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the
-        machine has them.
+        known), ``"relative_amplitude"`` (m; half that way), ``"shear_strain"``,
+        ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has them.
     power
         Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
         the speed is given or changes.
@@ -177,8 +176,7 @@ class RunUp:
 
     def _reached(self, wanted: str) -> str:
         """When it has its speed; 95 % of it, where it never has the whole."""
-        time = self.time_to_speed
-        if time is not None:
+        if (time := self.time_to_speed) is not None:
             return f"{wanted} in {time:.3g} s"
         time = self._time_at(AT_SPEED * self.speed) or 0.0
         return f"{100.0 * AT_SPEED:.0f} % of {wanted} in {time:.3g} s"
@@ -229,8 +227,7 @@ def start_up(
 ) -> RunUp:
     r"""Start a machine from rest.
 
-    With the shaft's angle phi from the direction up the slope, inertia J, motor torque T, friction
-    T_f and the deck's incline alpha,
+    With shaft angle phi, inertia J, motor torque T, friction T_f and deck angle alpha,
 
     .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
               - \ddot y_1 \cos\varphi) - m_0 r g \cos(\varphi + \alpha) .
@@ -385,8 +382,8 @@ def _fastest(drive: Drive | SpeedProfile, speed: float) -> float:
 def _steady(done: list[Stretch]) -> bool:
     """Whether the shaft stands, or has the same mean speed over the last turns and those before."""
     recent = done[-RECENT:]
-    if len(recent) == RECENT and _stands(recent[-1].states[:, 1 - SHAFT_STATES]):
-        return True
+    if len(recent) == RECENT and np.abs(recent[-1].states[:, 1 - SHAFT_STATES]).max() < CREEP:
+        return True  # held by friction, which fades with the speed
     t = np.concatenate([one.t for one in recent])
     angle = np.concatenate([one.states[:, -SHAFT_STATES] for one in recent])
     marks = angle[-1] - 2.0 * np.pi * LAST_TURNS * np.array([0.0, 1.0, 2.0])
@@ -395,11 +392,6 @@ def _steady(done: list[Stretch]) -> bool:
     times = np.interp(marks, angle, t)
     spans = times[:-1] - times[1:]
     return bool(abs(spans[0] / spans[1] - 1.0) < STEADY)
-
-
-def _stands(speeds: Real) -> bool:
-    """Whether a shaft only creeps, held by friction that fades with its speed."""
-    return bool(np.abs(speeds).max() < CREEP)
 
 
 def _judged(
@@ -453,10 +445,10 @@ def _outcome(
 
 
 def _turned_back(history: History) -> bool:
-    """Whether the shaft has stood still or swung back within its first turn, and got no farther."""
-    moved = history.t > history.t[0]
+    """Whether the shaft turned, and stood or swung back within its first turn."""
     within = float(history.angle.max() - history.angle[0]) < 2.0 * np.pi
-    return within and bool((history.omega[moved] <= CREEP).any())
+    after = np.maximum.accumulate(history.omega) > CREEP
+    return within and bool((history.omega[after] <= CREEP).any())
 
 
 def _steady_outcome(
