@@ -53,10 +53,13 @@ _HOME = {
     "Lump": "flipflow.model.disturbance",
     "InputError": "flipflow.errors",
     "Load": "flipflow.model.screen",
-    "Motor": "flipflow.model.drive",
+    "Motor": "flipflow.model.motor",
     "Drive": "flipflow.model.drive",
     "SpeedProfile": "flipflow.model.drive",
+    "StarDelta": "flipflow.model.starter",
+    "Converter": "flipflow.model.starter",
     "Limits": "flipflow.model.limits",
+    "PassingLimits": "flipflow.model.limits",
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
@@ -82,16 +85,19 @@ if TYPE_CHECKING:
     from flipflow.model.disturbance import LoadStep as LoadStep
     from flipflow.model.disturbance import Lump as Lump
     from flipflow.model.drive import Drive as Drive
-    from flipflow.model.drive import Motor as Motor
     from flipflow.model.drive import SpeedProfile as SpeedProfile
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.excitation import HarmonicForce as HarmonicForce
     from flipflow.model.excitation import MovingBase as MovingBase
     from flipflow.model.excitation import Unbalance as Unbalance
     from flipflow.model.limits import Limits as Limits
+    from flipflow.model.limits import PassingLimits as PassingLimits
+    from flipflow.model.motor import Motor as Motor
     from flipflow.model.project import Project as Project
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load
+    from flipflow.model.starter import Converter as Converter
+    from flipflow.model.starter import StarDelta as StarDelta
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
     from flipflow.model.vary import Choice as Choice
     from flipflow.model.vary import Normal as Normal

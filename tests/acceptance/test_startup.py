@@ -36,7 +36,8 @@ def test_a_plausible_motor_passes_the_resonance_and_reaches_speed(start):
     assert start.outcome == "reached"
     assert start.first_frequency == pytest.approx(W01, abs=1e-6)
     assert 0.0 < start.passing < start.time_to_speed < 2.0
-    assert WORKING <= start.final_speed < start.drive.synchronous_speed
+    assert start.final_speed == pytest.approx(WORKING, rel=1e-3)
+    assert start.final_speed < start.drive.synchronous_speed
     assert "reaches 850 rpm" in start.verdict
 
 
@@ -49,8 +50,16 @@ def test_peaks_on_the_way_exceed_those_of_running(start):
     assert start.peaks["main_amplitude"].value > 3.0 * running
 
 
+def by_kloss(screen, power):
+    """The drive, its motor by Kloss' formula from standstill on."""
+    drive = drive_of(screen, power)
+    motor = replace(drive.motor, starting_ratio=None, pull_up_ratio=None)
+    return replace(drive, motor=motor)
+
+
 def test_a_weaker_motor_is_captured(screen):
-    run = ff.start_up(screen, drive_of(screen, 1500.0), speed=WORKING)
+    weightless = screen.replace(deck_angle=None)
+    run = ff.start_up(weightless, by_kloss(screen, 1500.0), speed=WORKING)
     assert run.outcome == "captured"
     name, omega = run.near
     assert name == "w01"
@@ -114,15 +123,18 @@ def test_coast_down_begins_with_the_settled_motion(screen):
 def test_gravity_is_left_out_and_said(screen):
     """m0r g = 40.9 N m; with J = 0.9 kg m^2 the shaft swings below 2 sqrt(40.9 / 0.9) = 13.5."""
     drive = replace(drive_of(screen, 5500.0), inertia=0.9)
+    weighed, screen = screen, screen.replace(deck_angle=None)
+    assert not any("Gravity" in note for note in ff.start_up(weighed, drive).notes)
     up = ff.start_up(screen, drive, speed=WORKING)
     down = ff.coast_down(screen, WORKING, drive)
     weak = ff.start_up(screen, drive_of(screen, 500.0), speed=WORKING)
     given = ff.start_up(screen, ff.SpeedProfile((0.0, 1.0), (0.0, 20.0)))
     said = [" ".join(run.notes) for run in (up, down, weak, given)]
-    assert all("Gravity on the unbalance, up to 40.9 N m" in notes for notes in said[:3])
+    assert all("Weight not considered" in notes for notes in said[:3])
+    assert all("gravity on the unbalance, up to 40.9 N m" in notes for notes in said[:3])
     assert "below about 129 rpm, the shaft would swing" in said[1]
     assert "may not lift the unbalance" in said[2]
-    assert "Gravity" not in said[3]
+    assert "Weight" not in said[3]
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +190,7 @@ def test_any_machine_starts(screen):
     """A plain system has no normal direction; the screen without its data says so."""
     drive = drive_of(screen, 5500.0)
     plain = ff.start_up(screen.system(), drive)
-    bare = ff.start_up(screen.replace(normal_stiffness=None), drive)
+    bare = ff.start_up(screen.replace(normal_stiffness=None, deck_angle=None), drive)
     assert plain.outcome == bare.outcome == "reached"
     assert plain.history.normal is None
     assert plain.history.x == pytest.approx(bare.history.x)
@@ -282,9 +294,9 @@ def test_command_line(monkeypatch, capsys, tmp_path):
 
 
 def test_command_line_motor_too_weak_is_an_answer(monkeypatch, capsys):
-    code, out, _ = run(monkeypatch, capsys, "ffs0827", "--motor-power", "1.5 kW")
+    code, out, _ = run(monkeypatch, capsys, "ffs0827", "--motor-power", "1 kW")
     assert code == 0
-    assert "captured at 21" in out
+    assert "FFS0827: does not start" in out
     assert "Switched off" not in out
 
 
@@ -333,17 +345,17 @@ def test_interrupt_ends_with_130(monkeypatch, capsys):
 
 
 def test_drive_section(monkeypatch, capsys, tmp_path):
-    section = '[drive]\nrated_power = "1.5 kW"\ninertia = "0.9 kg m^2"\n\n[limits]'
+    section = '[drive]\nrated_power = "1 kW"\ninertia = "0.9 kg m^2"\n\n[limits]'
     path = machine_file(tmp_path, ("[limits]", section))
     project = ff.load_project(path)
     assert project.drive.inertia == 0.9
-    assert project.drive.motor.power == pytest.approx(1500.0)
+    assert project.drive.motor.power == pytest.approx(1000.0)
     assert project.drive.rated_speed == pytest.approx(WORKING)
     assert "drive: breakdown slip 0.2" in project.assumed
     assert not any("inertia" in text for text in project.assumed)
     code, out, _ = run(monkeypatch, capsys, path)
     assert code == 0
-    assert "captured" in out
+    assert "does not start" in out
     code, out, _ = run(monkeypatch, capsys, path, "--motor-power", "5.5 kW")
     assert "reaches 850 rpm" in out
     assert ff.load_project("ffs0827").drive is None

@@ -17,13 +17,13 @@ import flipflow as ff
 from flipflow.errors import InputError
 from flipflow.io.check import check_project
 from flipflow.io.derived import derive
-from flipflow.io.layout import SECTIONS
+from flipflow.io.layout import SECTIONS, sections_within
 from flipflow.io.results import document_of
 from flipflow.io.schema import machine_schema
 from flipflow.io.source import bundled_names
 from flipflow.io.template import template
 from flipflow.model.fields import FIELDS
-from flipflow.model.limits import LIMIT_FIELDS
+from flipflow.model.limits import LIMIT_FIELDS, PASSAGES, PASSING_FIELDS
 
 SMALL = """
 [frames]
@@ -256,9 +256,12 @@ def test_any_text_loads_or_is_refused_in_a_sentence(project_of, text, head):
     ),
 )
 def test_any_value_loads_or_is_refused_in_a_sentence(project_of, label, value):
-    section, key = label.split(".")
+    section, _, key = label.rpartition(".")
     tables = tomllib.loads(SMALL)
-    tables.setdefault(section, {})[key] = value
+    place = tables
+    for part in section.split("."):
+        place = place.setdefault(part, {})
+    place[key] = value
     refusal = _refusal(project_of, _toml(tables))
     assert refusal is None or (refusal.field and refusal.remedy)
 
@@ -287,9 +290,11 @@ def test_template_and_schema_know_every_key():
     schema = machine_schema()
     text = template()
     for section, entries in SECTIONS.items():
-        table = schema["properties"][section]
+        table = schema
+        for part in section.split("."):
+            table = table["properties"][part]
         keys = table.get("items", table).get("properties", {})
-        assert set(keys) == {entry.key for entry in entries}
+        assert set(keys) == {*(entry.key for entry in entries), *sections_within(section)}
         assert all(re.search(rf"\b{entry.key}\b", text) for entry in entries)
     assert json.loads(json.dumps(schema)) == schema
     assert schema["properties"]["frames"]["allOf"][0] == {"anyOf": [{"required": ["main_mass"]}]}
@@ -297,7 +302,9 @@ def test_template_and_schema_know_every_key():
 
 def test_limits_table_and_class_agree():
     names = [field.name for field in dataclasses.fields(ff.Limits)]
-    assert names == [limit.name for limit in LIMIT_FIELDS]
+    assert names == [*(limit.name for limit in LIMIT_FIELDS), *PASSAGES]
+    passing = {field.name for field in dataclasses.fields(ff.PassingLimits)}
+    assert all(passing == {limit.name for limit in PASSING_FIELDS[one]} for one in PASSAGES)
     with pytest.raises(InputError, match="lesser end first"):
         ff.Limits(speed=(100.0, 60.0))
     with pytest.raises(InputError, match="stop_force"):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+
 from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
 
 if TYPE_CHECKING:
@@ -23,7 +25,10 @@ def analyze(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Analyze a machine: verdict, allowed speed range, report."""
+    """Analyze a machine: verdict, allowed speed range, report.
+
+    Ends with code 5 where the machine does not start, or its drive does not fit, as given.
+    """
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
@@ -40,6 +45,10 @@ def analyze(
 
         assessment = with_progress(lambda monitor: assess(project, monitor, **options))
         _write(assessment, target)
+    if assessment.start_fails:
+        from flipflow.cli.output import DOES_NOT_START  # noqa: PLC0415
+
+        raise typer.Exit(DOES_NOT_START)
 
 
 def _write(assessment: Assessment, target: Destination) -> None:

@@ -61,7 +61,7 @@ def simulate(
 
             target.document(document_of(history))
         if target.spoken:
-            _show(project, history, console())
+            _show(project, history, blows, console())
         target.tell()
 
 
@@ -76,7 +76,16 @@ def _blows(written: Sequence[str], end: float) -> tuple[Impulse, ...]:
     return blows
 
 
-def _show(project: Project, history: History, out: Console) -> None:
+def _spans(history: History, blows: Sequence[Impulse]) -> dict[str, slice]:
+    """The rows of the start from rest, and those from the first blow on."""
+    blow = min((one.t for one in blows), default=math.inf)
+    first = int(history.t.searchsorted(blow))
+    if first >= history.t.size:
+        return {"start": slice(None)}
+    return {"start": slice(0, max(first, 1)), "blow": slice(first, None)}
+
+
+def _show(project: Project, history: History, blows: Sequence[Impulse], out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
     omega = float(history.omega[-1])
@@ -88,14 +97,18 @@ def _show(project: Project, history: History, out: Console) -> None:
     else:
         word = "Settled" if history.settled else "Not settled yet"
         out.print(f"{word}: {history.distance * 1e3:.2g} mm from the periodic motion ahead.")
-    out.print(f"{'':<24}{'last turn':>14}{'greatest':>14}")
+    spans = _spans(history, blows)
+    heads = "".join(f"{f'{name}, greatest':>20}" for name in spans)
+    out.print(f"{'':<18}{'last turn':>14}{heads}")
     for which in history.system.named:
         x = history.displacement(which) * 1e3
         half = (x[last].max() - x[last].min()) / 2.0
-        out.print(f"  {which!s:<22}{half:>11.3f} mm{abs(x).max():>11.3f} mm")
+        most = "".join(f"{abs(x[rows]).max():>17.3f} mm" for rows in spans.values())
+        out.print(f"  {which!s:<16}{half:>11.3f} mm{most}")
     if history.force.shape[1]:
         force = abs(history.stop_force()) / 1e3
-        out.print(f"  {'stop force':<22}{force[last].max():>11.3f} kN{force.max():>11.3f} kN")
+        most = "".join(f"{force[rows].max():>17.3f} kN" for rows in spans.values())
+        out.print(f"  {'stop force':<16}{force[last].max():>11.3f} kN{most}")
     e = history.energy
     names = ("input", "impulses", "loads", "dissipated", "stored")
     say(out, "Energy: " + ", ".join(f"{n} {e[n] / 1e3:.4g} kJ" for n in names if e[n]))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
-from flipflow.cli.output import console, print_list, printable
+from flipflow.cli.output import DOES_NOT_START, console, print_list, printable
 from flipflow.cli.progress import progress
 from flipflow.model.numerals import digits
 
@@ -26,6 +26,7 @@ LONGEST = 3600.0  # s
 WORDS = {
     "main_amplitude": ("main frame, amplitude", 1e3, "mm"),
     "relative_amplitude": ("relative, amplitude", 1e3, "mm"),
+    "shear_strain": ("shear strain", 1e2, "%"),
     "foundation_force": ("force on the foundation", 1e-3, "kN"),
     "stop_force": ("force on the stops of a side", 1e-3, "kN"),
 }
@@ -58,7 +59,9 @@ def startup(
 ) -> None:
     """Start a machine, let it coast down: reached or captured.
 
-    Shows the greatest amplitudes and forces on the way, and the speeds at which they occur.
+    Shows the greatest amplitudes and forces on the way, and the speeds at which they occur. The
+    start is the worst one from hanging and from every angle at which friction holds the shaft. Ends
+    with code 5 where it fails on a drive of which nothing is assumed.
     """
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
@@ -80,10 +83,22 @@ def startup(
             from flipflow.io.command_results import Startup  # noqa: PLC0415
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            target.document(document_of(Startup(project.name, start, coast)))
+            name = project.document.name or project.name
+            target.document(document_of(Startup(name, start, coast)))
         if target.spoken:
             _show(project, start, coast, console())
         target.tell()
+    if _fails_as_given(start):
+        raise typer.Exit(DOES_NOT_START)
+
+
+def _fails_as_given(start: RunUp) -> bool:
+    """Whether a start fails that rests on no assumed value."""
+    from flipflow.model.drive import Drive  # noqa: PLC0415  keeps --help quick
+    from flipflow.studies.start_and_blows import FAILED  # noqa: PLC0415
+
+    drive = start.drive
+    return isinstance(drive, Drive) and not drive.assumed_fields and start.outcome in FAILED
 
 
 def _refuse_beside_profile(given: dict[str, str | None]) -> None:
@@ -139,7 +154,9 @@ def _drive(
     if "rated_power" in given:
         motor = replace(drive.motor, rated_power=given["rated_power"], breakdown_torque=None)
         drive = replace(drive, motor=motor)
-    return replace(drive, inertia=given.get("inertia", drive.inertia))
+    names = tuple(name for name in drive.assumed_fields if name not in given)
+    inertia_now = given.get("inertia", drive.inertia)
+    return replace(drive, inertia=inertia_now, assumed_fields=names)
 
 
 def _calculated(
@@ -147,22 +164,36 @@ def _calculated(
 ) -> tuple[RunUp, RunUp | None]:
     """Start, and coast down where working speed is reached, with progress on stderr."""
     from flipflow.model.drive import Drive  # noqa: PLC0415
-    from flipflow.transient.startup import coast_down, start_up  # noqa: PLC0415  keeps --help quick
+    from flipflow.transient.startup import coast_down  # noqa: PLC0415  keeps --help quick
 
     with progress("start; the first run of a version compiles") as tell:
 
         def during(stage: str) -> Monitor:
             return lambda sentence, share: tell(f"{stage}, {sentence}", share)
 
-        start = start_up(
-            project.screen, drive, speed=project.speed, duration=seconds, monitor=during("start")
-        )
+        start = _start(project, drive, seconds, during("start"))
         if start.outcome != "reached" or not isinstance(start.drive, Drive):
             return start, None
         begin = start.final_speed
         return start, coast_down(
             project.screen, begin, start.drive, duration=seconds, monitor=during("coast-down")
         )
+
+
+def _start(
+    project: Project, drive: Drive | SpeedProfile | None, seconds: float | None, monitor: Monitor
+) -> RunUp:
+    """The worst start from rest; the one start of a given speed over time."""
+    from flipflow.model.drive import SpeedProfile  # noqa: PLC0415  keeps --help quick
+    from flipflow.studies.held_angles import starts_from_rest  # noqa: PLC0415
+    from flipflow.transient.chosen_drive import default_drive, fitted_drive  # noqa: PLC0415
+    from flipflow.transient.startup import start_up  # noqa: PLC0415
+
+    screen, speed = project.screen, project.speed
+    if speed is None or isinstance(drive, SpeedProfile):
+        return start_up(screen, drive, speed=speed, duration=seconds, monitor=monitor)
+    fitted = default_drive(screen, speed) if drive is None else fitted_drive(screen, drive, speed)
+    return starts_from_rest(screen, fitted, speed, seconds, monitor)[0]
 
 
 def _figures(runs: dict[str, RunUp], target: Destination) -> None:
@@ -200,3 +231,5 @@ def _run(run: RunUp, title: str, out: Console) -> None:
     first = f"w01 = {run.first_frequency * RPM:.0f} rpm"
     passed = f"passed in {run.passing:.2g} s" if run.passing is not None else "not passed"
     out.print(f"First natural frequency {first}: {passed}")
+    if run.history.normal is None:
+        out.print("Along the surface only: the force on the foundation is larger.")

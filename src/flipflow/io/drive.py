@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
-from flipflow.errors import InputError
-from flipflow.io.layout import SPEED, entry_of
-from flipflow.io.units import parse_quantity
-from flipflow.io.values import LEFT_OUT, Notes, Table, read_number
-from flipflow.model.drive import DRIVE_FIELDS, Drive, SpeedProfile, assumed_drive
-from flipflow.model.screen import FlipFlowScreen
+import numpy as np
 
+from flipflow.errors import InputError
+from flipflow.io.layout import SPEED, START, TORQUE_TABLE, entry_of
+from flipflow.io.units import parse_quantity
+from flipflow.io.values import (
+    LEFT_OUT,
+    Notes,
+    Table,
+    read_choice,
+    read_number,
+    read_torques,
+)
+from flipflow.model.drive import (
+    DRIVE_FIELDS,
+    SYNCHRONOUS_SPEED,
+    Drive,
+    SpeedProfile,
+    assumed_drive,
+)
+from flipflow.model.motor import checked_torque_table
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.torque_curve import rated_point
+
+# Fields that say nothing with a torque table, and those of one way of starting.
+OF_RATIOS = ("breakdown_ratio", "breakdown_slip", "starting_ratio", "pull_up_ratio")
+OF_STARTS = {
+    "switch_over_speed": "star-delta", "switch_over_time": "star-delta",
+    "ramp": "converter", "ramp_time": "converter", "torque_limit": "converter",
+}  # fmt: skip
 EXAMPLE = "0 s: 0 rpm, 20 s: 850 rpm"
 
 
@@ -20,7 +43,7 @@ def read_drive(
     Raises
     ------
     InputError
-        Without the rated power or the working speed.
+        Without the rated power or the working speed, and for values that contradict each other.
     """
     if table is None:
         return None
@@ -37,9 +60,62 @@ def read_drive(
         remedy = "give the working speed, for example '850 rpm', or leave out [drive]"
         raise InputError(SPEED.key, LEFT_OUT, remedy)
     power = values.pop("rated_power")
-    drive = assumed_drive(screen.eccentric_moment, speed, power, values)
+    start = "direct"
+    if START.key in table:
+        start = read_choice(table, START, notes, default="direct")
+    _check_start(table, values, start)
+    rows = _torque_table(table, power, values, notes)
+    drive = assumed_drive(
+        screen.eccentric_moment, speed, power, values, torque_table=rows, start=start
+    )
     notes.assumed.extend(f"drive: {text}" for text in drive.assumed)
     return drive
+
+
+def _check_start(table: Table, values: dict[str, float], start: str) -> None:
+    """Refuse what belongs to another way of starting, or is said twice."""
+    fields = {field.name: field for field in DRIVE_FIELDS}
+    for name, way in OF_STARTS.items():
+        if name in values and start != way:
+            key = entry_of(fields[name]).key
+            raise InputError(
+                fields[name].key,
+                table[key],
+                f'write drive.start = "{way}" with it, or leave it out',
+            )
+    for one, other in (("switch_over_speed", "switch_over_time"), ("ramp", "ramp_time")):
+        if one in values and other in values:
+            key = entry_of(fields[one]).key
+            raise InputError(fields[one].key, table[key], f"give it or drive.{other}, not both")
+    if start == "converter" and "ramp_time" in values:
+        synchronous = values.get("synchronous_speed", SYNCHRONOUS_SPEED)
+        values["ramp"] = synchronous / values.pop("ramp_time")
+
+
+def _torque_table(
+    table: Table, power: float, values: dict[str, float], notes: Notes
+) -> tuple[tuple[float, float], ...]:
+    """The table of torque over speed with torques over the rated one; empty where there is none."""
+    if TORQUE_TABLE.key not in table:
+        return ()
+    written = notes.written[TORQUE_TABLE.label] = table[TORQUE_TABLE.key]
+    for field in DRIVE_FIELDS:
+        if field.name in OF_RATIOS and field.name in values:
+            key = entry_of(field).key
+            raise InputError(
+                field.key, table[key], "the torque table says it, leave one of them out"
+            )
+    read, in_torque = read_torques(written, TORQUE_TABLE.label)
+    rows = checked_torque_table(TORQUE_TABLE.label, read)
+    synchronous = values.get("synchronous_speed", SYNCHRONOUS_SPEED)
+    last = () if rows[-1][0] >= synchronous else ((synchronous, 0.0),)
+    point = rated_point(np.array([*rows, *last]), power if in_torque else None)
+    if point is None:
+        raise InputError(
+            TORQUE_TABLE.label, written, "let it fall through the rated torque before its end"
+        )
+    rated = point[1] if in_torque else 1.0
+    return tuple((speed, torque / rated) for speed, torque in rows)
 
 
 def parse_profile(written: str, field: str) -> SpeedProfile:

@@ -15,14 +15,14 @@ from flipflow.errors import InputError
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.drive import DRIVE_FIELDS
 from flipflow.model.fields import FIELD, FIELDS, Field
-from flipflow.model.limits import LIMIT_FIELDS
+from flipflow.model.limits import LIMIT_FIELDS, PASSING_FIELDS
 from flipflow.model.quantities import needing
 from flipflow.model.screen import Measured, Rotation, TemperatureOf
 
 FORMAT = 1
 
 Kind = Literal[
-    "quantity", "each", "interval", "choice", "text", "temperatures", "material", "split"
+    "quantity", "each", "interval", "choice", "text", "temperatures", "torques", "material", "split"
 ]
 
 
@@ -70,6 +70,8 @@ SECTION_SENTENCES: Mapping[str, str] = {
     "operation": "How the machine is run.",
     "drive": "Motor and shaft, for starts; leave the section out and a drive is assumed.",
     "limits": "What the machine may do; a limit left out is not checked.",
+    "limits.start": "What it may do while it starts; left out, the running limit is compared.",
+    "limits.stop": "What it may do while it comes to a stop, the motor switched off.",
     "load_cases": "Loads and weather the machine must bear; the empty machine should be one.",
     "sources": 'Where values come from: "section.key" = "drawing 4711, sheet 2".',
 }
@@ -140,7 +142,7 @@ def unchecked_without(field: Field) -> str:
 
 def entry_of(field: Field) -> Entry:
     """Return the entry that holds ``field`` in a machine file."""
-    section, key = field.key.split(".")
+    section, _, key = field.key.rpartition(".")
     kind: Kind = "interval" if isinstance(field.example, tuple) else "quantity"
     example = list(field.example) if isinstance(field.example, tuple) else field.example
     return Entry(section, key, kind, field.sentence, example, field)
@@ -208,6 +210,18 @@ def _load_entries() -> Iterable[Entry]:
     )  # fmt: skip
 
 
+START = Entry(
+    "drive", "start", "choice", "How the motor is put on the mains.", "direct",
+    choices=("direct", "star-delta", "converter"),
+)  # fmt: skip
+TORQUE_TABLE = Entry(
+    "drive", "torque_table", "torques",
+    "Speed of the motor and its torque, as a share of the rated torque or in N m, from standstill "
+    "on; instead of torque ratios and slip.",
+    [["0 rpm", 2.0], ["300 rpm", 1.7], ["1200 rpm", 2.6], ["1440 rpm", 1.0]],
+)  # fmt: skip
+
+
 def _by_section() -> Mapping[str, tuple[Entry, ...]]:
     document = (Entry("document", key, "text", text, show) for key, text, show in _DOCUMENT)
     entries = (
@@ -215,7 +229,10 @@ def _by_section() -> Mapping[str, tuple[Entry, ...]]:
         *_machine_entries(),
         entry_of(SPEED),
         *map(entry_of, DRIVE_FIELDS),
+        TORQUE_TABLE,
+        START,
         *map(entry_of, LIMIT_FIELDS),
+        *(entry_of(field) for fields in PASSING_FIELDS.values() for field in fields),
         *_load_entries(),
     )
     return {
@@ -225,6 +242,11 @@ def _by_section() -> Mapping[str, tuple[Entry, ...]]:
 
 
 SECTIONS: Mapping[str, tuple[Entry, ...]] = _by_section()
+
+
+def sections_within(section: str) -> tuple[str, ...]:
+    """Keys under which other sections stand within one, as "start" within "limits"."""
+    return tuple(name[len(section) + 1 :] for name in SECTIONS if name.startswith(f"{section}."))
 
 
 def refuse_unknown(table: Mapping[str, object], known: Iterable[str], *, place: str) -> None:

@@ -11,7 +11,7 @@ from flipflow.io.layout import LOAD_FIELDS, SPEED
 from flipflow.io.units import in_unit, shown
 from flipflow.model.drive import DRIVE_FIELDS, Drive
 from flipflow.model.fields import FIELDS, Field
-from flipflow.model.limits import LIMIT_FIELDS, Limits
+from flipflow.model.limits import LIMIT_FIELDS, PASSING_FIELDS, Limits
 from flipflow.model.screen import FlipFlowScreen, Load
 
 _HERTZ = 2.0 * math.pi
@@ -19,6 +19,7 @@ NATURAL_FREQUENCIES = (0.2 * _HERTZ, 60.0 * _HERTZ)
 STATIC_AMPLITUDES = (0.1e-3, 30e-3)
 # Below the lesser, a damper is so weak that kN s/m was likely read as N s/m; zero is a choice.
 DAMPING_RATIOS = (5e-4, 1.5)
+OWN = {"switch_over_speed": "speed", "switch_over_time": "time"}  # names that a part has for them
 _FORCE = "or let it through with --force (force=True)"
 
 
@@ -56,6 +57,9 @@ def _values(
         value = getattr(limits, limit.name)
         for end in value if isinstance(value, tuple) else (value,):
             yield from _question(limit, end, written)
+    for passage, fields in PASSING_FIELDS.items():
+        for limit in fields:
+            yield from _question(limit, getattr(getattr(limits, passage), limit.name), written)
     for case in cases:
         for field in LOAD_FIELDS:
             yield from _question(field, getattr(case, field.name), {}, of=f" of {case.name!r}")
@@ -70,10 +74,14 @@ def _values(
 def _drive_values(drive: Drive | None, written: Mapping[str, object]) -> Iterator[InputError]:
     if drive is None:
         return
+    parts = (drive, drive.motor, drive.starter)
     for field in DRIVE_FIELDS:
-        if field.key in written:
-            owner = drive if hasattr(drive, field.name) else drive.motor
-            yield from _question(field, getattr(owner, field.name), written)
+        owner = next(
+            (part for part in parts if hasattr(part, OWN.get(field.name, field.name))), None
+        )
+        if field.key in written and owner is not None:
+            value = getattr(owner, OWN.get(field.name, field.name))
+            yield from _question(field, value, written)
 
 
 def _question(

@@ -5,17 +5,25 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from flipflow.errors import InputError
 from flipflow.io.drive import read_drive
-from flipflow.io.layout import FORMAT, SECTIONS, SPEED, refuse_unknown
+from flipflow.io.layout import FORMAT, SECTIONS, SPEED, refuse_unknown, sections_within
 from flipflow.io.load_cases import read_load_cases
 from flipflow.io.machine import Tables, read_screen
 from flipflow.io.plausibility import implausible
 from flipflow.io.source import read_source
 from flipflow.io.values import Notes, Table, read_interval, read_number, read_text
 from flipflow.model.arguments import checked_flag
-from flipflow.model.limits import LIMIT_FIELDS, Limits
+from flipflow.model.limits import (
+    LIMIT_FIELDS,
+    PASSAGES,
+    PASSING_FIELDS,
+    LimitField,
+    Limits,
+    PassingLimits,
+)
 from flipflow.model.project import Document, Project
 from flipflow.model.screen import FlipFlowScreen
 
@@ -73,7 +81,7 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
     speed = _speed(tables.get("operation", {}), notes)
     project = Project(
         screen=screen,
-        limits=_limits(tables.get("limits", {}), notes),
+        limits=_limits(tables, notes),
         load_cases=read_load_cases(cases, screen, notes),
         speed=speed,
         drive=read_drive(tables.get("drive"), screen, speed, notes),
@@ -100,16 +108,18 @@ def _plausible(project: Project, *, force: bool) -> Project:
 
 def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
     """Check that every section is there in the right shape and holds only known keys."""
-    refuse_unknown(tables, ["format", *SECTIONS], place="")
+    refuse_unknown(tables, ["format", *(name for name in SECTIONS if "." not in name)], place="")
     sections: Tables = {}
     for name, entries in SECTIONS.items():
-        table = tables.get(name)
+        within, _, last = name.rpartition(".")
+        table = (sections.get(within, {}) if within else tables).get(last)
         if table is None or name == "load_cases":
             continue
         if not isinstance(table, dict):
             raise InputError(name, table, f"write it as a section, [{name}] on a line of its own")
         if name != "sources":
-            refuse_unknown(table, [entry.key for entry in entries], place=f"{name}.")
+            known = [*(entry.key for entry in entries), *sections_within(name)]
+            refuse_unknown(table, known, place=f"{name}.")
         sections[name] = table
     cases = tables.get("load_cases", [])
     if not isinstance(cases, list) or not all(isinstance(case, dict) for case in cases):
@@ -128,14 +138,24 @@ def _check_format(tables: Mapping[str, object], notes: Notes) -> None:
         raise InputError("format", written, f"this version of flipflow reads format = {FORMAT}")
 
 
-def _limits(table: Table, notes: Notes) -> Limits:
+def _limits(tables: Tables, notes: Notes) -> Limits:
+    passing: dict[str, Any] = {
+        passage: PassingLimits(
+            **_limit_values(tables.get(f"limits.{passage}", {}), PASSING_FIELDS[passage], notes)
+        )
+        for passage in PASSAGES
+    }
+    return Limits(**_limit_values(tables.get("limits", {}), LIMIT_FIELDS, notes), **passing)
+
+
+def _limit_values(table: Table, fields: tuple[LimitField, ...], notes: Notes) -> dict[str, Any]:
     values = {}
-    for limit in LIMIT_FIELDS:
+    for limit in fields:
         if limit.name in table:
             written = notes.written[limit.key] = table[limit.name]
             read = read_interval if limit.interval else read_number
             values[limit.name] = read(written, limit)
-    return Limits(**values)  # type: ignore[arg-type]
+    return values
 
 
 def _speed(table: Table, notes: Notes) -> float | None:

@@ -6,6 +6,7 @@ They are not needed to open it again.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from functools import singledispatch
 from typing import Any
 
@@ -17,9 +18,10 @@ from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import CaseLoads, FoundationLoads, RunLoads
 from flipflow.studies.jump_risk import JumpRisk, Throw
 from flipflow.studies.sensitivity import OneAtATime
-from flipflow.studies.start_and_blows import Transients
+from flipflow.studies.start_and_blows import CaseRuns, Transients
+from flipflow.studies.start_sentence import does_it_start
 from flipflow.transient.history import History
-from flipflow.transient.startup import RunUp
+from flipflow.transient.startup import Peak, RunSummary, RunUp
 
 RUN = ("version", "energy", "status", "method", "counters")
 
@@ -113,8 +115,11 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
         "input_hash": assessment.input_hash,
         "name": assessment.project.document.name or assessment.project.name,
         "verdict": assessment.verdict,
+        "state": assessment.state,
+        "does_it_start": does_it_start(assessment.transients),
         "omega": assessment.omega,
         "limits": [plain(vars(row)) for row in assessment.limits_table],
+        "passing_limits": [plain(vars(row)) for row in assessment.passing_table],
         "region": {
             **{name: plain(getattr(region, name)) for name in frequencies},
             "feasible": plain(region.feasible),
@@ -174,15 +179,32 @@ def _support_loads(
 
 
 def _transients(found: Transients | None) -> dict[str, Any] | None:
-    """Start, coast-down and jump risk of the empty machine; null without a working speed."""
+    """Start, coast-down and jump risk, the worst and case by case; null without a speed."""
     if found is None:
         return None
     runs = {"start": found.start, "coast_down": found.coast_down}
     return {
+        "state": found.state,
         "drive_assumed": found.assumed,
+        "case": found.case,
         **{name: None if run is None else _run_summary(run) for name, run in runs.items()},
         "jump_risk": None if found.jump is None else risk_summary(found.jump),
         "reasons": dict(found.reasons),
+        "findings": [dict(vars(one)) for one in found.findings],
+        "cases": [_case_runs(one) for one in found.cases],
+    }
+
+
+def _case_runs(case: CaseRuns) -> dict[str, Any]:
+    """One load case without its motions."""
+    summary, peaks = CODEC.form(RunSummary | None), CODEC.form(Mapping[str, Peak])
+    return {
+        "name": case.case,
+        "start": summary.write(case.start),
+        "coast_down": summary.write(case.coast_down),
+        "peaks": peaks.write(case.peaks),
+        "jump_risk": None if case.jump is None else risk_summary(case.jump),
+        "reasons": dict(case.reasons),
     }
 
 

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from flipflow.io.layout import FORMAT, SECTION_SENTENCES, SECTIONS, Entry, Kind
+from flipflow.io.layout import (
+    FORMAT,
+    SECTION_SENTENCES,
+    SECTIONS,
+    Entry,
+    Kind,
+    sections_within,
+)
 from flipflow.model.fields import FIELDS, Field
 
 Schema = dict[str, object]
@@ -21,7 +28,8 @@ def machine_schema() -> Schema:
         The schema, ready for ``json.dumps``; editors check and complete machine files with it.
     """
     properties: Schema = {"format": {"const": FORMAT, "description": "Format of this file."}}
-    properties.update({name: _section(name, entries) for name, entries in SECTIONS.items()})
+    outer = {name: entries for name, entries in SECTIONS.items() if "." not in name}
+    properties.update({name: _section(name, entries) for name, entries in outer.items()})
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"flipflow/machine/{FORMAT}",
@@ -38,9 +46,13 @@ def _section(name: str, entries: tuple[Entry, ...]) -> Schema:
     if name == "sources":
         text = {"type": "string"}
         return {"type": "object", "description": sentence, "additionalProperties": text}
+    inner = sections_within(name)
     table: Schema = {
         "type": "object",
-        "properties": {entry.key: _entry(entry) for entry in entries},
+        "properties": {
+            **{entry.key: _entry(entry) for entry in entries},
+            **{key: _section(f"{name}.{key}", SECTIONS[f"{name}.{key}"]) for key in inner},
+        },
         "additionalProperties": False,
     }
     demands = [_demand(entry) for entry in entries if entry.kind == "quantity"]
@@ -97,6 +109,13 @@ def _temperatures(_: Entry) -> Schema:
     return {"type": "array", "items": pair, "minItems": 1}
 
 
+def _torques(_: Entry) -> Schema:
+    torque = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string", "pattern": _QUANTITY}]}
+    row = [{"type": "string", "pattern": _QUANTITY}, torque]
+    pair = {"type": "array", "prefixItems": row, "minItems": 2, "maxItems": 2}
+    return {"type": "array", "items": pair, "minItems": 2}
+
+
 def _split(_: Entry) -> Schema:
     share = {"type": "number", "minimum": 0, "maximum": 1}
     return {"type": "array", "items": share, "minItems": 2, "maxItems": 2}
@@ -116,6 +135,7 @@ _KINDS: Mapping[Kind, Callable[[Entry], Schema]] = {
     "material": _quantity,
     "interval": _interval,
     "temperatures": _temperatures,
+    "torques": _torques,
     "split": _split,
     "choice": _choice,
     "text": _text,

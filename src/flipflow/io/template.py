@@ -20,7 +20,12 @@ format = {FORMAT}
 """
 
 # Keys that say in other words what another key says already: shown, but commented out.
-_ALTERNATIVES = frozenset({"stops.clearance_minus"})
+_ALTERNATIVES = frozenset(
+    {
+        "stops.clearance_minus", "drive.torque_table", "drive.switch_over_speed",
+        "drive.switch_over_time", "drive.ramp", "drive.ramp_time", "drive.torque_limit",
+    }
+)  # fmt: skip
 
 
 def template() -> str:

@@ -54,6 +54,7 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
         "3 g",
         {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": GRAVITY, "g_n": GRAVITY},
     ),
+    "rad/s^2": ("a rise of speed", "15 rad/s^2", {"rad/s^2": 1.0, "rpm/s": _TURN / 60.0}),
     "kg m^2": ("a moment of inertia", "0.8 kg m^2", {"kg m^2": 1.0, "kg cm^2": 1e-4}),
     "N m": ("a torque", "40 N m", {"N m": 1.0, "kN m": 1e3}),
     "s": ("a time", "20 s", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}),
@@ -76,7 +77,7 @@ _OFFSET: Mapping[tuple[str, str], float] = {
     ("degC", "K"): -273.15,
     ("degC", "degF"): -160.0 / 9.0,
 }
-_NEVER_PINT = frozenset({"rad", "rad/s", "degC", ""})
+_NEVER_PINT = frozenset({"rad", "rad/s", "rad/s^2", "degC", ""})
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # Only names with small exponents go to pint: it evaluates arithmetic, however large.

@@ -140,6 +140,22 @@ def read_temperatures(written: object, label: str) -> tuple[tuple[float, float],
     return tuple(rows)
 
 
+def read_torques(written: object, label: str) -> tuple[list[tuple[float, float]], bool]:
+    """Read rows of speed and torque in rad/s and N m, or shares; whether they are in N m."""
+    shape = 'give rows such as [["0 rpm", 2.0], ["1440 rpm", 1.0]] or ["0 rpm", "70 N m"]'
+    if not isinstance(written, list) or len(written) < 2:
+        raise InputError(label, written, shape)
+    in_torque = isinstance(written[0], list) and any("N m" in str(one) for one in written[0])
+    rows = []
+    for row in written:
+        if not isinstance(row, list) or len(row) != 2:
+            raise InputError(label, row, shape)
+        speed = parse_quantity(row[0], "rad/s", field=label)
+        unit, example = ("N m", "70 N m") if in_torque else ("", "2.0")
+        rows.append((speed, parse_quantity(row[1], unit, field=label, example=example)))
+    return rows, in_torque
+
+
 def _two_ends(written: object, of: Field) -> str:
     """What to write where least and greatest belong; one end alone is taken as the greatest."""
     least, most = of.example if isinstance(of.example, tuple) else ("", "")

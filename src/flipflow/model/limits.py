@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from flipflow.errors import InputError
+from flipflow.model.arguments import checked_kind
 from flipflow.model.fields import Field
 from flipflow.model.quantities import QUANTITIES, Direction
 
@@ -52,6 +54,60 @@ LIMIT_FIELDS: tuple[LimitField, ...] = tuple(_fields())
 LIMIT_FIELD: Mapping[str, LimitField] = {field.name: field for field in LIMIT_FIELDS}
 
 
+Passage = Literal["start", "stop"]
+PASSAGES: tuple[Passage, ...] = ("start", "stop")
+
+
+def _passing_fields(passage: Passage) -> Iterator[LimitField]:
+    """The same for each quantity that may be limited while the machine starts, or stops."""
+    for quantity in QUANTITIES.values():
+        limit = quantity.passing
+        if limit is not None:
+            yield LimitField(
+                quantity.name, quantity.symbol, quantity.unit, quantity.shown_unit,
+                f"limits.{passage}.{quantity.name}", limit.sentence, lower_open=True,
+                plausible=limit.plausible, default=None, example=limit.example,
+                direction=limit.direction,
+            )  # fmt: skip
+
+
+PASSING_FIELDS: Mapping[Passage, tuple[LimitField, ...]] = {
+    passage: tuple(_passing_fields(passage)) for passage in PASSAGES
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PassingLimits:
+    """What a machine may do while it starts, or stops, in SI; each left at None is not checked.
+
+    Parameters
+    ----------
+    relative_amplitude
+        Greatest amplitude of x1 - xf in m.
+    main_amplitude
+        Greatest displacement of the main frame in m, in any direction.
+    shear_strain
+        Greatest relative amplitude over rubber height, a ratio.
+    stop_force, foundation_force
+        Greatest peak force in N.
+
+    Raises
+    ------
+    InputError
+        For a limit that no machine can have.
+    """
+
+    relative_amplitude: float | None = None
+    main_amplitude: float | None = None
+    shear_strain: float | None = None
+    stop_force: float | None = None
+    foundation_force: float | None = None
+
+    def __post_init__(self) -> None:
+        for field in PASSING_FIELDS["start"]:
+            object.__setattr__(self, field.name, field.check(getattr(self, field.name)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Limits:
     """What a machine may do, in SI; each limit left at None is not checked.
@@ -72,6 +128,8 @@ class Limits:
         Greatest mean power of the dampers in W.
     jump_margin
         Least distance from the jump speed, as a ratio of it.
+    start, stop
+        What it may do while it starts, and while it stops.
 
     Raises
     ------
@@ -88,8 +146,12 @@ class Limits:
     foundation_force: float | None = None
     dissipated_power: float | None = None
     jump_margin: float | None = None
+    start: PassingLimits = PassingLimits()
+    stop: PassingLimits = PassingLimits()
 
     def __post_init__(self) -> None:
+        for passage in PASSAGES:
+            checked_kind(passage, getattr(self, passage), PassingLimits, "give a PassingLimits")
         for field in LIMIT_FIELDS:
             value = getattr(self, field.name)
             checked = _interval(field, value) if field.interval else field.check(value)

@@ -76,6 +76,8 @@ class Quantity:
         Of a machine's coordinate, that coordinate and what is read off it.
     limit
         The limit that may be set on it; None where there is none.
+    passing
+        The limit that may be set on it while the machine starts and stops.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Quantity:
     coordinate: Coordinate | None = None
     part: Part | None = None
     limit: Limit | None = None
+    passing: Limit | None = None
 
     def missing(self, machine: Machine) -> tuple[str, ...]:
         """Fields that it needs and a screen does not have, in the order of the alphabet."""
@@ -113,6 +116,9 @@ _ALL = (
             "between", "Least and greatest relative amplitude, half peak to peak.",
             ("4 mm", "8 mm"), (0.0, 0.1),
         ),
+        passing=Limit(
+            "at most", "Greatest relative amplitude on the way.", "15 mm", (1e-3, 0.2),
+        ),
     ),
     Quantity(
         "stroke", "stroke", "2|x2|", "m", "mm",
@@ -121,6 +127,10 @@ _ALL = (
     Quantity(
         "main_amplitude", "main frame amplitude", "|x1|", "m", "mm",
         "Half the peak-to-peak motion of the main frame along the surface.",
+        passing=Limit(
+            "at most", "Greatest displacement of the main frame on the way, in any direction.",
+            "25 mm", (1e-3, 0.3),
+        ),
     ),
     Quantity(
         "floating_amplitude", "floating frame amplitude", "|xf|", "m", "mm",
@@ -165,6 +175,10 @@ _ALL = (
             "at most", "Greatest relative amplitude over the rubber height of a shear spring.",
             "20 %", (0.005, 3.0),
         ),
+        passing=Limit(
+            "at most", "Greatest relative amplitude over the rubber height on the way.",
+            "30 %", (0.005, 3.0),
+        ),
     ),
     Quantity(
         "shear_piece_force", "force per shear spring", "F2/n2", "N", "kN",
@@ -189,6 +203,10 @@ _ALL = (
             "at most", "Greatest force on the stop springs of one side together, peak.",
             "15 kN", (100.0, 10e6),
         ),
+        passing=Limit(
+            "at most", "Greatest force on the stop springs of one side on the way, peak.",
+            "30 kN", (100.0, 10e6),
+        ),
     ),
     Quantity(
         "stop_piece_force", "force per stop spring", "H/n3", "N", "kN",
@@ -207,6 +225,10 @@ _ALL = (
         limit=Limit(
             "at most", "Greatest dynamic force on the foundation, peak, in any direction.",
             "8 kN", (50.0, 5e6),
+        ),
+        passing=Limit(
+            "at most", "Greatest dynamic force on the foundation on the way, in any direction.",
+            "20 kN", (50.0, 5e6),
         ),
     ),
     Quantity(

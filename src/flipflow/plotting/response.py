@@ -134,7 +134,7 @@ def cases_figure(assessment: Assessment) -> Figure:
         "a small disturbance. Arrows: jumps."
     )
     figure = Figure(
-        "Amplitude of the relative motion over speed", caption, panels, len(panels), 216,
+        "Amplitude of the relative motion over speed", caption, panels, len(panels), 196,
         shares=(0.56, 0.44) if len(panels) == 2 else (),
     )  # fmt: skip
     beyond = max(legend_rows(figure) - LEGEND_WITHIN, 0)

@@ -128,8 +128,8 @@ def _torque(run: RunUp, time: Axis) -> Panel:
     t, values = _thinned(history.t, torque)
     low = min(0.0, float(values.min()))
     return Panel(
-        time, Axis("motor torque", "N m", (low, HEADROOM * float(values.max()))),
-        traces=(Trace("motor torque", t, values, colour="input", legend=False),),
+        time, Axis("torque at the shaft", "N m", (low, HEADROOM * float(values.max()))),
+        traces=(Trace("torque at the shaft", t, values, colour="input", legend=False),),
     )  # fmt: skip
 
 

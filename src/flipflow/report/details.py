@@ -120,7 +120,7 @@ def _quantities(title: str, cases: Sequence[CaseAssessment]) -> Table:
 
 
 def _parameter(value: Value) -> tuple[Cell, ...]:
-    section_name, key = value.key.split(".")
+    section_name, _, key = value.key.rpartition(".")
     sentence = next((e.sentence for e in SECTIONS[section_name] if e.key == key), "")
     return (
         Cell(value.key, sentence),

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 
+from flipflow.model.limits import PASSAGES
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
@@ -26,17 +27,13 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, rpm, span, speed
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import (
-    ATTENTION,
-    FAIL,
-    NO_LIMIT,
-    NOT_CHECKED,
-    PASS,
     Assessment,
     CaseAssessment,
     LimitRow,
 )
 from flipflow.studies.feasible import REGION, STABILITY, Bound
 from flipflow.studies.operating_region import OperatingRegion
+from flipflow.studies.start_sentence import does_it_start
 
 NO_NORMAL = (
     "Orbits are not drawn: isolation.normal_stiffness or isolation.normal_damping is missing in "
@@ -88,6 +85,7 @@ def verdict(assessment: Assessment) -> Iterator[Block]:
     ):
         if text:
             yield Text(text, lead)
+    yield Text(does_it_start(assessment.transients), "Does it start:")
     yield from (Note(note) for note in assessment.notes[: notes_that_fit(assessment)])
 
 
@@ -131,11 +129,24 @@ def limits(assessment: Assessment) -> Iterator[Block]:
         Column("State"),
     )
     caption = (
-        "Worst value over all load cases. Margin: distance from the limit as a share of it. "
-        "Attention: met by less than 5 %."
+        "Worst value over all load cases; of start and stop the tightest limit each. Margin: "
+        "distance from the limit as a share of it. Attention: met by less than 5 %."
     )
-    rows = tuple(_limit_row(row) for row in assessment.limits_table)
+    passing = tightest_on_the_way(assessment)
+    rows = tuple(_limit_row(row) for row in (*assessment.limits_table, *passing))
     yield Table("", columns, rows, caption)
+
+
+def tightest_on_the_way(assessment: Assessment) -> Iterator[LimitRow]:
+    """Of the limits on the start, and of those on the stop, the one that leaves least."""
+    for passage in PASSAGES:
+        rows = [
+            row
+            for row in assessment.passing_table
+            if row.margin is not None and row.name.startswith(f"limits.{passage}.")
+        ]
+        if rows:
+            yield min(rows, key=lambda row: row.margin or 0.0)
 
 
 @section(Assessment, Part.FIRST_PAGE, 60, brief=True)
@@ -213,6 +224,8 @@ def _other_lines(assessment: Assessment) -> int:
         max(legend_lines(names) - LEGEND_WITHIN, 0)
         + bool(contact_sentence(assessment.region))
         + (not any(case.normal for case in assessment.cases))
+        + _note_lines(f"Does it start: {does_it_start(assessment.transients)}")
+        - 1
     )
 
 
@@ -233,14 +246,8 @@ def contact_sentence(region: OperatingRegion) -> str:
 
 
 def verdict_state(assessment: Assessment) -> str:
-    """The worst state of the limits that were given; fail without a motion that returns."""
-    if assessment.omega is None:
-        return NOT_CHECKED
-    if any(case.orbit is None or case.orbit.stability == "unstable" for case in assessment.cases):
-        return FAIL
-    states = {row.state for row in assessment.limits_table if row.limit != NO_LIMIT}
-    order = (FAIL, NOT_CHECKED, ATTENTION, PASS)
-    return next((state for state in order if state in states), NOT_CHECKED)
+    """The state of limits, drive and start together."""
+    return assessment.state
 
 
 def allowed_range(assessment: Assessment) -> str:

@@ -1,46 +1,56 @@
-"""Start, coast-down and jump risk of the empty machine, in words a plant understands."""
+"""Start, coast-down and jump risk of every load case, in words a plant understands."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from flipflow.plotting.transient import run_ups_figure
-from flipflow.report.blocks import Block, Column, FigureBlock, Heading, Note, Table, Text, cells
+from flipflow.report.blocks import (
+    Block,
+    Cell,
+    Column,
+    FigureBlock,
+    Heading,
+    Note,
+    Table,
+    Text,
+    cells,
+)
 from flipflow.report.jump_risk import millimetres, moment_words
-from flipflow.report.numbers import NOTHING, number, quantity, rpm
+from flipflow.report.numbers import NOTHING, bounds, number, percent, quantity, rpm
 from flipflow.report.registry import Part, section
-from flipflow.studies.assessment import Assessment
+from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_limit
 from flipflow.studies.jump_risk import JumpRisk
-from flipflow.studies.start_and_blows import Transients
-from flipflow.transient.startup import RunUp
+from flipflow.studies.start_and_blows import CaseRuns, Transients
+from flipflow.studies.start_sentence import NO_SPEED, drive_words
+from flipflow.transient.startup import RunSummary, RunUp
 
-PEAKS = (
-    ("main_amplitude", "Main frame, amplitude", "mm", "m"),
-    ("relative_amplitude", "Relative motion, amplitude", "mm", "m"),
-    ("foundation_force", "Force on the foundation", "kN", "N"),
-    ("stop_force", "Force on the stops of a side", "kN", "N"),
+GREATEST = (
+    ("main_amplitude", "main frame", "mm", "m"),
+    ("foundation_force", "foundation", "kN", "N"),
 )
 ASSUMED = "Assumed: "
 CANNOT_JUMP = "cannot jump: no other motion was found"
-NO_SPEED = "not checked, for the machine file gives no working speed."
+MOST_NAMED = 3  # load cases that a line names
 
 
 @section(Assessment, Part.DETAILS, 70, brief=True)
 def start_and_stop(assessment: Assessment) -> Iterator[Block]:
-    """Start, coast-down and jump risk in a line each."""
+    """Start, coast-down and jump risk in a line each, of the worst load case."""
     yield Heading("Start, stop and disturbances", 1, new_page=False)
     found = assessment.transients
     if found is None:
         yield Text(NO_SPEED, "Start, stop and disturbances:")
         return
-    yield Text(start_words(found), "Start (empty):")
-    yield Text(coast_words(found), "Coast-down (empty):")
-    yield Text(jump_words(found), "Blows and lumps (empty):")
+    yield Text(start_words(found), f"Start ({found.case}):")
+    yield Text(coast_words(found), "Coast-down:")
+    yield from jump_lines(found)
+    yield from (Note(text) for text in beyond_running(assessment))
 
 
 @section(Assessment, Part.DETAILS, 71)
 def start_and_stop_details(assessment: Assessment) -> Iterator[Block]:
-    """The peaks on the way with their speeds, start and coast-down over time, the assumptions."""
+    """The peaks on the way with their limits, every load case, runs over time, assumptions."""
     found = assessment.transients
     if found is None:
         return
@@ -49,7 +59,10 @@ def start_and_stop_details(assessment: Assessment) -> Iterator[Block]:
         yield Text(moment_words(found.jump))
     if not runs:
         return
-    yield _peaks_table(found)
+    if found.cases:
+        yield _cases_table(found)
+    if assessment.passing_table:
+        yield _limits_table(assessment)
     notes = dict.fromkeys(note for run in runs for note in run.notes)
     yield from (Note(note) for note in notes if not note.startswith(ASSUMED))
     assumed = [note.removeprefix(ASSUMED).rstrip(".") for note in notes if note.startswith(ASSUMED)]
@@ -59,17 +72,16 @@ def start_and_stop_details(assessment: Assessment) -> Iterator[Block]:
 
 
 def start_words(found: Transients) -> str:
-    """What becomes of a start from rest, the greatest amplitude and force on the way."""
+    """What becomes of the worst start, the greatest amplitude and force on the way."""
     run = found.start
     if run is None:
         return f"not checked: {found.reasons['start']}."
-    drive = "drive assumed" if found.assumed else "drive of the machine file"
     first = f"the first natural frequency w01 = {rpm(run.first_frequency)} rpm"
     if run.passing is None:
         first = f"does not pass {first}"
     else:
         first = f"passes {first} in {run.passing:.2g} s"
-    return f"{run.verdict}; {first}; {_greatest(run)} ({drive})."
+    return f"{run.verdict}; {first}; {_greatest(run)} ({drive_words(found)})."
 
 
 def coast_words(found: Transients) -> str:
@@ -80,14 +92,53 @@ def coast_words(found: Transients) -> str:
     return f"{run.verdict}; {_greatest(run)}."
 
 
-def jump_words(found: Transients) -> str:
+def jump_lines(found: Transients) -> Iterator[Text]:
+    """Blows and lumps of the worst load case, and which load cases cannot jump."""
+    if not found.cases:
+        yield Text(jump_words(found.jump, found.reasons), "Blows and lumps (empty):")
+        return
+    able = [one for one in found.cases if one.jump is not None and one.jump.others]
+    worst = min(able, key=lambda one: one.jump.impulse if one.jump else 0.0, default=None)
+    if worst is not None:
+        yield Text(jump_words(worst.jump, worst.reasons), f"Blows and lumps ({worst.case}):")
+    for words, cases in _alike([one for one in found.cases if one not in able]).items():
+        every = len(cases) == len(found.cases)
+        names = "every load case" if every and len(cases) > 1 else _names(cases)
+        yield Text(words, f"Blows and lumps ({names}):")
+
+
+def _alike(cases: list[CaseRuns]) -> dict[str, list[str]]:
+    """Load cases by what is said of them."""
+    said: dict[str, list[str]] = {}
+    for one in cases:
+        said.setdefault(jump_words(one.jump, one.reasons), []).append(one.case)
+    return said
+
+
+def _names(names: list[str]) -> str:
+    return "; ".join(names) if len(names) <= MOST_NAMED else f"{len(names)} load cases"
+
+
+def jump_words(risk: JumpRisk | None, reasons: dict[str, str]) -> str:
     """The least blow on each frame and the least lump, or that nothing can throw the motion."""
-    risk = found.jump
     if risk is None:
-        return f"not checked: {found.reasons['jump']}."
+        return f"not checked: {reasons['jump']}."
     if not risk.others:
         return f"{CANNOT_JUMP}."
     return f"{_least_blows(risk)}; {_least_lump(risk)}."
+
+
+def beyond_running(assessment: Assessment) -> Iterator[str]:
+    """What is greater on the way than the running limit, where there is no limit for the way."""
+    for row in assessment.passing_table:
+        most = running_limit(assessment.project, row)
+        if row.limit != NO_LIMIT or row.worst is None or most is None or row.worst <= most:
+            continue
+        worst, limit = (quantity(value, row.shown_unit, row.unit) for value in (row.worst, most))
+        yield (
+            f"{row.label[:1].upper()}{row.label[1:]}: {worst} (case {row.case}) exceeds the "
+            f"running limit of {limit}; {row.reason}."
+        )
 
 
 def _least_blows(risk: JumpRisk) -> str:
@@ -113,31 +164,72 @@ def _least_lump(risk: JumpRisk) -> str:
 def _greatest(run: RunUp) -> str:
     """Greatest amplitude of the main frame and force on the foundation, each with its speed."""
     parts = []
-    for (name, _, shown, unit), what in zip(
-        (PEAKS[0], PEAKS[2]), ("main frame", "foundation"), strict=True
-    ):
+    for name, what, shown, unit in GREATEST:
         if peak := run.peaks.get(name):
             parts.append(f"{what} {quantity(peak.value, shown, unit)} at {rpm(peak.omega)} rpm")
-    return f"greatest: {', '.join(parts)}"
+    along = "" if run.history.normal is not None else ", along the surface only"
+    return f"greatest: {', '.join(parts)}{along}"
 
 
-def _peaks_table(found: Transients) -> Table:
-    runs = (("start", found.start), ("coast-down", found.coast_down))
-    columns = [Column("Greatest on the way")]
-    for name, _ in runs:
-        columns += [Column(name.capitalize(), numeric=True), Column("at", "rpm", numeric=True)]
-    rows = []
-    for name, label, shown, unit in PEAKS:
-        row = [label]
-        for _, run in runs:
-            peak = None if run is None else run.peaks.get(name)
-            if peak is None:
-                row += [NOTHING, NOTHING]
-            else:
-                row += [quantity(peak.value, shown, unit), rpm(peak.omega)]
-        if any(text != NOTHING for text in row[1:]):
-            rows.append(cells(*row))
+def _cases_table(found: Transients) -> Table:
+    """Start and coast-down of every load case."""
+    columns = [Column("Load case"), Column("Start"), Column("at speed", "s", numeric=True)]
+    columns.append(Column("settles at", "rpm", numeric=True))
+    for passage in ("start", "stop"):
+        columns += [
+            Column(f"{what}, {passage}", shown, numeric=True) for _, what, shown, _ in GREATEST
+        ]
+    rows = tuple(_case_row(one) for one in found.cases)
     caption = (
-        "Empty machine. Amplitude: half the way from one turning point of the motion to the next."
+        "The worst start from hanging and from every angle at which friction holds the shaft. "
+        "Main frame: greatest distance from rest; foundation: greatest dynamic force."
     )
-    return Table("", tuple(columns), tuple(rows), caption)
+    return Table("Starts and coast-downs", tuple(columns), rows, caption)
+
+
+def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
+    run = case.start
+    if run is None:
+        return cells(case.case, "not checked", *[NOTHING] * 6)
+    time = NOTHING if run.time_to_speed is None else f"{run.time_to_speed:.3g}"
+    peaks = [
+        quantity(peak.value, shown, unit, with_unit=False)
+        if (peak := values.get(name)) is not None
+        else NOTHING
+        for values in (case.peaks, case.peaks_of("stop"))
+        for name, _, shown, unit in GREATEST
+    ]
+    return cells(case.case, _outcome(run), time, rpm(run.final_speed), *peaks)
+
+
+def _outcome(run: RunSummary) -> str:
+    return run.outcome
+
+
+def _limits_table(assessment: Assessment) -> Table:
+    columns = (
+        Column("Greatest on the way"),
+        Column("Allowed"),
+        Column("Worst", numeric=True),
+        Column("Case"),
+        Column("Margin", numeric=True),
+        Column("State"),
+    )
+    rows = tuple(_limit_row(assessment, row) for row in assessment.passing_table)
+    caption = (
+        "Amplitude: half the way from one turning point of the motion to the next; main frame: "
+        "distance from rest, in any direction where the normal direction is known."
+    )
+    return Table("Limits on start and stop", columns, rows, caption)
+
+
+def _limit_row(assessment: Assessment, row: LimitRow) -> tuple[Cell, ...]:
+    allowed = bounds(*row.limit, row.shown_unit, row.unit)
+    state, case = Cell(row.state, state=row.state), row.case or row.reason
+    if row.limit == NO_LIMIT:
+        most = running_limit(assessment.project, row)
+        allowed = "" if most is None else f"running: {quantity(most, row.shown_unit, row.unit)}"
+        state = Cell(row.reason)
+    worst = quantity(row.worst, row.shown_unit, row.unit)
+    label = Cell(row.label[:1].upper() + row.label[1:])
+    return (label, Cell(allowed), Cell(worst), Cell(case), Cell(percent(row.margin)), state)

@@ -16,7 +16,14 @@ from flipflow.dynamics.normal import NormalMotion
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
-from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
+from flipflow.model.limits import (
+    LIMIT_FIELDS,
+    PASSAGES,
+    PASSING_FIELDS,
+    LimitField,
+    Passage,
+    limit_bounds,
+)
 from flipflow.model.monitor import Monitor
 from flipflow.model.numerals import digits
 from flipflow.model.project import Project
@@ -25,6 +32,7 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.frozen import Frozen
+from flipflow.studies.drive_check import Demand
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.foundation_loads import FoundationLoads, foundation_loads
 from flipflow.studies.gaps_under_weight import GapsUnderWeight, gaps_under_weight
@@ -34,11 +42,13 @@ from flipflow.studies.quantity_values import Working
 from flipflow.studies.rubber_temperature import warmed_load
 from flipflow.studies.sensitivity import OneAtATime, one_at_a_time
 from flipflow.studies.start_and_blows import Transients, transients
+from flipflow.studies.start_sentence import ASSUMED, in_cases
 
 TORNADO_SHARE = 0.05  # change of each field, down and up, relative to its value
 PASS, ATTENTION, FAIL, NOT_CHECKED = "pass", "attention", "fail", "not checked"
 CLOSE = 0.05  # margin to a limit, relative, below which it asks for attention
 NO_LIMIT = (-math.inf, math.inf)
+NOT_SO_FAR = "the machine does not come so far"  # what is not judged on the way
 
 
 @dataclass(frozen=True)
@@ -148,13 +158,15 @@ class Assessment:
         The empty machine's relative amplitude with one field at a time 5 % lower and higher; None
         without a working speed.
     transients
-        Start, coast-down and jump risk of the empty machine; None without a working speed.
+        Start, coast-down and jump risk of every load case; None without a working speed.
     notes
         What was not checked or not finished.
     method, version, input_hash
         How, by which version, from which input.
     foundation
         What goes into the ground; None without a motion or a run.
+    passing_table
+        The limits on start and stop, and what is greatest there where no limit is given.
     """
 
     project: Project
@@ -170,6 +182,27 @@ class Assessment:
     version: str
     input_hash: str
     foundation: FoundationLoads | None = None
+    passing_table: tuple[LimitRow, ...] = ()
+
+    @property
+    def state(self) -> str:
+        """The worst state of limits and drive; fail without a motion that returns."""
+        if self.omega is None:
+            return NOT_CHECKED
+        if any(one.orbit is None or one.orbit.stability == "unstable" for one in self.cases):
+            return FAIL
+        rows = (*self.limits_table, *self.passing_table)
+        judged = (row for row in rows if row.limit != NO_LIMIT and row.reason != NOT_SO_FAR)
+        states = {row.state for row in judged}
+        if self.transients is not None and self.transients.cases:
+            states.add(self.transients.state)
+        order = (FAIL, NOT_CHECKED, ATTENTION, PASS)
+        return next((state for state in order if state in states), NOT_CHECKED)
+
+    @property
+    def start_fails(self) -> bool:
+        """Whether the machine does not start, or runs where it may not, by the drive given."""
+        return self.transients is not None and self.transients.state == FAIL
 
     def __repr__(self) -> str:
         name = self.project.document.name or self.project.name
@@ -220,14 +253,15 @@ def assess(
         for load, branch in zip(loads, region.branches, strict=True)
     )
     rows = tuple(limit_row(project, cases, limit.name) for limit in LIMIT_FIELDS)
-    found = None if project.speed is None else transients(project, project.speed)
+    found = None if project.speed is None else passing(project, project.speed, cases, region)
+    on_the_way = () if found is None else passing_rows(project, found)
     return Assessment(
         project=project,
         region=region,
         cases=cases,
         omega=project.speed,
         limits_table=rows,
-        verdict=verdict(project.speed, rows, cases, region),
+        verdict=with_start(verdict(project.speed, rows, cases, region), found, on_the_way),
         tornado=None if project.speed is None else tornado(project.screen, project.speed),
         transients=found,
         notes=(
@@ -240,17 +274,39 @@ def assess(
         version=__version__,
         input_hash=input_hash(project),
         foundation=loads_of(cases, found),
+        passing_table=on_the_way,
     )
 
 
 def loads_of(cases: tuple[CaseAssessment, ...], found: Transients | None) -> FoundationLoads | None:
-    """What goes into the ground in every load case, at start and coast-down."""
+    """What goes into the ground in every load case, at the worst start and coast-down."""
     motions = {case.name: case.orbit for case in cases if case.orbit is not None}
     runs = {}
     if found is not None:
-        named = {"start (empty)": found.start, "coast-down (empty)": found.coast_down}
+        named = {f"start ({found.case})": found.start, "coast-down": found.coast_down}
         runs = {name: run for name, run in named.items() if run is not None}
     return foundation_loads(motions, runs) if motions or runs else None
+
+
+def passing(
+    project: Project, omega: float, cases: tuple[CaseAssessment, ...], region: OperatingRegion
+) -> Transients:
+    """Start, coast-down and jump risk of every load case, and the drive against the machine."""
+    screens = {case.name: case.screen for case in cases}
+    powers = {case.name: total_power(case.energy) for case in cases if case.energy}
+    first = cases[0]
+
+    def power_at(speed: float) -> float | None:
+        working = working_motion(first.screen, first.branch, speed)
+        return None if working is None else total_power(energy_balance(working))
+
+    demand = Demand(first.screen, omega, region.feasible, powers, power_at)
+    return transients(project, omega, screens, demand)
+
+
+def total_power(energy: Mapping[str, float]) -> float:
+    """Mean power in W that the dampers take of a motion in both directions."""
+    return energy["input"] + energy.get("normal", 0.0)
 
 
 def tornado(screen: FlipFlowScreen, omega: float) -> OneAtATime:
@@ -330,6 +386,69 @@ def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) ->
     margin, worst, case_name = min(judged, key=lambda one: one[0])
     state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
     return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
+
+
+def passing_rows(project: Project, found: Transients) -> tuple[LimitRow, ...]:
+    """The limits on start and stop with their worst case, and what has none there."""
+    rows = (
+        passing_row(project, found, passage, field)
+        for passage in PASSAGES
+        for field in PASSING_FIELDS[passage]
+    )
+    return tuple(row for row in rows if row is not None)
+
+
+def passing_row(
+    project: Project, found: Transients, passage: Passage, field: LimitField
+) -> LimitRow | None:
+    """The worst case of one quantity on the way; None where it has neither value nor limit."""
+    quantity = QUANTITIES[field.name]
+    label = f"{quantity.label}, {passage}"
+    row = LimitRow(field.key, label, quantity.unit, quantity.shown_unit, NO_LIMIT)
+    most = getattr(getattr(project.limits, passage), field.name)
+    worst = [
+        (peak.value, case.case)
+        for case in found.cases
+        if (peak := case.peaks_of(passage).get(field.name)) is not None
+    ]
+    if most is not None:
+        row = dataclasses.replace(row, limit=(-math.inf, most))
+    missing = quantity.missing(project.screen)
+    if not worst or missing:
+        reason = missing_words(missing) if missing else NOT_SO_FAR
+        return None if most is None else dataclasses.replace(row, reason=reason)
+    value, case = max(worst)
+    row = dataclasses.replace(row, worst=value, case=case)
+    if most is None:
+        return dataclasses.replace(row, reason=f"no limit given for the {passage}")
+    margin = relative_margin(value, -math.inf, most)
+    state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
+    return dataclasses.replace(row, margin=margin, state=state)
+
+
+def running_limit(project: Project, row: LimitRow) -> float | None:
+    """The greatest value that the running limit allows of what is greatest on the way, SI."""
+    name = row.name.rpartition(".")[2]
+    if getattr(project.limits, name, None) is None:
+        return None
+    return limit_bounds(project.limits, name)[1]
+
+
+def with_start(sentence: str, found: Transients | None, rows: tuple[LimitRow, ...]) -> str:
+    """The verdict with what start, stop and drive add to it."""
+    if found is None or not found.cases:
+        return sentence
+    broken = sum(row.state == FAIL for row in rows)
+    parts = []
+    if found.failed:
+        where = in_cases([one.case for one in found.failed], len(found.cases))
+        rests = f" ({ASSUMED})" if found.rests_on_assumed else ""
+        parts.append(f"the start fails {where}{rests}")
+    elif any(one.state == FAIL for one in found.findings):
+        parts.append("the drive does not fit")
+    if broken:
+        parts.append(f"{broken} {'limit' if broken == 1 else 'limits'} on start and stop broken")
+    return f"{sentence.rstrip('.')}; {' and '.join(parts)}." if parts else sentence
 
 
 def relative_margin(value: float, low: float, high: float) -> float:

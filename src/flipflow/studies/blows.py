@@ -93,6 +93,16 @@ class Blows:
             return -share * v / one.mobility
         return (one.largest if one.kind == "+" else -one.largest) * share
 
+    def _pushes(self, row: Int, share: Real, velocity: Real) -> Real:
+        """The impulses of many blows on frames that have these velocities, (K,)."""
+        lump = np.array([one.kind == "lump" for one in self.rows])[row]
+        signs = np.array([1.0 if one.kind == "+" else -1.0 for one in self.rows])[row]
+        most = np.array([one.largest for one in self.rows])[row]
+        index = np.array([one.index for one in self.rows])[row]
+        mobility = np.array([one.mobility for one in self.rows])[row]
+        own = velocity[np.arange(row.size), index]
+        return np.asarray(np.where(lump, -share * own / mobility, signs * most * share))
+
     def lump(self, row: int, share: float) -> float:
         """The lump's mass in kg."""
         return math.inf if share >= 1.0 else share / (1.0 - share) / self.rows[row].mobility
@@ -108,9 +118,8 @@ class Blows:
         """The motion on which the machine settles after each blow, (K,)."""
         t = phase / self.omega
         x, v = self.motion.derivative(t, 0), self.motion.derivative(t, 1).copy()
-        for k in range(row.size):
-            push = self.impulse(int(row[k]), float(share[k]), float(phase[k]))
-            v[k] += self.mobility[:, self.rows[row[k]].index] * push
+        index = np.array([one.index for one in self.rows])[row]
+        v += self.mobility[:, index].T * self._pushes(row, share, v)[:, None]
         begin = np.mod(t, 2.0 * np.pi / self.omega)
         run = self.attractors.run(np.concatenate([x, v], axis=1), MOST_TURNS, begin, tick)
         self.tried += run.label.size

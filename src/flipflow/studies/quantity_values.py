@@ -236,13 +236,13 @@ class Working(Frozen):
         return max((self.orbit.stop_force_peak(j) for j in self.stops), default=0.0)
 
     def shear_force(self) -> float:
-        k, c = self.screen.shear_stiffness, self.screen.shear_damping
+        k, c = self.field("shear_stiffness"), self.field("shear_damping")
         return self.orbit.peak(
             lambda _t, x, v, _a: k * (x[:, 0] - x[:, 1]) + c * (v[:, 0] - v[:, 1])
         )
 
     def shear_power(self) -> float:
-        return self.screen.shear_damping * self.orbit.mean_square_velocity("relative")
+        return self.field("shear_damping") * self.orbit.mean_square_velocity("relative")
 
     def approach_speed(self) -> float:
         begins = [touch.start for touch in self.orbit.contact_intervals]
@@ -251,7 +251,7 @@ class Working(Frozen):
 
     def bearing_load(self) -> float:
         normal, mass = self.normal, self.field("rotating_mass")
-        if normal is None or math.isnan(mass):
+        if self.screen is None or normal is None or math.isnan(mass):
             return math.nan
         force = self.screen.eccentric_moment * self.omega**2
         sense = self.screen.normal_sense

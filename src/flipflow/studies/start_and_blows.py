@@ -2,27 +2,53 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 
 from flipflow.errors import IncompleteError, InputError
+from flipflow.model.constants import RPM
+from flipflow.model.drive import Drive
+from flipflow.model.limits import Passage
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.studies.drive_check import (
+    Demand,
+    Finding,
+    drive_findings,
+    power_that_passes,
+    power_words,
+)
+from flipflow.studies.held_angles import badness, starts_from_rest
 from flipflow.studies.jump_risk import JumpRisk, jump_risk
-from flipflow.transient.startup import RunUp, coast_down, start_up
+from flipflow.transient.chosen_drive import default_drive, fitted_drive
+from flipflow.transient.startup import (
+    Outcome,
+    Peak,
+    RunSummary,
+    RunUp,
+    coast_down,
+)
+
+NOT_REACHED = "the start does not reach the working speed"
+FAILED: tuple[Outcome, ...] = ("not started", "captured", "short", "unfinished")
 
 
 @dataclass(frozen=True, eq=False)
-class Transients:
-    """Start, coast-down and jump risk of the empty machine at its working speed.
+class CaseRuns:
+    """Start, coast-down and jump risk of one load case at its working speed.
 
     Parameters
     ----------
-    assumed
-        Whether the drive was assumed, for the machine file gives none.
+    case
+        The load case.
     start
-        From rest; None where it could not be calculated.
+        From rest, from the worst angle at which the shaft can have stopped; None where it could
+        not be calculated.
     coast_down
         From the speed that the start reaches, the motor switched off; None where it reaches none.
+    peaks
+        The greatest peaks of all starts of the case, by name.
     jump
         The least blow and the least lump that throw the working motion onto another one; None
         where it could not be calculated.
@@ -30,15 +56,92 @@ class Transients:
         Why "start", "coast_down" or "jump" is None.
     """
 
+    case: str
+    start: RunSummary | None
+    coast_down: RunSummary | None
+    peaks: Mapping[str, Peak]
+    jump: JumpRisk | None
+    reasons: dict[str, str]
+
+    def peaks_of(self, passage: Passage) -> Mapping[str, Peak]:
+        """The greatest peaks while it starts, or stops."""
+        if passage == "start":
+            return self.peaks
+        return {} if self.coast_down is None else self.coast_down.peaks
+
+
+@dataclass(frozen=True, eq=False)
+class Transients:
+    """Start, coast-down and jump risk of every load case, and the drive.
+
+    Parameters
+    ----------
+    assumed
+        Whether the drive was assumed, for the machine file gives none.
+    start
+        The worst start of all load cases: one that fails, else that with the greatest force on the
+        foundation; None where none could be calculated.
+    coast_down
+        The coast-down with the greatest force on the foundation; None where no start reaches the
+        working speed.
+    jump
+        The least blow and the least lump of all load cases; None where it could not be calculated.
+    reasons
+        Why "start", "coast_down" or "jump" is None.
+    cases
+        Every load case; empty in results of earlier versions, which had the empty machine alone.
+    case
+        The load case of ``start``.
+    findings
+        What is wrong with the drive.
+    """
+
     assumed: bool
     start: RunUp | None
     coast_down: RunUp | None
     jump: JumpRisk | None
     reasons: dict[str, str]
+    cases: tuple[CaseRuns, ...] = ()
+    case: str = "empty"
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def failed(self) -> tuple[CaseRuns, ...]:
+        """The load cases in which the start does not reach the working speed."""
+        return tuple(one for one in self.cases if one.start and one.start.outcome in FAILED)
+
+    @property
+    def rests_on_assumed(self) -> bool:
+        """Whether values of the drive were assumed."""
+        drive = None if self.start is None else self.start.drive
+        return isinstance(drive, Drive) and bool(drive.assumed_fields)
+
+    @property
+    def state(self) -> str:
+        """Pass, attention, fail on given values, or "not checked"."""
+        if self.start is None:
+            return "not checked"
+        states = {one.state for one in self.findings}
+        if self.failed:
+            states.add("attention" if self.rests_on_assumed else "fail")
+        return next((word for word in ("fail", "attention") if word in states), "pass")
 
 
-def transients(project: Project, omega: float) -> Transients:
-    """Start, coast-down and jump risk of a project's empty machine at ``omega`` in rad/s.
+def transients(
+    project: Project, omega: float, screens: Mapping[str, FlipFlowScreen], demand: Demand
+) -> Transients:
+    """Start, coast-down and jump risk of every load case at ``omega`` in rad/s.
+
+    Parameters
+    ----------
+    project
+        Its drive is taken; where it has none, one is assumed.
+    omega
+        Working speed in rad/s.
+    screens
+        The machine under each load case, by name; the first one chooses what is open of the drive.
+    demand
+        What the machine asks of its drive.
 
     Raises
     ------
@@ -46,34 +149,134 @@ def transients(project: Project, omega: float) -> Transients:
         For a drive in the project with which the machine cannot be started.
     """
     reasons: dict[str, str] = {}
-    start = _start(project, omega, reasons)
-    coast = None
-    if start is not None and start.outcome == "reached":
-        coast = coast_down(project.screen, start.final_speed, start.drive)
-    else:
-        reasons["coast_down"] = "the start does not reach the working speed"
-    jump = _jump(project.screen, omega, reasons)
-    return Transients(not _known(project), start, coast, jump, reasons)
+    drive = _drive(project, omega, demand.screen, reasons)
+    alike: dict[FlipFlowScreen, list[str]] = {}
+    for name, screen in screens.items():
+        alike.setdefault(screen, []).append(name)
+    # Kernels leave the interpreter free, so that cases run side by side.
+    with ThreadPoolExecutor(2) as pool:
+        runs = list(pool.map(lambda one: _runs(one, drive, omega), alike))
+    jumps = [_jump(screen, omega) for screen in alike]
+    starts = {
+        name: (run, jump)
+        for names, run, jump in zip(alike.values(), runs, jumps, strict=True)
+        for name in names
+    }
+    cases = tuple(_case(name, *starts[name], reasons) for name in screens)
+    found = () if drive is None else drive_findings(drive, demand)
+    whole = _worst(project, cases, {name: run for name, (run, _) in starts.items()}, reasons)
+    if whole.failed and drive is not None:
+        found = (*found, *_resonance(whole, drive, screens))
+    return replace(whole, findings=found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """The starts of a machine, the worst first, and its coast-down."""
+
+    starts: tuple[RunUp, ...]
+    coast_down: RunUp | None
+
+
+def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float) -> _Runs:
+    if drive is None:
+        return _Runs((), None)
+    starts = starts_from_rest(screen, drive, omega)
+    if starts[0].outcome != "reached":
+        return _Runs(starts, None)
+    return _Runs(starts, coast_down(screen, starts[0].final_speed, drive))
+
+
+def _case(name: str, runs: _Runs, jump: JumpRisk | str, nothing: Mapping[str, str]) -> CaseRuns:
+    reasons = dict(nothing)
+    if runs.coast_down is None:
+        reasons["coast_down"] = NOT_REACHED
+    if isinstance(jump, str):
+        reasons["jump"] = jump
+    peaks: dict[str, Peak] = {}
+    for run in runs.starts:
+        for key, peak in run.peaks.items():
+            if key not in peaks or peak.value > peaks[key].value:
+                peaks[key] = peak
+    return CaseRuns(
+        name,
+        runs.starts[0].summary if runs.starts else None,
+        None if runs.coast_down is None else runs.coast_down.summary,
+        peaks,
+        None if isinstance(jump, str) else jump,
+        reasons,
+    )
+
+
+def _worst(
+    project: Project,
+    cases: tuple[CaseRuns, ...],
+    runs: Mapping[str, _Runs],
+    nothing: Mapping[str, str],
+) -> Transients:
+    """The worst of all cases, with its motion."""
+    starts = {name: one.starts[0] for name, one in runs.items() if one.starts}
+    case = min(starts, key=lambda name: badness(starts[name]), default=cases[0].case)
+    coasts = [one.coast_down for one in runs.values() if one.coast_down is not None]
+    reasons = dict(nothing)
+    if not coasts:
+        reasons["coast_down"] = NOT_REACHED
+    jumps = [one.jump for one in cases if one.jump is not None]
+    jump = min(jumps, key=lambda one: (not one.others, one.impulse), default=None)
+    if jump is None:
+        reasons["jump"] = next(one.reasons["jump"] for one in cases)
+    return Transients(
+        not _known(project),
+        starts.get(case),
+        max(coasts, key=lambda run: -badness_down(run), default=None),
+        jump,
+        reasons,
+        cases,
+        case,
+    )
+
+
+def badness_down(run: RunUp) -> float:
+    """Minus the greatest force on the foundation of a coast-down in N."""
+    force = run.peaks.get("foundation_force")
+    return 0.0 if force is None else -force.value
 
 
 def _known(project: Project) -> bool:
     return project.drive is not None and project.drive.motor is not None
 
 
-def _start(project: Project, omega: float, reasons: dict[str, str]) -> RunUp | None:
-    if _known(project):
-        return start_up(project.screen, project.drive, speed=omega)
+def _drive(
+    project: Project, omega: float, screen: FlipFlowScreen, reasons: dict[str, str]
+) -> Drive | None:
+    """The drive of the project, or an assumed one, with what was open of it chosen."""
+    if project.drive is not None and _known(project):
+        return fitted_drive(screen, project.drive, omega)
     try:
-        return start_up(project.screen, speed=omega)
+        return default_drive(screen, omega)
     except InputError as error:
         # Nobody gave this drive, so the rest of the analysis need not end with it.
         reasons["start"] = f"no drive is given, and none can be assumed ({error})"
         return None
 
 
-def _jump(screen: FlipFlowScreen, omega: float, reasons: dict[str, str]) -> JumpRisk | None:
+def _jump(screen: FlipFlowScreen, omega: float) -> JumpRisk | str:
     try:
         return jump_risk(screen, omega)
     except IncompleteError as error:
-        reasons["jump"] = str(error).rstrip(".")
-        return None
+        return str(error).rstrip(".")
+
+
+def _resonance(
+    found: Transients, drive: Drive, screens: Mapping[str, FlipFlowScreen]
+) -> tuple[Finding, ...]:
+    """The rated power with which a start that is captured passes; nothing for other failures."""
+    run = found.start
+    if run is None or run.near is None:
+        return ()
+    power = power_that_passes(drive, screens[found.case], run.near.omega)
+    if power is None:
+        return ()
+    held = f"{run.near.name} = {run.near.omega * RPM:.4g} rpm (case {found.case})"
+    sentence = f"{power_words(power)} of rated power pass {held} however slowly."
+    return (Finding("resonance", "attention", sentence),)

@@ -1,7 +1,8 @@
 """Equations of motion at varying shaft speed: masses, stops, and the shaft with its torques.
 
-The state is s = (x, x', phi, phi', work put in, work dissipated, work of the shaft's friction).
-The shaft angle is part of it, so that the equations do not depend on time explicitly.
+The state is s = (x, x', phi, phi', speed of a converter's field, work put in, work dissipated, work
+of the shaft's friction). Shaft angle and field are part of it, so that the equations do not
+depend on time explicitly.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from flipflow.dynamics.law import (
 from flipflow.model.contact_law import NO_EXIT, OPEN
 
 UNBALANCE = 2  # power of omega with which its force grows
-SHAFT_STATES = 5  # of the shaft: phi, phi', work put in, work dissipated, work of friction
+SHAFT_STATES = 6  # phi, phi', speed of the field, work put in, work dissipated, work of friction
+MAINS, CONVERTER = 0, 1  # what a motor is fed by
 
 
 class Shaft(NamedTuple):
@@ -35,12 +37,20 @@ class Shaft(NamedTuple):
     breakdown_torque: float
     breakdown_slip: float
     synchronous_speed: float
+    pieces: Real  # (K, 5) begin and cubic of each piece of the torque below Kloss' formula
+    pieces_end: float  # speed at which they end
+    feed: int  # MAINS or CONVERTER
+    slip_torque: float  # of a converter: torque for one unit of slip
+    torque_limit: float
     friction: float  # constant torque against the motion
     viscous: float
     creep: float  # speed below which the constant torque fades
-    speed_low: float  # speeds at which the run ends, infinite for none
-    speed_high: float
+    weight: float  # m0r g, the largest torque of gravity on the unbalance
+    incline: float  # of the x direction to the horizontal, upwards
+    ends: Real  # (2,) speeds at which the run ends, infinite for none
     acceleration: Real  # (1,) given one
+    share: Real  # (1,) of the motor's torque on the mains: less in star
+    field_rate: Real  # (1,) acceleration of the converter's field
 
 
 class Equations(NamedTuple):
@@ -64,13 +74,35 @@ class Equations(NamedTuple):
 
 
 @kernel(inline=True)
-def motor_torque(shaft: Shaft, speed: float) -> float:
-    """T = 2 T_b s s_b / (s^2 + s_b^2), s = 1 - speed / synchronous speed (Kloss)."""
+def motor_torque(shaft: Shaft, speed: float, field: float) -> float:
+    """Torque on the mains by its curve, behind a converter by the slip and within the limit."""
+    if shaft.feed == CONVERTER:
+        torque = shaft.slip_torque * (field - speed)
+        return min(max(torque, -shaft.torque_limit), shaft.torque_limit)
+    return shaft.share[0] * _mains_torque(shaft, speed)
+
+
+@kernel(inline=True)
+def _mains_torque(shaft: Shaft, speed: float) -> float:
+    """T = 2 T_b s s_b / (s^2 + s_b^2), s = 1 - speed / synchronous speed (Kloss), or the pieces."""
+    if speed < shaft.pieces_end:
+        row = 0
+        while row + 1 < shaft.pieces.shape[0] and shaft.pieces[row + 1, 0] <= speed:
+            row += 1
+        one = shaft.pieces[row]
+        d = max(speed - one[0], 0.0)
+        return one[1] + d * (one[2] + d * (one[3] + d * one[4]))
     if shaft.breakdown_torque == 0.0:
         return 0.0
     slip = 1.0 - speed / shaft.synchronous_speed
     s_b = shaft.breakdown_slip
     return 2.0 * shaft.breakdown_torque * slip * s_b / (slip * slip + s_b * s_b)
+
+
+@kernel(inline=True)
+def gravity_torque(shaft: Shaft, angle: float) -> float:
+    """Torque of the unbalance's weight: it hangs where angle + incline is a quarter turn down."""
+    return -shaft.weight * math.cos(angle + shaft.incline)
 
 
 @kernel(inline=True)
@@ -84,8 +116,8 @@ def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> Non
     """Write ds/dt at ``point`` to ``rows[row]``, with the springs in their regimes.
 
     M a + C v + K x + sum d H = f_0 + sum p phi'^power + q phi'' with p = Re(vector exp(i n phi)),
-    q = Im(vector exp(i n phi)) / n of an unbalance, and J phi'' - q a = T - T_friction: phi''
-    follows after eliminating a.
+    q = Im(vector exp(i n phi)) / n of an unbalance, and J phi'' - q a = T - T_friction + T_gravity:
+    phi'' follows after eliminating a.
     """
     n = eq.static.shape[0]
     speed = point[2 * n + 1]
@@ -103,11 +135,12 @@ def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> Non
         eq.answer[i] = b
         against += eq.lever[i] * a
         reach += eq.lever[i] * b
-    torque = motor_torque(eq.shaft, speed)
+    torque = motor_torque(eq.shaft, speed, point[2 * n + 2])
     friction = friction_torque(eq.shaft, speed)
     alpha = eq.shaft.acceleration[0]
     if eq.shaft.free == 1:
-        alpha = (torque - friction + against) / (eq.shaft.inertia - reach)
+        gravity = gravity_torque(eq.shaft, point[2 * n])
+        alpha = (torque - friction + gravity + against) / (eq.shaft.inertia - reach)
     work = torque * speed
     for i in range(n):
         rows[row, i] = point[n + i]
@@ -116,9 +149,10 @@ def slopes(eq: Equations, regime: Int, point: Real, rows: Real, row: int) -> Non
             work += (eq.pull[i] + eq.lever[i] * alpha) * point[n + i]
     rows[row, 2 * n] = speed
     rows[row, 2 * n + 1] = alpha
-    rows[row, 2 * n + 2] = work
-    rows[row, 2 * n + 3] = dissipated
-    rows[row, 2 * n + 4] = friction * speed
+    rows[row, 2 * n + 2] = eq.shaft.field_rate[0]
+    rows[row, 2 * n + 3] = work
+    rows[row, 2 * n + 4] = dissipated
+    rows[row, 2 * n + 5] = friction * speed
 
 
 @kernel(inline=True)
@@ -205,8 +239,8 @@ def switching(
     if j == regime.shape[0]:
         speed, alpha = point[2 * n + 1], rows[row, 2 * n + 1]
         if which == 0:
-            return speed - eq.shaft.speed_high, alpha
-        return eq.shaft.speed_low - speed, -alpha
+            return speed - eq.shaft.ends[1], alpha
+        return eq.shaft.ends[0] - speed, -alpha
     y, v = gap_motion(eq, point, j)
     if regime[j] == OPEN:
         return (y - eq.stops.gap[j, 0], v) if which == 0 else (-eq.stops.gap[j, 1] - y, -v)
@@ -239,4 +273,4 @@ def switch(eq: Equations, regime: Int, point: Real, j: int, which: int) -> None:
     if regime[j] != OPEN:
         y, _ = gap_motion(eq, point, j)
         held = stored_energy(eq.stops, j, before, y)
-        point[2 * n + 3] += held - stored_energy(eq.stops, j, regime[j], y)
+        point[2 * n + 4] += held - stored_energy(eq.stops, j, regime[j], y)

@@ -9,13 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.model.constants import GRAVITY
 from flipflow.model.contact_law import engaged_side
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.starter import STAR_TORQUE, Converter, StarDelta
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.transient.history import ContactChange, History, stop_forces
-from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper, Stretch
+from flipflow.transient.time_stepping import (
+    WEIGHTLESS,
+    NormalDirection,
+    RungeKutta,
+    Stepper,
+    Stretch,
+    UnbalanceWeight,
+)
 
 Real = NDArray[np.float64]
 MOST_ROWS = 400_000  # rows after which a run is ended
@@ -58,6 +67,19 @@ def normal_direction(machine: Machine) -> NormalDirection | None:
     return NormalDirection(machine.main_mass + machine.floating_mass, k, c)
 
 
+def unbalance_weight(machine: Machine) -> UnbalanceWeight:
+    """Gravity on the unbalance of a screen; none where its ``deck_angle`` is not known."""
+    if not isinstance(machine, FlipFlowScreen) or machine.deck_angle is None:
+        return WEIGHTLESS
+    return UnbalanceWeight(machine.eccentric_moment * GRAVITY, machine.deck_angle)
+
+
+def hanging_angle(machine: Machine) -> float:
+    """Shaft angle in rad at which the unbalance hangs; 0 where no weight is considered."""
+    weight = unbalance_weight(machine)
+    return -0.5 * np.pi - weight.incline if weight.torque > 0.0 else 0.0
+
+
 def movable(machine: Machine) -> MechanicalSystem:
     """The machine as a system, refused without damping."""
     system = system_of(machine)
@@ -65,12 +87,12 @@ def movable(machine: Machine) -> MechanicalSystem:
     return system
 
 
-def at_rest(machine: Machine) -> Start:
-    """Everything at rest, the unbalance along +x."""
+def at_rest(machine: Machine, angle: float = 0.0) -> Start:
+    """Everything at rest, the unbalance at an angle to +x."""
     x = system_of(machine).static_position()
     if normal_direction(machine) is not None:
         x = np.append(x, 0.0)
-    return Start(np.concatenate([x, np.zeros(x.size)]), 0.0, 0.0)
+    return Start(np.concatenate([x, np.zeros(x.size)]), angle, 0.0)
 
 
 def run_history(
@@ -94,6 +116,7 @@ def run_history(
     stepper = Stepper(
         system, shaft, start.state, angle=start.angle, speed=start.speed, normal=normal,
         method=method, fastest=fastest, end_speeds=(slowest, np.inf),
+        weight=unbalance_weight(machine),
     )  # fmt: skip
     done: list[Stretch] = []
     changes: list[tuple[float, int, int]] = []
@@ -204,11 +227,11 @@ def _history(
     across = [s[:, n], s[:, size + n], slope[:, size + n]] if size > n else None
     columns = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
     stored = [stepper.stored_energy(s[k], contacts[k]) for k in (0, -1)]
-    worked, damped, rubbed = s[:, 2 * size + 2 :].T
+    field, worked, damped, rubbed = s[:, 2 * size + 2 :].T
     return History(
         system, t, x, v, slope[:, size : size + n], stop_forces(system, x, v, contacts),
         speed, s[:, 2 * size],
-        torque=shaft.torque(speed) if isinstance(shaft, Drive) else None,
+        torque=_torque(shaft, t, speed, field) if isinstance(shaft, Drive) else None,
         normal=None if across is None else np.column_stack(across),
         energy={
             "input": float(worked[-1]), "dissipated": float(damped[-1] + rubbed[-1]),
@@ -223,6 +246,22 @@ def _history(
         counters=stepper.counters,
         works={"input": worked, "dissipated": damped + rubbed, "friction": rubbed},
     )  # fmt: skip
+
+
+def _torque(drive: Drive, t: Real, speed: Real, field: Real) -> Real:
+    """Torque of the motor at the shaft over a run in N m, as it was switched."""
+    starter = drive.starter
+    if isinstance(starter, Converter):
+        return drive.converter_torque(starter, speed, field)
+    torque = drive.torque(speed)
+    if isinstance(starter, StarDelta):
+        in_delta = np.full(t.size, False)
+        if starter.time is not None:
+            in_delta |= t >= starter.time
+        if starter.speed is not None:
+            in_delta |= np.maximum.accumulate(speed) >= starter.speed / drive.ratio
+        torque = np.where(in_delta, torque, STAR_TORQUE * torque)
+    return torque
 
 
 _PARTS = ("t", "states", "slopes")

@@ -13,29 +13,34 @@ from numpy.typing import NDArray
 from flipflow.compiled import status
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_monitor, checked_positive, checked_speed
+from flipflow.model.arguments import (
+    checked_monitor,
+    checked_number,
+    checked_positive,
+    checked_speed,
+)
 from flipflow.model.constants import GRAVITY, RPM
-from flipflow.model.drive import Drive, SpeedProfile, assumed_drive
+from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
-from flipflow.model.numerals import digits
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
+from flipflow.transient.chosen_drive import NOT_SETTLED, default_drive, fitted_drive
 from flipflow.transient.history import History
 from flipflow.transient.shaft_equations import SHAFT_STATES
 from flipflow.transient.speed_run import (
-    MOST_TURNS,
     STATUS,
     at_rest,
+    hanging_angle,
     movable,
     normal_direction,
     run_history,
     settled_start,
-    steady_power,
     swings,
     turn_means,
+    unbalance_weight,
 )
-from flipflow.transient.time_stepping import RungeKutta, Stretch
+from flipflow.transient.time_stepping import CREEP, RungeKutta, Stretch
 
 Outcome = Literal[
     "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
@@ -59,6 +64,20 @@ class NaturalFrequency(NamedTuple):
     omega: float
 
 
+@dataclass(frozen=True)
+class RunSummary:
+    """A start or a coast-down without its motion; the fields are those of :class:`RunUp`."""
+
+    outcome: Outcome
+    verdict: str
+    angle: float
+    final_speed: float
+    time_to_speed: float | None
+    duration: float
+    passing: float | None
+    peaks: Mapping[str, Peak]
+
+
 @dataclass(frozen=True, eq=False)
 class RunUp:
     """A start or a coast-down, and what it does to the machine.
@@ -72,9 +91,10 @@ class RunUp:
     history
         The motion in time.
     outcome
-        "reached", "captured" (the speed stays near a natural frequency), "short" (it stays below
-        the working speed elsewhere), "not started", "unfinished" (still changing when the time was
-        up), "stopped" (coast-down), "followed" (a given speed over time).
+        "reached" (the speed ends within 5 % of the working speed, or above), "captured" (it stays
+        near a natural frequency, the motor overloaded), "short" (it stays below the working speed
+        elsewhere), "not started", "unfinished" (still changing when the time was up), "stopped"
+        (coast-down), "followed" (a given speed over time).
     final_speed
         Speed at the end in rad/s; with a motor the mean over the last turns.
     near
@@ -84,14 +104,17 @@ class RunUp:
     passing
         Time in s between 0.8 and 1.25 times w01; None where it is not passed.
     peaks
-        ``"main_amplitude"``, ``"relative_amplitude"`` (half the way from one turning point to the
-        next, m), ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has
-        them.
+        ``"main_amplitude"`` (m; the greatest distance from rest in any direction, or along the
+        surface half the way from one turning point to the next, where that direction alone is
+        known), ``"relative_amplitude"`` (m; half that way), ``"shear_strain"``,
+        ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has them.
     power
         Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
         the speed is given or changes.
     notes
         What was assumed or left out.
+    angle
+        Shaft angle in rad in which it began.
     """
 
     machine: Machine
@@ -106,6 +129,7 @@ class RunUp:
     peaks: Mapping[str, Peak]
     power: Mapping[str, float]
     notes: tuple[str, ...]
+    angle: float = 0.0
 
     def __repr__(self) -> str:
         return f"RunUp({self.outcome}, {self.final_speed:.6g} rad/s after {self.duration:.4g} s)"
@@ -117,11 +141,20 @@ class RunUp:
 
     @property
     def time_to_speed(self) -> float | None:
-        """Time in s at which the shaft first has the working speed, within five per cent."""
-        reached = np.flatnonzero(self.history.omega >= AT_SPEED * self.speed)
-        if self.outcome == "stopped" or reached.size == 0:
+        """Time in s at which the shaft first has the working speed; None where it never has."""
+        return None if self.outcome == "stopped" else self._time_at(self.speed)
+
+    def _time_at(self, speed: float) -> float | None:
+        """Time in s at which the shaft first has a speed in rad/s, between two steps."""
+        omega, t = self.history.omega, self.history.t
+        reached = np.flatnonzero(omega >= speed)
+        if reached.size == 0:
             return None
-        return float(self.history.t[reached[0]])
+        k = int(reached[0])
+        if k == 0 or omega[k] == omega[k - 1]:
+            return float(t[k])
+        share = (speed - omega[k - 1]) / (omega[k] - omega[k - 1])
+        return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
     @property
     def verdict(self) -> str:
@@ -132,8 +165,8 @@ class RunUp:
             held = f"{self.near.name} = {self.near.omega * RPM:.0f} rpm"
             return f"captured at {now}, near the natural frequency {held}"
         sentences = {
-            "reached": f"reaches {wanted} in {self.time_to_speed or 0.0:.2g} s, then runs at {now}",
-            "short": f"stays at {now}, below the working speed of {wanted}: the drive is too weak",
+            "reached": f"reaches {self._reached(wanted)}, then runs at {now}",
+            "short": f"stays at {now}, below the working speed of {wanted}: {self._why_short}",
             "not started": "does not start: the torque at rest does not turn the shaft",
             "unfinished": f"at {now} after {seconds}, still changing; calculate a longer time",
             "stopped": f"comes down from {wanted} in {seconds}",
@@ -141,9 +174,30 @@ class RunUp:
         }
         return sentences[self.outcome]
 
+    def _reached(self, wanted: str) -> str:
+        """When it has its speed; 95 % of it, where it never has the whole."""
+        if (time := self.time_to_speed) is not None:
+            return f"{wanted} in {time:.3g} s"
+        time = self._time_at(AT_SPEED * self.speed) or 0.0
+        return f"{100.0 * AT_SPEED:.0f} % of {wanted} in {time:.3g} s"
+
+    @property
+    def summary(self) -> RunSummary:
+        """The run without its motion."""
+        return RunSummary(
+            self.outcome, self.verdict, self.angle, self.final_speed, self.time_to_speed,
+            self.duration, self.passing, self.peaks,
+        )  # fmt: skip
+
+    @property
+    def _why_short(self) -> str:
+        end = self.drive.end_speed if isinstance(self.drive, Drive) else None
+        if end is not None and end <= self.speed:
+            return f"its synchronous speed is {end * RPM:.0f} rpm"
+        return "the drive is too weak"
+
 
 Real = NDArray[np.float64]
-POWER_FACTOR = 4.0  # assumed rated power over the power that the dampers take at working speed
 START_SECONDS = 60.0  # longest start in s unless told otherwise
 COAST_SECONDS = 600.0  # longest coast-down in s unless told otherwise
 MOST_SECONDS = 3600.0  # longest run in s that may be asked for
@@ -155,7 +209,6 @@ STOPPED = 0.02  # share of its first speed at which a coast-down ends
 NEAR = (0.8, 1.1)  # final speed over the natural frequency by which a start is captured
 PASSING = (0.8, 1.25)  # speeds over w01 between which the time of passing is taken
 FREE = 1e-6  # a natural frequency below this share of the highest is that of a free body
-NOT_SETTLED = f"had not settled after {MOST_TURNS} turns from rest"
 UNSETTLED = (
     f"The motion in which the coast-down begins {NOT_SETTLED}: begun a turn later, it would have "
     "other peaks."
@@ -168,17 +221,20 @@ def start_up(
     *,
     speed: float | None = None,
     duration: float | None = None,
+    angle: float | None = None,
     method: RungeKutta | None = None,
     monitor: Monitor | None = None,
 ) -> RunUp:
     r"""Start a machine from rest.
 
-    With the shaft's angle phi, inertia J, motor torque T and friction T_f,
+    With shaft angle phi, inertia J, motor torque T, friction T_f and deck angle alpha,
 
     .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
-              - \ddot y_1 \cos\varphi) .
+              - \ddot y_1 \cos\varphi) - m_0 r g \cos(\varphi + \alpha) .
 
-    Gravity on the unbalance, a torque of up to m0 r g, is left out; a note says so.
+    The last term, gravity on the unbalance, is left out for a machine without ``deck_angle``; a
+    note says so. Where the ratio of the drive is open, or the end of a converter's ramp, it is
+    chosen such that the shaft settles at working speed; the result's drive has it.
 
     Parameters
     ----------
@@ -191,6 +247,9 @@ def start_up(
         Working speed in rad/s; None: the drive's rated speed, or the profile's highest.
     duration
         Longest time in s; None: 60 s or the profile's; a run ends when nothing changes any more.
+    angle
+        Shaft angle at rest in rad; None: the unbalance hangs, at -pi/2 - alpha, or 0 where gravity
+        is left out.
     method
         How it is stepped.
     monitor
@@ -211,8 +270,11 @@ def start_up(
     checked_monitor(monitor)
     shaft = _shaft(machine, drive, given, method)
     wanted = given or _working_speed(shaft)
+    begin = hanging_angle(machine)
+    if angle is not None:
+        begin = checked_number("angle", angle, "give a finite angle in rad")
     history = run_history(
-        machine, shaft, at_rest(machine), _longest(shaft, duration, START_SECONDS),
+        machine, shaft, at_rest(machine, begin), _longest(shaft, duration, START_SECONDS),
         fastest=_fastest(shaft, wanted), method=method, monitor=monitor,
         enough=None if isinstance(shaft, SpeedProfile) else _steady,
     )  # fmt: skip
@@ -230,8 +292,8 @@ def coast_down(
 ) -> RunUp:
     """Let a machine come down from its settled motion at ``speed``, the motor switched off.
 
-    Gravity on the unbalance is left out, so that the last turns come out longer than they are; a
-    note tells the speed below which the shaft would swing.
+    Gravity on the unbalance is considered as in :func:`start_up`. A free run ends where the speed
+    first falls to 2 % of ``speed``: the shaft stops, or begins to swing.
 
     Parameters
     ----------
@@ -274,25 +336,6 @@ def coast_down(
     return _judged(machine, shaft, omega, history, unsettled)
 
 
-def default_drive(machine: Machine, speed: float | None, method: RungeKutta | None = None) -> Drive:
-    """A plausible drive for a screen whose drive is not known; what it assumes stands in it.
-
-    The rated power is four times what the dampers take at working speed: starting asks for more
-    than running. The rest is as in :func:`flipflow.model.drive.assumed_drive`.
-    """
-    if not isinstance(machine, FlipFlowScreen):
-        raise InputError("drive", None, "give a Drive or a SpeedProfile for this machine")
-    if speed is None:
-        raise InputError("speed", None, "give the working speed, or a drive")
-    steady, settled = steady_power(machine, speed, method)
-    power = POWER_FACTOR * steady
-    drive = assumed_drive(machine.eccentric_moment, speed, power)
-    rated = f"{digits(power / 1e3)} kW" if power >= 100.0 else f"{power:.3g} W"
-    word = f"rated power {rated}, four times what the dampers take at working speed"
-    word += "" if settled else f", in the mean over 20 turns of a motion that {NOT_SETTLED}"
-    return replace(drive, assumed=(word, *drive.assumed))
-
-
 def _shaft(
     machine: Machine,
     drive: Drive | SpeedProfile | None,
@@ -306,7 +349,9 @@ def _shaft(
         return default_drive(machine, speed, method)
     if not isinstance(drive, (Drive, SpeedProfile)):
         raise InputError("drive", drive, "give an ff.Drive or an ff.SpeedProfile")
-    return drive
+    if speed is None or isinstance(drive, SpeedProfile):
+        return drive
+    return fitted_drive(machine, drive, speed, method)
 
 
 def _longest(shaft: Drive | SpeedProfile, duration: float | None, usual: float) -> float:
@@ -331,12 +376,14 @@ def _working_speed(drive: Drive | SpeedProfile) -> float:
 def _fastest(drive: Drive | SpeedProfile, speed: float) -> float:
     if isinstance(drive, SpeedProfile):
         return max(*drive.speeds, speed)
-    return max(drive.synchronous_speed or 0.0, speed)
+    return max(drive.synchronous_speed or 0.0, drive.end_speed or 0.0, speed)
 
 
 def _steady(done: list[Stretch]) -> bool:
-    """Whether the mean speed is the same over the last turns and over those before."""
+    """Whether the shaft stands, or has the same mean speed over the last turns and those before."""
     recent = done[-RECENT:]
+    if len(recent) == RECENT and np.abs(recent[-1].states[:, 1 - SHAFT_STATES]).max() < CREEP:
+        return True  # held by friction, which fades with the speed
     t = np.concatenate([one.t for one in recent])
     angle = np.concatenate([one.states[:, -SHAFT_STATES] for one in recent])
     marks = angle[-1] - 2.0 * np.pi * LAST_TURNS * np.array([0.0, 1.0, 2.0])
@@ -366,6 +413,7 @@ def _judged(
         _passing(history, first), _peaks(machine, history),
         _power(history) if steady and isinstance(drive, Drive) else {},
         (*_ended_early(history), *notes, *_notes(machine, drive)),
+        float(history.angle[0]),
     )  # fmt: skip
 
 
@@ -387,19 +435,32 @@ def _outcome(
     if drive.motor is None:
         down = history.omega[-1] <= 1.001 * STOPPED * speed
         return ("stopped" if down else "unfinished"), None
-    if final < AT_REST * speed and float(drive.torque(0.0)) <= drive.friction:
+    if final < AT_REST * speed and (
+        drive.torque_at_rest <= drive.friction or _turned_back(history)
+    ):
         return "not started", None
     if not _is_steady(history):
         return "unfinished", None
-    return _steady_outcome(speed, final, frequencies)
+    return _steady_outcome(drive, speed, final, frequencies)
+
+
+def _turned_back(history: History) -> bool:
+    """Whether the shaft turned, and stood or swung back within its first turn."""
+    within = float(history.angle.max() - history.angle[0]) < 2.0 * np.pi
+    after = np.maximum.accumulate(history.omega) > CREEP
+    return within and bool((history.omega[after] <= CREEP).any())
 
 
 def _steady_outcome(
-    speed: float, final: float, frequencies: Mapping[str, float]
+    drive: Drive, speed: float, final: float, frequencies: Mapping[str, float]
 ) -> tuple[Outcome, NaturalFrequency | None]:
+    """A motor that gives no more than its rated torque is not held by anything: it runs."""
     if final >= AT_SPEED * speed:
         return "reached", None
-    if not frequencies:
+    rated = drive.motor.rated_torque * drive.ratio if drive.motor else 0.0
+    if not frequencies or (
+        float(drive.torque(final)) <= rated and final > 0.5 * (drive.end_speed or 0.0)
+    ):
         return "short", None
     name = min(frequencies, key=lambda one: abs(math.log(final / frequencies[one])))
     if NEAR[0] <= final / frequencies[name] <= NEAR[1]:
@@ -437,23 +498,44 @@ def _passing(history: History, omega: float) -> float | None:
 
 def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
     found = {}
-    names = ("main", "relative") if isinstance(machine, FlipFlowScreen) else history.system.named
-    for which in names:
+    screen = machine if isinstance(machine, FlipFlowScreen) else None
+    for which in ("main", "relative") if screen else history.system.named:
         times, sizes = swings(history.t, history.displacement(which), history.velocity(which))
         if sizes.size:
-            found[f"{which}_amplitude"] = _peak(history, times, sizes)
-    if isinstance(machine, FlipFlowScreen):
-        found["foundation_force"] = _peak(history, history.t, foundation_force(machine, history))
+            found[f"{which}_amplitude"] = _greatest(history, times, sizes)
+    if screen is not None:
+        if history.normal is not None:
+            reach = np.hypot(history.displacement("main"), history.normal[:, 0])
+            found["main_amplitude"] = _peak(history, reach)
+        relative = found.get("relative_amplitude")
+        if relative is not None and screen.shear_height is not None:
+            strain = relative.value / screen.shear_height
+            found["shear_strain"] = replace(relative, value=strain)
+        found["foundation_force"] = _peak(history, foundation_force(screen, history))
     for j in range(history.force.shape[1]):
         name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"
-        found[name] = _peak(history, history.t, np.abs(history.stop_force(j)))
+        found[name] = _peak(history, np.abs(history.stop_force(j)))
     return found
 
 
-def _peak(history: History, t: Real, values: Real) -> Peak:
+def _greatest(history: History, times: Real, values: Real) -> Peak:
+    """The greatest of single values."""
     k = int(values.argmax())
-    omega = float(np.interp(t[k], history.t, history.omega))
-    return Peak(float(values[k]), omega, float(t[k]))
+    t = float(times[k])
+    return Peak(float(values[k]), float(np.interp(t, history.t, history.omega)), t)
+
+
+def _peak(history: History, values: Real) -> Peak:
+    """The greatest value; between steps, the top of the parabola through it and its neighbours."""
+    times, k = history.t, int(values.argmax())
+    t, value = float(times[k]), float(values[k])
+    if 0 < k < times.size - 1 and times[k - 1] < t < times[k + 1]:
+        rows = slice(k - 1, k + 2)
+        bend, slope, _ = np.polyfit(times[rows] - t, values[rows], 2)
+        if bend < 0.0:
+            away = float(np.clip(-0.5 * slope / bend, times[k - 1] - t, times[k + 1] - t))
+            t, value = t + away, max(value, value + away * float(slope + bend * away))
+    return Peak(value, float(np.interp(t, times, history.omega)), t)
 
 
 def foundation_force(screen: FlipFlowScreen, history: History) -> Real:
@@ -482,7 +564,8 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
     if isinstance(machine, FlipFlowScreen) and normal_direction(machine) is None:
         notes.append(
             "Normal direction not checked, for want of isolation.normal_stiffness and "
-            "normal_damping: amplitudes and forces are those along the surface."
+            "normal_damping: amplitudes and forces are those along the surface, the force on the "
+            "foundation is larger."
         )
     if isinstance(drive, Drive):
         notes += [*_gravity(machine, drive), *(f"Assumed: {text}." for text in drive.assumed)]
@@ -490,19 +573,24 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
 
 
 def _gravity(machine: Machine, drive: Drive) -> list[str]:
-    """What the weight of the unbalance, which the equations leave out, would change."""
+    """What the weight of the unbalance would change, where the equations leave it out."""
+    if unbalance_weight(machine).torque > 0.0:
+        return []
     forces = machine.system().excitations
     moment = sum(float(np.abs(f.vector).max()) for f in forces if isinstance(f, Unbalance))
     torque = moment * GRAVITY
     if torque == 0.0:
         return []
-    left_out = f"Gravity on the unbalance, up to {torque:.3g} N m at the shaft, is not calculated."
+    left_out = (
+        f"Weight not considered: gravity on the unbalance, up to {torque:.3g} N m at the shaft, "
+        "is not calculated."
+    )
     if drive.motor is None:
         over = 2.0 * math.sqrt(torque / drive.inertia) * RPM
         swings = f"Coasting below about {over:.0f} rpm, the shaft would swing instead of turning."
         return [left_out, swings]
-    at_rest = float(drive.torque(0.0))
+    at_rest = drive.torque_at_rest
     if at_rest < torque:
-        lift = f"The motor's torque at rest, {at_rest:.3g} N m, may not lift the unbalance."
+        lift = f"The torque at rest, {at_rest:.3g} N m at the shaft, may not lift the unbalance."
         return [left_out, lift]
     return [left_out]

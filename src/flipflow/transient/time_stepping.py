@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,19 @@ from flipflow.model.arguments import checked_number, checked_positive, checked_w
 from flipflow.model.contact_law import stored_energy
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.excitation import Unbalance
+from flipflow.model.starter import STAR_TORQUE, Converter, StarDelta
 from flipflow.model.system import MechanicalSystem
+from flipflow.model.torque_curve import NO_PIECES
 from flipflow.transient import runge_kutta
 from flipflow.transient.runge_kutta import Walk
-from flipflow.transient.shaft_equations import SHAFT_STATES, UNBALANCE, Equations, Shaft
+from flipflow.transient.shaft_equations import (
+    CONVERTER,
+    MAINS,
+    SHAFT_STATES,
+    UNBALANCE,
+    Equations,
+    Shaft,
+)
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4, Tableau
 
 Real = NDArray[np.float64]
@@ -70,9 +80,23 @@ class NormalDirection:
     damping: float
 
 
+class UnbalanceWeight(NamedTuple):
+    """Gravity on the unbalance: m0r g in N m, and the incline of the x direction in rad."""
+
+    torque: float
+    incline: float
+
+    def energy(self, angle: float) -> float:
+        """Energy in J that lifting it to a shaft angle in rad takes, from the shaft's height."""
+        return self.torque * math.sin(angle + self.incline)
+
+
+WEIGHTLESS = UnbalanceWeight(0.0, 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Rows of a record: times (n,), states and their slopes (n, 2 N + 5), contacts (n, m)."""
+    """Rows of a record: times (n,), states and their slopes (n, 2 N + 6), contacts (n, m)."""
 
     t: Real
     states: Real
@@ -102,6 +126,8 @@ class Stepper:
         Highest shaft speed in rad/s that is expected, for the longest step.
     end_speeds
         The run ends where the speed falls to the first or rises to the second.
+    weight
+        Gravity on the unbalance.
     """
 
     def __init__(
@@ -116,6 +142,7 @@ class Stepper:
         method: RungeKutta | None = None,
         fastest: float,
         end_speeds: tuple[float, float] = (-math.inf, math.inf),
+        weight: UnbalanceWeight = WEIGHTLESS,
     ) -> None:
         self.method = method or RungeKutta()
         self.profile = shaft if isinstance(shaft, SpeedProfile) else None
@@ -130,14 +157,15 @@ class Stepper:
         self.power = np.array([power for _, power in terms], np.int64)
         if drive is not None:
             _check_drive(drive, inverse, vector, self.order, linear)
-        self.vector, self.drive = vector, drive
+        self.vector, self.drive, self.weight = vector, drive, weight
         self.K, self.static = K, static
-        self._acceleration = np.zeros(1)
+        self._plan = _plan(shaft, end_speeds)
+        self._dials = Dials(np.zeros(1), np.ones(1), np.zeros(1), np.array(end_speeds))
         self.equations = Equations(
             inverse_mass=inverse, damping=C, stiffness=K,
             direction=self._directions(), stops=stops_of(linear.springs), static=static,
             circulation=0.5 * (K - K.T), vector=vector, order=self.order, power=self.power,
-            shaft=_shaft(drive, end_speeds, self._acceleration),
+            shaft=_shaft(drive, weight, self._dials),
             pull=np.zeros(self.size), lever=np.zeros(self.size), push=np.zeros(self.size),
             answer=np.zeros(self.size),
         )  # fmt: skip
@@ -169,14 +197,18 @@ class Stepper:
 
     def run(self, until: float) -> Iterator[Stretch]:
         """Step to time ``until`` in s, handing over the record whenever it is full."""
-        for end, acceleration in self._legs(until):
-            self._acceleration[0] = acceleration
+        for leg in self._plan:
+            if leg.until <= self.time or self.time >= until:
+                continue
+            self._dials.set(leg)
+            end = min(leg.until, until)
             while True:
                 self.code = runge_kutta.advance(self.equations, self.walk, end)
                 if self.code != status.POINT_LIMIT:
                     break
                 yield self._emptied()
-            if self.code != status.OK:
+            switched = leg.switch_over is not None and self.code == status.REACHED_UPPER
+            if self.code != status.OK and not switched:
                 break
         yield self._emptied()
 
@@ -200,18 +232,8 @@ class Stepper:
             turns = np.exp(1j * self.order * angle) / self.order
             lever = (turns @ self.vector).imag
             energy += 0.5 * self.drive.inertia * speed**2 - speed * float(lever @ v)
+            energy += self.weight.energy(float(angle))
         return energy
-
-    def _legs(self, until: float) -> Iterator[tuple[float, float]]:
-        """End and acceleration of each straight piece of the profile; one piece for a drive."""
-        if self.profile is not None:
-            times, speeds = self.profile.times, self.profile.speeds
-            for k in range(1, len(times)):
-                if self.time < times[k] and self.time < until:
-                    slope = (speeds[k] - speeds[k - 1]) / (times[k] - times[k - 1])
-                    yield min(times[k], until), slope
-        if self.time < until:
-            yield until, 0.0
 
     def _emptied(self) -> Stretch:
         walk, rows = self.walk, int(self.walk.tally[runge_kutta.ROWS])
@@ -258,7 +280,7 @@ class Stepper:
         length = max(thrown, float(np.abs(s[:n]).max()))
         gaps = [abs(gap) for spring in self.springs for gap in spring.gaps if math.isfinite(gap)]
         length = max([length, *gaps]) or float(reach.max()) / fastest**2 or 1.0
-        sizes = [*[length] * n, *[length * fastest] * n, 1.0, fastest, *[math.inf] * 3]
+        sizes = [*[length] * n, *[length * fastest] * n, 1.0, fastest, *[math.inf] * 4]
         return self.method.tolerance * np.array(sizes)
 
 
@@ -286,20 +308,85 @@ def _longest_step(M: Real, K: Real, fastest: float) -> float:
     return 2.0 * math.pi / STEPS_PER_TURN / max(fastest, highest)
 
 
-def _shaft(drive: Drive | None, end_speeds: tuple[float, float], acceleration: Real) -> Shaft:
+@dataclass(frozen=True)
+class Leg:
+    """A part of a run in which nothing is switched: its end in s, and how the shaft is driven.
+
+    ``acceleration`` of a given speed, ``field_rate`` of a converter's field in rad/s^2; ``share``
+    of its torque that a motor gives; speeds in rad/s at which the run ends, and at which the leg
+    does.
+    """
+
+    until: float
+    ends: tuple[float, float]
+    acceleration: float = 0.0
+    share: float = 1.0
+    field_rate: float = 0.0
+    switch_over: float | None = None
+
+
+class Dials(NamedTuple):
+    """What is set from leg to leg, as the equations read it."""
+
+    acceleration: Real  # (1,)
+    share: Real  # (1,)
+    field_rate: Real  # (1,)
+    ends: Real  # (2,)
+
+    def set(self, leg: Leg) -> None:
+        """Turn them as a leg says."""
+        self.acceleration[0], self.share[0] = leg.acceleration, leg.share
+        self.field_rate[0], self.ends[:] = leg.field_rate, leg.ends
+        if leg.switch_over is not None:
+            self.ends[1] = leg.switch_over
+
+
+def _plan(shaft: Drive | SpeedProfile, ends: tuple[float, float]) -> tuple[Leg, ...]:
+    """The legs of a run: straight pieces of a profile, star and delta, the ramp of a converter."""
+    last = Leg(math.inf, ends)
+    if isinstance(shaft, SpeedProfile):
+        points = list(zip(shaft.times, shaft.speeds, strict=True))
+        rises = ((b, (v - u) / (b - a)) for (a, u), (b, v) in itertools.pairwise(points))
+        return (*(Leg(end, ends, acceleration=rise) for end, rise in rises), last)
+    starter = shaft.starter
+    if isinstance(starter, StarDelta):
+        speed = None if starter.speed is None else starter.speed / shaft.ratio
+        star = Leg(starter.time or math.inf, ends, share=STAR_TORQUE, switch_over=speed)
+        return (star, last)
+    if isinstance(starter, Converter):
+        rate = starter.ramp / shaft.ratio
+        return (Leg((shaft.end_speed or 0.0) / rate, ends, field_rate=rate), last)
+    return (last,)
+
+
+def _shaft(drive: Drive | None, weight: UnbalanceWeight, dials: Dials) -> Shaft:
     motor = None if drive is None else drive.motor
+    ratio = 1.0 if drive is None else drive.ratio
+    curve = NO_PIECES if motor is None else motor.curve.scaled(ratio, 1.0 / ratio)
+    starter = None if drive is None else drive.starter
+    slope, limit = 0.0, 0.0
+    if drive is not None and isinstance(starter, Converter):
+        slope, limit = drive.converter_slope_and_limit(starter)
     return Shaft(
         free=int(drive is not None),
         inertia=1.0 if drive is None else float(drive.inertia),
-        breakdown_torque=0.0 if not (drive and motor) else drive.ratio * motor.largest_torque,
+        breakdown_torque=0.0 if motor is None else ratio * motor.largest_torque,
         breakdown_slip=1.0 if motor is None else float(motor.breakdown_slip),
-        synchronous_speed=1.0 if not (drive and motor) else motor.synchronous_speed / drive.ratio,
+        synchronous_speed=1.0 if motor is None else motor.synchronous_speed / ratio,
+        pieces=np.ascontiguousarray(curve.pieces),
+        pieces_end=float(curve.end),
+        feed=CONVERTER if isinstance(starter, Converter) else MAINS,
+        slip_torque=slope,
+        torque_limit=limit,
         friction=0.0 if drive is None else float(drive.friction),
         viscous=0.0 if drive is None else float(drive.viscous_friction),
         creep=CREEP,
-        speed_low=float(end_speeds[0]),
-        speed_high=float(end_speeds[1]),
-        acceleration=acceleration,
+        weight=float(weight.torque),
+        incline=float(weight.incline),
+        ends=dials.ends,
+        acceleration=dials.acceleration,
+        share=dials.share,
+        field_rate=dials.field_rate,
     )
 
 

@@ -1,0 +1,70 @@
+"""Does it start: the start of every load case in one sentence, for page, terminal and document."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flipflow.model.constants import RPM
+from flipflow.studies.drive_check import Finding
+from flipflow.studies.start_and_blows import CaseRuns, Transients
+
+NO_SPEED = "not checked, for the machine file gives no working speed."
+ASSUMED = "drive assumed"
+
+
+def does_it_start(found: Transients | None) -> str:
+    """Whether the machine starts, how fast, or why not and what would do."""
+    if found is None:
+        return NO_SPEED
+    if found.start is None:
+        return f"not checked: {found.reasons['start']}."
+    drive = f" ({drive_words(found)})"
+    if found.failed:
+        return f"no{drive}: {_failure(found.failed, len(found.cases))}.{_remedies(found.findings)}"
+    return f"yes{drive}: {_success(found)}.{_remedies(found.findings)}"
+
+
+def drive_words(found: Transients) -> str:
+    """How far the drive is given."""
+    if found.assumed:
+        return ASSUMED
+    return f"{ASSUMED} in part" if found.rests_on_assumed else "drive of the machine file"
+
+
+def in_cases(names: Sequence[str], count: int) -> str:
+    """In which load cases, in words; of many only their number."""
+    if len(names) == count:
+        return "in every load case" if count > 1 else f"in case {names[0]}"
+    if len(names) > MOST_NAMED:
+        return f"in {len(names)} of {count} load cases"
+    return f"in {'case' if len(names) == 1 else 'cases'} {'; '.join(names)}"
+
+
+MOST_NAMED = 3
+
+
+def _failure(failed: tuple[CaseRuns, ...], count: int) -> str:
+    """What becomes of the starts that fail: those of the first kind in their cases."""
+    told = failed[0].start
+    return f"{in_cases([one.case for one in failed], count)} it {told.verdict if told else ''}"
+
+
+def _success(found: Transients) -> str:
+    times = [one.start.time_to_speed for one in found.cases if one.start]
+    last = [one.start.final_speed for one in found.cases if one.start]
+    run = found.start
+    wanted = "" if run is None else f"{run.speed * RPM:.4g} rpm"
+    known = [time for time in times if time is not None]
+    if len(known) < len(times) or not known:
+        reached = "" if run is None else run.verdict
+    else:
+        reached = f"reaches {wanted} in at most {max(known):.3g} s"
+        low, high = (f"{end * RPM:.0f}" for end in (min(last, default=0.0), max(last, default=0.0)))
+        reached += f", then {low if low == high else f'{low} to {high}'} rpm"
+    cases = " in every load case" if len(found.cases) > 1 else ""
+    return f"it {reached}{cases}"
+
+
+def _remedies(findings: tuple[Finding, ...]) -> str:
+    """The findings on the drive as sentences of their own."""
+    return "".join(f" {one.sentence[:1].upper()}{one.sentence[1:]}" for one in findings)
