@@ -7,9 +7,10 @@ import sys
 import textwrap
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
 from flipflow.errors import Cancelled
@@ -24,15 +25,10 @@ from flipflow.results.store import (
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from flipflow.plotting.figure import Figure
+
 CLOCK = 0.05  # s by which the clock of files may be late
 STOPPED, NOTHING = "Stopped by the user", "nothing is written"
-
-
-class Picture(Protocol):
-    """What writes itself to a file, as a figure does."""
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write to a file, in the format its ending names."""
 
 
 class Destination:
@@ -78,9 +74,9 @@ class Destination:
         """Whether the terminal is for words; else it is for JSON alone."""
         return self.json != TERMINAL
 
-    def picture(self, name: str, picture: Picture) -> None:
-        """Write a figure into the folder."""
-        picture.write(self.path(name))
+    def picture(self, name: str, figure: Figure, subject: str = "") -> None:
+        """Write a figure, which carries what it belongs to, into the folder."""
+        replace(figure, subject=subject).write(self.path(name))
         self.wrote(name)
 
     def data(self, name: str, document: Mapping[str, object]) -> None:

@@ -48,15 +48,16 @@ PAGE = """<!DOCTYPE html>
 <link rel="icon" href="data:,">
 <style>body {{ font: 14px {family}; color: {ink}; width: {width}px; margin: 1.5em auto; }}
 h1 {{ font-size: 1.3em; }}</style></head>
-<body><h1>{title}</h1>{figure}<p>{caption}</p>
+<body><h1>{title}</h1>{subject}{figure}<p>{caption}</p>
 <script>{library}</script><script>{start}</script></body></html>
 """
 
 
 def page(figure: PanelGrid) -> str:
     """One HTML page with the figure, plotly.js embedded."""
+    subject = f"<p>{html.escape(figure.subject)}</p>" if figure.subject else ""
     return PAGE.format(
-        title=html.escape(figure.title), caption=html.escape(figure.caption), family=FAMILY,
+        subject=subject, title=html.escape(figure.title), caption=html.escape(figure.caption), family=FAMILY,
         ink=INK, width=WIDTH, figure=element(figure), library=library(), start=START,
     )  # fmt: skip
 

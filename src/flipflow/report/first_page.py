@@ -279,7 +279,8 @@ def _reached(omega: float, cases: tuple[CaseAssessment, ...]) -> str:
 def _bound(bound: Bound, region_end: str) -> str:
     """What ends the allowed range; ``region_end`` says what ends the operating region there."""
     if bound.limit == REGION:
-        return region_end
+        words = region_end.removesuffix(")")
+        return f"{words}{', ' if words != region_end else ' ('}empty machine)"
     if bound.limit == "speed":
         return "the limit on speed"
     if bound.limit == STABILITY:
