@@ -107,7 +107,7 @@ def test_the_document_of_a_command_opens_as_what_was_found(command, monkeypatch,
 
 
 def test_every_command_with_a_document_is_tried():
-    from flipflow.cli.main import COMMANDS as ALL  # noqa: PLC0415  the command line is slow to load
+    from flipflow.cli.app import COMMANDS as ALL  # noqa: PLC0415  the command line is slow to load
 
     assert {one.__name__ for one in ALL} - NO_RESULT == set(COMMANDS)
 
