@@ -28,6 +28,7 @@ _HOME = {
     "switch_branch": "flipflow.continuation.continue_orbit",
     "continue_fold": "flipflow.continuation.continue_field",
     "assess": "flipflow.studies.assessment",
+    "compare": "flipflow.studies.compare",
     "simulate": "flipflow.transient.simulate",
     "sweep": "flipflow.transient.sweep",
     "ramp": "flipflow.studies.ramp",
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
     from flipflow.plotting.dispatch import figure as figure
     from flipflow.studies.assessment import assess as assess
     from flipflow.studies.basins import basins as basins
+    from flipflow.studies.compare import compare as compare
     from flipflow.studies.jump_risk import jump_risk as jump_risk
     from flipflow.studies.loading import loading as loading
     from flipflow.studies.operating_region import operating_region as operating_region

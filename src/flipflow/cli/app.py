@@ -16,6 +16,7 @@ from flipflow import __version__
 from flipflow.cli.analyze import analyze
 from flipflow.cli.basins import basins
 from flipflow.cli.check import check
+from flipflow.cli.compare import compare
 from flipflow.cli.destination import NOTHING, STOPPED
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
@@ -40,6 +41,7 @@ COMMANDS = (
     analyze,
     basins,
     check,
+    compare,
     new,
     schema,
     simulate,

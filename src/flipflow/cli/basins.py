@@ -115,16 +115,15 @@ def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
     return document_of(found) | {"jump_risk": None if risk is None else document_of(risk)}
 
 
-def _show(
-    title: str, found: Basins, risk: JumpRisk | None, reason: str, out: Console
-) -> None:
+def _show(title: str, found: Basins, risk: JumpRisk | None, reason: str, out: Console) -> None:
     from flipflow.report.jump_risk import millimetres, risk_words  # noqa: PLC0415  quick --help
     from flipflow.report.numbers import speed  # noqa: PLC0415
     from flipflow.report.terminal import say  # noqa: PLC0415
 
     count = len(found.orbits)
     motions = f"{count} motion{'' if count == 1 else 's'}" if count else "no motion"
-    say(out, f"{printable(title)} at {speed(found.omega)}: {motions} the machine can settle on", "bold")
+    head = f"{printable(title)} at {speed(found.omega)}"
+    say(out, f"{head}: {motions} the machine can settle on", "bold")
     out.print()
     for orbit, share, (low, high) in zip(
         found.orbits, found.shares, found.share_intervals, strict=True

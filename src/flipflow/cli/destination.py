@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import textwrap
 import time
@@ -45,12 +44,18 @@ class Destination:
         What ``--json`` names; ``-`` is the terminal, which then shows nothing else.
     reads
         Files that the command reads: they are not written to.
+    quiet
+        Whether nothing is said in the terminal.
     """
 
-    def __init__(self, folder: Path | None, json: str | None, reads: Iterable[str] = ()) -> None:
+    def __init__(
+        self, folder: Path | None, json: str | None, reads: Iterable[str] = (), *,
+        quiet: bool = False,
+    ) -> None:  # fmt: skip
         if folder is not None:
             prepare_folder(folder, OUTPUT)
         self.folder, self.json, self._reads = folder, json, tuple(reads)
+        self._quiet = quiet
         if json not in (None, TERMINAL):
             refuse_input(json, self._reads, JSON)
             checked_place(json, JSON)
@@ -72,7 +77,7 @@ class Destination:
     @property
     def spoken(self) -> bool:
         """Whether the terminal is for words; else it is for JSON alone."""
-        return self.json != TERMINAL
+        return self.json != TERMINAL and not self._quiet
 
     def picture(self, name: str, figure: Figure, subject: str = "") -> None:
         """Write a figure, which carries what it belongs to, into the folder."""

@@ -25,6 +25,7 @@ FILE_HELP = (
 )
 
 File = Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)]
+Files = Annotated[list[str], typer.Argument(metavar="FILE...", help=FILE_HELP)]
 Speed = Annotated[
     str | None,
     typer.Option("--speed", metavar="SPEED", help="Shaft speed: '850 rpm', '203 rad/s'."),
@@ -102,7 +103,7 @@ def in_case(project: Project, name: str | None) -> Project:
         if load.name == name:
             return replace(project, screen=project.screen.loaded(load), load_cases=(load,))
     known = ", ".join(repr(load.name) for load in project.load_cases)
-    raise InputError("--case", name, f"the machine file has no such load case, choose one of {known}")
+    raise InputError("--case", name, f"there is no such load case, choose one of {known}")
 
 
 def title_of(project: Project, case: str | None) -> str:
@@ -113,14 +114,14 @@ def title_of(project: Project, case: str | None) -> str:
 
 def marked(project: Project, case: str | None) -> str:
     """What a figure carries: machine, load case, revision, date."""
-    from datetime import date  # noqa: PLC0415  keeps --help quick
+    from datetime import UTC, datetime  # noqa: PLC0415  keeps --help quick
 
     revision = project.document.revision
     parts = [
         project.document.name or project.name,
         f"case {case}" if case is not None else "empty machine",
         f"revision {revision}" if revision else "no revision",
-        date.today().isoformat(),  # noqa: DTZ011  the day on which the reader's sheet is made
+        datetime.now(UTC).astimezone().date().isoformat(),
     ]
     return ", ".join(parts)
 

@@ -94,7 +94,8 @@ def _show(title: str, history: History, out: Console) -> None:
 
     omega = float(history.omega[-1])
     last = history.t >= history.t[-1] - 2.0 * math.pi / omega
-    say(out, f"{printable(title)} at {omega * RPM:.4g} rpm, {history.t[-1]:.4g} s from rest", "bold")
+    head = f"{printable(title)} at {omega * RPM:.4g} rpm"
+    say(out, f"{head}, {history.t[-1]:.4g} s from rest", "bold")
     if history.distance is None:
         out.print("No periodic motion lies near the end: the motion has not settled.")
     else:

@@ -87,7 +87,8 @@ def sweep(
         if json is not None:
             target.document(_document(title_of(project, case), found))
         if output is not None:
-            target.picture("sweep.html", _figure(project, found.sweeps, ends), marked(project, case))
+            figure = _figure(project, found.sweeps, ends)
+            target.picture("sweep.html", figure, marked(project, case))
         if target.spoken:
             _show(title_of(project, case), found, steps, console())
         target.tell()

@@ -13,6 +13,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.results.codec import exact, plain
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.compare import Comparison
 from flipflow.studies.documents import CODEC
 from flipflow.studies.jump_risk import JumpRisk, Throw
 from flipflow.studies.sensitivity import OneAtATime
@@ -146,6 +147,20 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
         "transients": _transients(assessment.transients),
         "tornado": None if assessment.tornado is None else _tornado_document(assessment.tornado),
         "notes": list(assessment.notes),
+    }
+
+
+@read_off.register
+def comparison_summary(found: Comparison) -> dict[str, Any]:
+    """Inputs that differ, and every result with its changes against the first machine, SI."""
+    others = range(1, len(found.names))
+    return {
+        "names": list(found.names),
+        "verdicts": [one.verdict for one in found.assessments],
+        "inputs": [exact(vars(one)) for one in found.inputs],
+        "results": [
+            exact(vars(row) | {"changes": [row.change(k) for k in others]}) for row in found.results
+        ],
     }
 
 

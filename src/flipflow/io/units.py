@@ -50,8 +50,16 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
         "a static moment",
         "4168.25 kg mm",
         {
-            "kg m": 1.0, "kg mm": 1e-3, "kg cm": 1e-2, "g m": 1e-3, "g mm": 1e-6,
-            "kgm": 1.0, "kgmm": 1e-3, "kgcm": 1e-2, "gm": 1e-3, "gmm": 1e-6,
+            "kg m": 1.0,
+            "kg mm": 1e-3,
+            "kg cm": 1e-2,
+            "g m": 1e-3,
+            "g mm": 1e-6,
+            "kgm": 1.0,
+            "kgmm": 1e-3,
+            "kgcm": 1e-2,
+            "gm": 1e-3,
+            "gmm": 1e-6,
         },
     ),
     "m/s^2": (
@@ -87,6 +95,7 @@ _NEVER_PINT = frozenset({"rad", "rad/s", "degC", ""})
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # Thousands set apart by blanks, as "6 800 kg"; no comma or point ever does that here.
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?: [0-9]{3})+(?![0-9])(?:\.[0-9]*)?")
+_DIGIT = re.compile("[^eE]*[1-9]")  # one that is not 0, before the power of ten
 _BLANKS = re.compile("[\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}]")
 # Where a point sets thousands apart, "6.800 kg" is 6800 kg.
 _THREE_DECIMALS = re.compile(r"[+-]?[0-9]{1,3}\.[0-9]{3}(?![0-9eE.])")
@@ -226,8 +235,9 @@ def _normal(unit: str) -> str:
 
 def _convert(number: str, name: str, unit: str, *, field: str, written: str, example: str) -> float:
     what, _, known = _UNITS[unit]
-    if float(number) == 0.0 and any(digit in "123456789" for digit in re.split("[eE]", number)[0]):
-        raise InputError(field, written, f"give a value that can be told from 0, for example {example!r}")
+    if float(number) == 0.0 and _DIGIT.match(number):
+        remedy = f"give a value that can be told from 0, for example {example!r}"
+        raise InputError(field, written, remedy)
     if name in known:
         return _times(number, known[name]) + _OFFSET.get(name, 0.0)
     if not name:

@@ -56,9 +56,7 @@ def _field(name: str, word: str) -> Field:
         raise InputError(OPTION, word, f"{name!r} may be {' or '.join(fitting)}, write one of them")
     near = difflib.get_close_matches(name, [*FIELD, *BY_KEY], n=1)
     hint = f"perhaps {near[0]!r} is meant; " if near else ""
-    raise InputError(
-        OPTION, word, f"the field {name!r} is not known, {hint}choose one of {WORDS}"
-    )
+    raise InputError(OPTION, word, f"the field {name!r} is not known, {hint}choose one of {WORDS}")
 
 
 def _pieces(name: str, word: str, screen: FlipFlowScreen) -> tuple[str, float]:
@@ -75,9 +73,7 @@ def _pieces(name: str, word: str, screen: FlipFlowScreen) -> tuple[str, float]:
     return total, float(count)
 
 
-def _checked(
-    field: Field, text: str, word: str, screen: FlipFlowScreen, count: float
-) -> object:
+def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen, count: float) -> object:
     """A range that analyses take; what they would refuse names the option as it was written."""
     if field.whole:
         raise InputError(OPTION, word, f"{field.name} is counted, vary what has values between")
@@ -91,9 +87,7 @@ def _checked(
     return given
 
 
-def _range(
-    field: Field, text: str, word: str, screen: FlipFlowScreen, count: float
-) -> object:
+def _range(field: Field, text: str, word: str, screen: FlipFlowScreen, count: float) -> object:
     if text.startswith(PLUS_MINUS):
         return _about(field, text.removeprefix(PLUS_MINUS), word, screen)
     if SPREAD in text:

@@ -13,6 +13,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
+from flipflow.plotting.compare import comparison_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.history import history_figure
@@ -25,6 +26,7 @@ from flipflow.plotting.sweep import sweep_figure
 from flipflow.plotting.transient import run_up_figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.compare import Comparison
 from flipflow.studies.loading import Loading
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
@@ -99,6 +101,11 @@ def _(result: OperatingRegion) -> Figure:
 @_figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@_figure.register
+def _(result: Comparison) -> Figure:
+    return comparison_figure(result)
 
 
 @_figure.register

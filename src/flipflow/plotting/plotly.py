@@ -57,8 +57,8 @@ def page(figure: PanelGrid) -> str:
     """One HTML page with the figure, plotly.js embedded."""
     subject = f"<p>{html.escape(figure.subject)}</p>" if figure.subject else ""
     return PAGE.format(
-        subject=subject, title=html.escape(figure.title), caption=html.escape(figure.caption), family=FAMILY,
-        ink=INK, width=WIDTH, figure=element(figure), library=library(), start=START,
+        subject=subject, title=html.escape(figure.title), caption=html.escape(figure.caption),
+        family=FAMILY, ink=INK, width=WIDTH, figure=element(figure), library=library(), start=START,
     )  # fmt: skip
 
 

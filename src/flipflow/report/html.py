@@ -14,6 +14,7 @@ from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
+from flipflow.studies.compare import Comparison
 
 if TYPE_CHECKING:
     import jinja2
@@ -55,6 +56,17 @@ def html(assessment: Assessment) -> str:
         title=assessment.project.document.name or assessment.project.name,
         kind="vibration report",
         footer=f"flipflow {assessment.version}, input {assessment.input_hash}",
+    )
+
+
+def comparison_html(found: Comparison) -> str:
+    """The page of machines compared as text."""
+    inputs = ", ".join(one.input_hash for one in found.assessments)
+    return page(
+        blocks_of(found),
+        title=" and ".join(found.names),
+        kind="comparison",
+        footer=f"flipflow {found.version}, inputs {inputs}",
     )
 
 
