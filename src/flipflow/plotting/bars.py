@@ -81,8 +81,8 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
     order = "" if few else ", one below the other in the order of their table"
     caption = (
         f"Each bar: the speeds at which a limit is met in a load case{order}. The machine may run "
-        "where all bars overlap, within the operating region (contact begins at w_cs; equal amplitudes "
-        "at w_ea; antiresonance of the main frame at w_ar; jump speeds w_lb and w_ub)."
+        "where all bars overlap, within the operating region (contact begins at w_cs; equal "
+        "amplitudes at w_ea; antiresonance of the main frame at w_ar; jump speeds w_lb and w_ub)."
     )
     return Figure("Allowed speed range", caption, (panel,), height=120 + 28 * len(rows))
 

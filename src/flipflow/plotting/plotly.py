@@ -145,7 +145,7 @@ def _axis(axis: Axis, rect: Rect, figure: PanelGrid, key: str, *, across: bool) 
 def _trace(trace: Trace, panel: Panel, key: str) -> Iterator[Json]:
     base = {
         "type": "scatter", "name": words(trace.name), "xaxis": f"x{key}", "yaxis": f"y{key}",
-        "legendgroup": trace.name, "x": _plain(trace.x),
+        "legendgroup": words(trace.name), "x": _plain(trace.x),
     }  # fmt: skip
     if trace.lower is not None:
         hidden = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
@@ -222,7 +222,7 @@ def _bars(bars: tuple[Bar, ...], key: str) -> Iterator[Json]:
         kinds.setdefault((bar.name, bar.colour, bar.hatch), []).append(bar)
     for (name, colour, hatch), some in kinds.items():
         yield {
-            "type": "bar", "orientation": "h", "name": words(name), "legendgroup": name,
+            "type": "bar", "orientation": "h", "name": words(name), "legendgroup": words(name),
             "showlegend": any(bar.legend for bar in some), "xaxis": f"x{key}", "yaxis": f"y{key}",
             "base": [bar.low for bar in some], "x": [bar.high - bar.low for bar in some],
             "y": [bar.y for bar in some], "width": [bar.thickness for bar in some],

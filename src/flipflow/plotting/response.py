@@ -187,9 +187,12 @@ def case_names(names: Sequence[str]) -> list[str]:
 
     Colours and marks tell no more than six apart.
     """
-    if len(names) <= CASES:
-        return [within(name, LEGEND_LETTERS) for name in names]
-    return [within(names[0], LEGEND_LETTERS), *[OTHER_CASES] * (len(names) - 1)]
+    if len(names) > CASES:
+        return [within(names[0], LEGEND_LETTERS), *[OTHER_CASES] * (len(names) - 1)]
+    shown = [within(name, LEGEND_LETTERS) for name in names]
+    if len(set(shown)) == len(shown):
+        return shown
+    return [f"{k}: {within(name, LEGEND_LETTERS - 3)}" for k, name in enumerate(names, start=1)]
 
 
 def case_look(index: int, count: int) -> tuple[str, str | None]:
