@@ -9,7 +9,10 @@ import re
 import pytest
 
 import flipflow as ff
+from flipflow.model.load_case import case_words
 from flipflow.report.first_page import allowed_range
+from flipflow.report.html import html
+from flipflow.report.registry import blocks_of
 
 DATE = r"20\d\d-[01]\d-[0-3]\d"
 FULL = "full, stiffening"
@@ -84,3 +87,24 @@ def test_the_ends_of_the_allowed_range_name_their_case(project):
     words = allowed_range(ff.assess(unlimited))
     assert "from contact begins (w_cs, empty machine) to jump when" in words
     assert words.endswith("(w_lb, empty machine).")
+
+
+def test_a_case_called_case_has_the_word_once(project):
+    """Fault seen in a report: "case case 29"."""
+    loads = tuple(ff.Load(name=f"case {k}", stiffness_factor=1.0 + 0.1 * k) for k in range(28, 31))
+    found = ff.assess(dataclasses.replace(project, load_cases=loads))
+    page = html(found)
+    assert "(case 28)" in page
+    assert not re.search("case case", page, re.IGNORECASE)
+    compared = blocks_of(ff.compare([found.project, found.project]))
+    assert "case case" not in repr(compared).lower()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("hot", "case hot"), ("case 29", "case 29"), ("Load case 3", "Load case 3"),
+     ("casehardened", "case casehardened"), ("Fall 4", "case Fall 4")],
+)  # fmt: skip
+def test_words_for_a_case(name, words):
+    assert case_words(name) == words
+    assert case_words(name, capital=True) == words[0].upper() + words[1:]

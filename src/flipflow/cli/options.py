@@ -108,18 +108,22 @@ def in_case(project: Project, name: str | None) -> Project:
 
 def title_of(project: Project, case: str | None) -> str:
     """Name of the machine, and of the load case where one was asked for."""
+    from flipflow.model.load_case import case_words  # noqa: PLC0415  keeps --help quick
+
     name = project.document.name or project.name
-    return name if case is None else f"{name}, case {case}"
+    return name if case is None else f"{name}, {case_words(case)}"
 
 
 def marked(project: Project, case: str | None) -> str:
     """What a figure carries: machine, load case, revision, date."""
     from datetime import UTC, datetime  # noqa: PLC0415  keeps --help quick
 
+    from flipflow.model.load_case import case_words  # noqa: PLC0415
+
     revision = project.document.revision
     parts = [
         project.document.name or project.name,
-        f"case {case}" if case is not None else "empty machine",
+        case_words(case) if case is not None else "empty machine",
         f"revision {revision}" if revision else "no revision",
         datetime.now(UTC).astimezone().date().isoformat(),
     ]

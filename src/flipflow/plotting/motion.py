@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.model.elements import ClearanceSpring
+from flipflow.model.load_case import case_words
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
@@ -86,9 +87,11 @@ def motions_figure(assessment: Assessment) -> Figure | None:
         _shaft(), Axis("relative motion (x2)", "mm"), traces,
         bands=tuple(contact_bands(orbit)), lines=gap_lines(orbit),
     )  # fmt: skip
-    said = f"The stop is not reached in case {case.name}." if case.screen.has_stop else NO_STOP
+    said = (
+        f"The stop is not reached in {case_words(case.name)}." if case.screen.has_stop else NO_STOP
+    )
     if case.stop_reached:
-        said = f"Shaded: the stop is touched, {_shares_of_turn(orbit)} (case {case.name})."
+        said = f"Shaded: the stop is touched, {_shares_of_turn(orbit)} ({case_words(case.name)})."
     orbits = _orbits(found)
     if orbits is None:
         return Figure("Relative motion over two turns", said, (turns,), height=MOTION_HEIGHT)

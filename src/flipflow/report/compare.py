@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit, shown
+from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.compare import comparison_figure
 from flipflow.report.blocks import (
@@ -104,7 +105,7 @@ def _described(name: str, one: Assessment) -> str:
 
 
 def _headed(case: str) -> str:
-    return "Empty machine" if case == EMPTY else f"Case {case}"
+    return "Empty machine" if case == EMPTY else case_words(case, capital=True)
 
 
 def _machine_columns(found: Comparison) -> tuple[Column, ...]:
@@ -195,7 +196,7 @@ def _summary_row(name: str, one: Assessment) -> tuple[Cell, ...]:
     label, case, margin = NOTHING, "", NOTHING
     if tightest is not None:
         label, margin = QUANTITIES[tightest.name].label, percent(tightest.margin)
-        case = "" if tightest.name == "speed" else f"case {tightest.case}"
+        case = "" if tightest.name == "speed" else case_words(tightest.case)
     return (
         Cell(name), Cell(state, state=state), Cell(speed), Cell(allowed or "none"),
         Cell(label, case), Cell(margin),

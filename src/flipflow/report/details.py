@@ -8,6 +8,7 @@ from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
+from flipflow.model.load_case import case_words
 from flipflow.model.quantities import quantities_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.bars import energy_figure, region_figure
@@ -125,7 +126,7 @@ def responses(assessment: Assessment) -> Iterator[Block]:
         yield from map(FigureBlock, responses_figures(branches, assessment.omega))
         return
     for case in cases:
-        title = f"Response over speed, case {case.name}"
+        title = f"Response over speed, {case_words(case.name)}"
         yield FigureBlock(branch_figure(case.branch, assessment.omega, title))
 
 

@@ -7,6 +7,7 @@ import math
 import textwrap
 from collections.abc import Iterator
 
+from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
@@ -328,8 +329,10 @@ def _bound(bound: Bound, region_end: str) -> str:
     if bound.limit == "speed":
         return "the limit on speed"
     if bound.limit == STABILITY:
-        return f"where the motion is not sure to return after a disturbance (case {bound.case})"
-    return f"the limit on {QUANTITIES[bound.limit].label} (case {bound.case})"
+        return (
+            f"where the motion is not sure to return after a disturbance ({case_words(bound.case)})"
+        )
+    return f"the limit on {QUANTITIES[bound.limit].label} ({case_words(bound.case)})"
 
 
 def _limit_row(row: LimitRow) -> tuple[Cell, ...]:
@@ -381,7 +384,7 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
         for name in names
         if case.values.get(name) is not None
     ]
-    where = f" (case {case.name})" if len(assessment.cases) > 1 else ""
+    where = f" ({case_words(case.name)})" if len(assessment.cases) > 1 else ""
     return f"{', '.join(parts)}{where}"
 
 

@@ -16,6 +16,7 @@ from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.fields import MOTION_FIELDS
 from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
+from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
@@ -363,10 +364,10 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
     names = [case.name for case in cases if sum(orbit.stable for orbit in case.orbits) > 1]
     if not names:
         return ()
-    sentence = (
-        f"{'Case' if len(names) == 1 else 'Cases'} {'; '.join(names)}: another motion is possible "
-        "at this speed; shown is the one reached when the speed is raised from below."
-    )
+    head = f"Cases {'; '.join(names)}"
+    if len(names) == 1:
+        head = case_words(names[0], capital=True)
+    sentence = f"{head}: another motion is possible at this speed; shown is the one reached when the speed is raised from below."
     return (sentence,)
 
 

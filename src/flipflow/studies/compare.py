@@ -16,6 +16,7 @@ from flipflow.model.arguments import checked_monitor, members_of
 from flipflow.model.drive import DRIVE_FIELDS
 from flipflow.model.fields import FIELDS
 from flipflow.model.limits import LIMIT_FIELDS, Limits, limit_bounds
+from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Document, Project
 from flipflow.model.quantities import QUANTITIES, quantities_of
@@ -168,7 +169,7 @@ class Comparison(Frozen):
                 return row
         known = ", ".join(dict.fromkeys(row.name for row in self.results if row.case == case))
         what = f"choose one of {known}" if known else f"give a case of {', '.join(self._order)}"
-        raise InputError("result", f"{name}, case {case}", what)
+        raise InputError("result", f"{name}, {case_words(case)}", what)
 
 
 def compare(
