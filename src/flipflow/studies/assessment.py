@@ -367,8 +367,10 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
     head = f"Cases {'; '.join(names)}"
     if len(names) == 1:
         head = case_words(names[0], capital=True)
-    sentence = f"{head}: another motion is possible at this speed; shown is the one reached when the speed is raised from below."
-    return (sentence,)
+    return (
+        f"{head}: another motion is possible at this speed; shown is the one reached when the speed "
+        "is raised from below.",
+    )
 
 
 def _against(row: LimitRow) -> str:
