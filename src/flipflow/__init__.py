@@ -29,6 +29,7 @@ _HOME = {
     "switch_branch": "flipflow.continuation.continue_orbit",
     "continue_fold": "flipflow.continuation.continue_field",
     "assess": "flipflow.studies.assessment",
+    "compare": "flipflow.studies.compare",
     "simulate": "flipflow.transient.simulate",
     "sweep": "flipflow.transient.sweep",
     "ramp": "flipflow.studies.ramp",
@@ -109,6 +110,7 @@ if TYPE_CHECKING:
     from flipflow.studies.assessment import assess as assess
     from flipflow.studies.basins import basins as basins
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
+    from flipflow.studies.compare import compare as compare
     from flipflow.studies.foundation_loads import foundation_loads as foundation_loads
     from flipflow.studies.jump_risk import jump_risk as jump_risk
     from flipflow.studies.loading import loading as loading

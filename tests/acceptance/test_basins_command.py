@@ -20,7 +20,7 @@ def test_command_line(command, monkeypatch, tmp_path):
     assert code == 0
     lines = out.splitlines()
     assert max(map(len, lines)) <= 80
-    assert lines[0].startswith("1939 rpm (32.31 Hz, 203 rad/s): 2 motions")
+    assert lines[0].startswith("FFS0827 at 1939 rpm (32.31 Hz, 203 rad/s): 2 motions")
     text = " ".join(line.strip() for line in lines)
     assert "39.2 mm" in text
     assert "kg m/s" in text

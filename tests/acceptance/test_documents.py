@@ -20,6 +20,7 @@ from flipflow.io.results import SCHEMAS
 from flipflow.paper.reproduce import Reproduction
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.compare import Comparison
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.transient.history import History
@@ -80,6 +81,7 @@ COMMANDS = {
     "analyze": (Assessment, LINEAR, "--speeds", "800 rpm", "802 rpm"),
     "basins": (Basins, LINEAR, "--cells", "2"),
     "check": (Check, LINEAR),
+    "compare": (Comparison, LINEAR, LINEAR, "--speed", "800 rpm"),
     "orbits": (tuple, LINEAR, "--max-periods", "1"),
     "reproduce": (Reproduction, "1"),
     "sensitivity": (Sensitivity, LINEAR, "--vary", "floating_mass=+-5 %", "--n", "2"),
@@ -88,6 +90,7 @@ COMMANDS = {
     "sweep": (Sweeps, LINEAR, "--speeds", "800 rpm", "802 rpm", "--steps", "2", "--rate", "60"),
 }
 NO_RESULT = {"new", "schema"}
+NAMED = {"basins", "orbits", "sensitivity", "simulate"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -103,11 +106,13 @@ def test_the_document_of_a_command_opens_as_what_was_found(command, monkeypatch,
     if name == "basins":  # the jump risk is a second result, beside the basins in one file
         risk = written[0].pop("jump_risk")
         assert risk is None or isinstance(opened(risk, tmp_path), JumpRisk)
+    if name in NAMED:  # what the machine is called stands beside the result
+        assert written[0].pop("name")
     assert written[0] == written[1]
 
 
 def test_every_command_with_a_document_is_tried():
-    from flipflow.cli.main import COMMANDS as ALL  # noqa: PLC0415  the command line is slow to load
+    from flipflow.cli.app import COMMANDS as ALL  # noqa: PLC0415  the command line is slow to load
 
     assert {one.__name__ for one in ALL} - NO_RESULT == set(COMMANDS)
 

@@ -118,7 +118,7 @@ def test_interrupt_ends_with_130(run, monkeypatch):
 def test_help_loads_nothing_heavy():
     """Seconds depend on the machine that runs the test; what is imported does not."""
     code = (
-        "import sys; from flipflow.cli.main import app; "
+        "import sys; from flipflow.cli.app import app; "
         "heavy = {'numpy', 'scipy', 'numba', 'xarray', 'pint', 'rich', 'plotly'}; "
         "print(sorted(heavy & set(sys.modules)))"
     )

@@ -21,7 +21,7 @@ from flipflow.plotting.bars import energy_figure, region_figure
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import WIDTH, arrange, place_labels
-from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figure, portrait_figure
+from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figures, portrait_figure
 from flipflow.plotting.panels import Axis, Line, Panel
 from flipflow.plotting.plotly import described
 from flipflow.plotting.print import _draw
@@ -57,7 +57,7 @@ def figures(assessment):
         assessment.region,
         assessment,
     )
-    made = [orbits_figure(assessment), portrait_figure(assessment), energy_figure(assessment)]
+    made = [*orbits_figures(assessment), portrait_figure(assessment), energy_figure(assessment)]
     return [*map(ff.figure, results), *made, motions_figure(assessment)]
 
 
@@ -175,7 +175,7 @@ def test_without_the_normal_direction_there_are_no_orbits():
     project = ff.load_project("ffs0827")
     screen = project.screen.replace(normal_stiffness=None)
     bare = assess(dataclasses.replace(project, screen=screen, load_cases=project.load_cases[:1]))
-    assert orbits_figure(bare) is None
+    assert orbits_figures(bare) == ()
     assert len(motions_figure(bare).panels) == 1
 
 
@@ -241,7 +241,7 @@ def test_portraits_keep_clear_of_their_frame(assessment, linear, rig):
 
 def test_orbits_leave_no_empty_rows(assessment, linear):
     for one in (assessment, linear):
-        figure = orbits_figure(one)
+        (figure,) = orbits_figures(one)
         panel, rect = figure.panels[0], arrange(figure).rects[0]
         wide, high = (axis.bounds[1] for axis in (panel.x, panel.y))
         assert rect.height == pytest.approx(rect.width * high / wide, abs=8.0)

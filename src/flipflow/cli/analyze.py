@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flipflow.cli.options import File, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
+from flipflow.cli.options import Files, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
 
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
+    from flipflow.model.project import Project
     from flipflow.studies.assessment import Assessment
 
 
 def analyze(
-    file: File,
+    files: Files,
     output: Folder = None,
     json: Json = None,
     speeds: Speeds = None,
@@ -25,18 +27,39 @@ def analyze(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Analyze a machine: verdict, allowed speed range, report.
+    """Analyze machines: verdict, allowed speed range, report.
 
-    Ends with code 5 where the machine does not start, or its drive does not fit, as given.
+    Of several files each has a report of its own, and one table sums them up. Ends with code 5
+    where a machine does not start, or its drive does not fit, as given.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.analyze_several import analyze_several  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = load_project(file, force=force)
-    if project.speed is not None:
-        speed_of(project, None)
     options = _options(speeds, harmonics)
-    with Destination(output or Path(f"{project.name}-flipflow"), json, [file]) as target:
+    projects = [load_project(file, force=force) for file in files]
+    for project in projects:
+        if project.speed is not None:
+            speed_of(project, None)
+    if len(files) > 1:
+        one = partial(_analyze, options=options)
+        found = analyze_several(files, projects, output, json, one)
+    else:
+        folder = output or Path(f"{projects[0].name}-flipflow")
+        found = [_analyze(files[0], projects[0], folder, json, options=options)]
+    if any(assessment.start_fails for assessment in found):
+        from flipflow.cli.output import DOES_NOT_START  # noqa: PLC0415
+
+        raise typer.Exit(DOES_NOT_START)
+
+
+def _analyze(
+    file: str, project: Project, folder: Path, json: str | None, *, options: dict[str, Any],
+    quiet: bool = False,
+) -> Assessment:  # fmt: skip
+    """One machine: its report in a folder, its summary in the terminal unless ``quiet``."""
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
+
+    with Destination(folder, json, [file], quiet=quiet) as target:
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
@@ -45,10 +68,7 @@ def analyze(
 
         assessment = with_progress(lambda monitor: assess(project, monitor, **options))
         _write(assessment, target)
-    if assessment.start_fails:
-        from flipflow.cli.output import DOES_NOT_START  # noqa: PLC0415
-
-        raise typer.Exit(DOES_NOT_START)
+    return assessment
 
 
 def _write(assessment: Assessment, target: Destination) -> None:

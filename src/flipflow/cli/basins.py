@@ -5,8 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from flipflow.cli.options import RPM, File, Folder, Force, Json, Speed, speed_of, whole
-from flipflow.cli.output import console
+from flipflow.cli.options import (
+    RPM,
+    Case,
+    File,
+    Folder,
+    Force,
+    Json,
+    Speed,
+    in_case,
+    marked,
+    speed_of,
+    title_of,
+    whole,
+)
+from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress, stoppable
 
 if TYPE_CHECKING:
@@ -24,6 +37,7 @@ def basins(
     file: File,
     speed: Speed = None,
     cells: Annotated[int, whole("--cells", "N", 2, 1000, "N x N starting states.")] = CELLS,
+    case: Case = None,
     output: Folder = None,
     json: Json = None,
     force: Force = False,
@@ -32,19 +46,19 @@ def basins(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = load_project(file, force=force)
+    project = in_case(load_project(file, force=force), case)
     omega = speed_of(project, speed)
     with Destination(output or Path(f"{project.name}-flipflow"), json, [file]) as target:
         found, risk, reason = _computed(project.screen, omega, cells)
 
         from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
-        document = _document(found, risk)
-        target.picture("basins.html", figure(found))
+        document = {**_document(found, risk), "name": title_of(project, case)}
+        target.picture("basins.html", figure(found), marked(project, case))
         target.data("basins.json", document)
         target.document(document)
         if target.spoken:
-            _show(found, risk, reason, console())
+            _show(title_of(project, case), found, risk, reason, console())
         target.tell()
         if not found.complete:
             raise target.stopped(kept=True)
@@ -101,14 +115,15 @@ def _document(found: Basins, risk: JumpRisk | None) -> dict[str, Any]:
     return document_of(found) | {"jump_risk": None if risk is None else document_of(risk)}
 
 
-def _show(found: Basins, risk: JumpRisk | None, reason: str, out: Console) -> None:
+def _show(title: str, found: Basins, risk: JumpRisk | None, reason: str, out: Console) -> None:
     from flipflow.report.jump_risk import millimetres, risk_words  # noqa: PLC0415  quick --help
     from flipflow.report.numbers import speed  # noqa: PLC0415
     from flipflow.report.terminal import say  # noqa: PLC0415
 
     count = len(found.orbits)
     motions = f"{count} motion{'' if count == 1 else 's'}" if count else "no motion"
-    say(out, f"{speed(found.omega)}: {motions} the machine can settle on", "bold")
+    head = f"{printable(title)} at {speed(found.omega)}"
+    say(out, f"{head}: {motions} the machine can settle on", "bold")
     out.print()
     for orbit, share, (low, high) in zip(
         found.orbits, found.shares, found.share_intervals, strict=True

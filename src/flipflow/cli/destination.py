@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import textwrap
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
 from flipflow.errors import Cancelled
@@ -24,15 +24,10 @@ from flipflow.results.store import (
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from flipflow.plotting.figure import Figure
+
 CLOCK = 0.05  # s by which the clock of files may be late
 STOPPED, NOTHING = "Stopped by the user", "nothing is written"
-
-
-class Picture(Protocol):
-    """What writes itself to a file, as a figure does."""
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write to a file, in the format its ending names."""
 
 
 class Destination:
@@ -49,12 +44,18 @@ class Destination:
         What ``--json`` names; ``-`` is the terminal, which then shows nothing else.
     reads
         Files that the command reads: they are not written to.
+    quiet
+        Whether nothing is said in the terminal.
     """
 
-    def __init__(self, folder: Path | None, json: str | None, reads: Iterable[str] = ()) -> None:
+    def __init__(
+        self, folder: Path | None, json: str | None, reads: Iterable[str] = (), *,
+        quiet: bool = False,
+    ) -> None:  # fmt: skip
         if folder is not None:
             prepare_folder(folder, OUTPUT)
         self.folder, self.json, self._reads = folder, json, tuple(reads)
+        self._quiet = quiet
         if json not in (None, TERMINAL):
             refuse_input(json, self._reads, JSON)
             checked_place(json, JSON)
@@ -76,11 +77,11 @@ class Destination:
     @property
     def spoken(self) -> bool:
         """Whether the terminal is for words; else it is for JSON alone."""
-        return self.json != TERMINAL
+        return self.json != TERMINAL and not self._quiet
 
-    def picture(self, name: str, picture: Picture) -> None:
-        """Write a figure into the folder."""
-        picture.write(self.path(name))
+    def picture(self, name: str, figure: Figure, subject: str = "") -> None:
+        """Write a figure, which carries what it belongs to, into the folder."""
+        replace(figure, subject=subject).write(self.path(name))
         self.wrote(name)
 
     def data(self, name: str, document: Mapping[str, object]) -> None:

@@ -1,122 +1,68 @@
-"""The entry point ``flipflow``: commands, version, and one place where errors become sentences."""
+"""The entry point ``flipflow``: from its first moment on it can be stopped by a sentence."""
 
 from __future__ import annotations
 
 import os
-import shutil
+import signal
 import sys
-import textwrap
-from collections.abc import Callable
-from functools import wraps
-from typing import Annotated
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 
-import typer
-
-from flipflow import __version__
-from flipflow.cli.analyze import analyze
-from flipflow.cli.basins import basins
-from flipflow.cli.check import check
-from flipflow.cli.destination import NOTHING, STOPPED
-from flipflow.cli.new import new
-from flipflow.cli.orbits import orbits
-from flipflow.cli.reproduce import reproduce
-from flipflow.cli.schema import schema
-from flipflow.cli.sensitivity import sensitivity
-from flipflow.cli.simulate import simulate
-from flipflow.cli.startup import startup
-from flipflow.cli.sweep import sweep
-from flipflow.errors import Cancelled, FlipflowError, StoreError
-
-app = typer.Typer(
-    name="flipflow",
-    help="Dynamics, design and diagnosis of flip-flow vibrating screens.",
-    no_args_is_help=True,
-    add_completion=False,
-    # Plain help: rich would be imported for it, which takes longer than everything else.
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-COMMANDS = (
-    analyze,
-    basins,
-    check,
-    new,
-    schema,
-    simulate,
-    sweep,
-    orbits,
-    startup,
-    sensitivity,
-    reproduce,
-)
-
-
-def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
-    """A command that Ctrl-C ends with a sentence, wherever it is."""
-
-    @wraps(command)
-    def run(*given: object, **options: object) -> None:
-        try:
-            command(*given, **options)
-        except KeyboardInterrupt:
-            raise Cancelled(f"{STOPPED}; {NOTHING}.") from None
-
-    return run
-
-
-for one in COMMANDS:
-    app.command()(_stoppable(one))
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"flipflow {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    _version: Annotated[
-        bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
-    ] = False,
-) -> None:
-    """Dynamics, design and diagnosis of flip-flow vibrating screens."""
+STOPPED_CODE = 130
+STOPPED_EARLY = "Stopped by the user; nothing is written.\n"
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def main() -> None:
     """Run the command line; an error is one sentence on stderr and the exit code of its class."""
+    with _stopped_at_once():
+        # Loading the commands takes a moment, in which libraries would answer Ctrl-C themselves.
+        from flipflow.cli.app import run  # noqa: PLC0415
+    with _terminated_as_interrupted():
+        run()
+
+
+@contextmanager
+def _stopped_at_once() -> Iterator[None]:
+    """End the process at Ctrl-C or SIGTERM as long as nothing has begun."""
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        os.write(sys.stderr.fileno(), STOPPED_EARLY.encode())
+        os._exit(STOPPED_CODE)
+
+    with _answered(dict.fromkeys(SIGNALS, end)):
+        yield
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Let SIGTERM do what Ctrl-C does at that moment."""
+
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        answer = signal.getsignal(signal.SIGINT)
+        if not callable(answer):
+            raise KeyboardInterrupt
+        answer(number, frame)
+
+    with _answered({signal.SIGTERM: interrupted}):
+        yield
+
+
+@contextmanager
+def _answered(answers: dict[signal.Signals, object]) -> Iterator[None]:
+    """Answer signals in the block; what is ignored, as in a shell's background, stays so."""
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for one, answer in answers.items():
+            if signal.getsignal(one) is not signal.SIG_IGN:
+                before[one] = signal.signal(one, answer)  # type: ignore[arg-type]
     try:
-        try:
-            app()
-        finally:
-            sys.stdout.flush()
-    except FlipflowError as error:
-        head = "" if isinstance(error, Cancelled) else "Error: "
-        typer.echo(_for_terminal(f"{head}{_sentence(str(error))}"), err=True)
-        sys.exit(error.exit_code)
-    except OSError as error:
-        # What is written to files has its own sentence; this is the terminal, or a pipe from it.
-        typer.echo(f"Error: what was found cannot be shown ({error.strerror}).", err=True)
-        # What is still held back would be tried again, and fail again, at the interpreter's end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(StoreError.exit_code)
-    except KeyboardInterrupt:
-        sys.exit(130)
-
-
-def _sentence(text: str) -> str:
-    """One line with a full stop; keys of a file may hold line breaks and control characters."""
-    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    return line if line.endswith((".", "?", ")")) else f"{line}."
-
-
-def _for_terminal(sentence: str) -> str:
-    """Break a sentence between words where a terminal would break it anywhere; not in a file."""
-    if not sys.stderr.isatty():
-        return sentence
-    width = shutil.get_terminal_size().columns
-    return textwrap.fill(sentence, width, break_long_words=False, break_on_hyphens=False)
+        yield
+    finally:
+        for one, answer in before.items():
+            signal.signal(one, answer)
 
 
 if __name__ == "__main__":

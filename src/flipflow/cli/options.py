@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,6 +25,7 @@ FILE_HELP = (
 )
 
 File = Annotated[str, typer.Argument(metavar="FILE", help=FILE_HELP)]
+Files = Annotated[list[str], typer.Argument(metavar="FILE...", help=FILE_HELP)]
 Speed = Annotated[
     str | None,
     typer.Option("--speed", metavar="SPEED", help="Shaft speed: '850 rpm', '203 rad/s'."),
@@ -31,6 +33,10 @@ Speed = Annotated[
 Speeds = Annotated[
     tuple[str, str] | None,
     typer.Option("--speeds", metavar="LOW HIGH", help='From and to: "300 rpm" "40 Hz".'),
+]
+Case = Annotated[
+    str | None,
+    typer.Option("--case", metavar="NAME", help="A load case of the machine file, by its name."),
 ]
 Output = Annotated[
     Path | None,
@@ -85,6 +91,43 @@ def as_written(option: str, written: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(option, written, error.remedy) from None
+
+
+def in_case(project: Project, name: str | None) -> Project:
+    """The project of a machine under one of its load cases; as it is where none is named."""
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    if name is None:
+        return project
+    for load in project.load_cases:
+        if load.name == name:
+            return replace(project, screen=project.screen.loaded(load), load_cases=(load,))
+    known = ", ".join(repr(load.name) for load in project.load_cases)
+    raise InputError("--case", name, f"there is no such load case, choose one of {known}")
+
+
+def title_of(project: Project, case: str | None) -> str:
+    """Name of the machine, and of the load case where one was asked for."""
+    from flipflow.model.load_case import case_words  # noqa: PLC0415  keeps --help quick
+
+    name = project.document.name or project.name
+    return name if case is None else f"{name}, {case_words(case)}"
+
+
+def marked(project: Project, case: str | None) -> str:
+    """What a figure carries: machine, load case, revision, date."""
+    from datetime import UTC, datetime  # noqa: PLC0415  keeps --help quick
+
+    from flipflow.model.load_case import case_words  # noqa: PLC0415
+
+    revision = project.document.revision
+    parts = [
+        project.document.name or project.name,
+        case_words(case) if case is not None else "empty machine",
+        f"revision {revision}" if revision else "no revision",
+        datetime.now(UTC).astimezone().date().isoformat(),
+    ]
+    return ", ".join(parts)
 
 
 def speed_of(project: Project, written: str | None) -> float:

@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of, whole
+from flipflow.cli.options import (
+    RPM,
+    Case,
+    File,
+    Force,
+    Json,
+    Output,
+    Speed,
+    in_case,
+    marked,
+    speed_of,
+    title_of,
+    whole,
+)
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.model.project import Project
     from flipflow.periodic.orbit import Orbit
 
 AFTER = "after a small disturbance"
@@ -23,6 +35,7 @@ def orbits(
     max_periods: Annotated[
         int, whole("--max-periods", "N", 1, 12, "Turns after which one may repeat.")
     ] = 6,
+    case: Case = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
@@ -35,7 +48,7 @@ def orbits(
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.studies.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
 
-    project = load_project(file, force=force)
+    project = in_case(load_project(file, force=force), case)
     omega = speed_of(project, speed)
     with Destination(output, json, [file]) as target:
         with progress("searching; the first run of a version compiles") as tell:
@@ -44,21 +57,20 @@ def orbits(
             from flipflow.plotting.motion import orbit_figure  # noqa: PLC0415  loads plotly
 
             for k, orbit in enumerate(found, 1):
-                target.picture(f"motion-{k}.html", orbit_figure(orbit))
+                target.picture(f"motion-{k}.html", orbit_figure(orbit), marked(project, case))
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            target.document(document_of(found))
+            target.document(document_of(found) | {"name": title_of(project, case)})
         if target.spoken:
-            _show(project, omega, found, console())
+            _show(title_of(project, case), omega, found, console())
         target.tell()
 
 
-def _show(project: Project, omega: float, found: tuple[Orbit, ...], out: Console) -> None:
+def _show(title: str, omega: float, found: tuple[Orbit, ...], out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
-    name = printable(project.document.name or project.name)
-    say(out, f"{name} at {omega * RPM:.4g} rpm: {_count(found)}", "bold")
+    say(out, f"{printable(title)} at {omega * RPM:.4g} rpm: {_count(found)}", "bold")
     if found:
         out.print(
             f"{'':>3}{'relative':>12}{'main':>12}{'floating':>12}  {'repeats after':<15}{'returns'}"

@@ -44,45 +44,49 @@ def reproduce(
     folder = output or FOLDER
     with Destination(folder, json, [machine]) as target:
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
-        from flipflow.paper.page import ENDINGS, PAGE, write_reproduction  # noqa: PLC0415
+        from flipflow.paper.page import ENDINGS, PAGE, write_page  # noqa: PLC0415
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
         target.all_of([PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)])
 
-        def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
-            found = _finished(screen, [one.name for one in wanted], monitor)
-            return found, write_reproduction(found, folder, monitor)
-
-        found, written = with_progress(run)
+        found = with_progress(
+            lambda monitor: _finished(screen, [one.name for one in wanted], folder, monitor)
+        )
+        write_page(found, folder)
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(found))
         if target.spoken:
             _show(found, console())
-        count = (len(written) - 1) // 3
+        count = sum(one.figure is not None for one in found.figures)
         pictures = "1 figure" if count == 1 else f"{count} figures"
-        target.wrote(written[0], f"and {pictures} as HTML, SVG and PDF")
+        target.wrote(PAGE, f"and {pictures} as HTML, SVG and PDF")
         target.tell()
         if len(found.figures) < len(wanted):
             raise target.stopped(kept=True)
 
 
-def _finished(screen: FlipFlowScreen, names: Sequence[str], monitor: Monitor) -> Reproduction:
-    """One figure after the other; Ctrl-C ends it and keeps those that are finished."""
-    from flipflow.paper.reproduce import Reproduction  # noqa: PLC0415  quick --help
+def _finished(
+    screen: FlipFlowScreen, names: Sequence[str], folder: Path, monitor: Monitor
+) -> Reproduction:
+    """One figure after the other, each written at once; Ctrl-C ends it and keeps the finished."""
+    from flipflow.paper.page import write_figure  # noqa: PLC0415  quick --help
+    from flipflow.paper.reproduce import Reproduction  # noqa: PLC0415
     from flipflow.paper.reproduce import reproduce as reproduced  # noqa: PLC0415
 
     made: list[ReproducedFigure] = []
     for k, name in enumerate(names):
         monitor(name, k / len(names))
         try:
-            made += reproduced(screen, (name,)).figures
+            (one,) = reproduced(screen, (name,)).figures
+            write_figure(one, folder)
         except KeyboardInterrupt:
             if not made:
                 raise
             break
+        made.append(one)
     return Reproduction(screen, tuple(made))
 
 

@@ -7,17 +7,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flipflow.cli.options import (
+    Case,
     File,
     Force,
     Json,
     Output,
     Speed,
     Speeds,
+    in_case,
+    marked,
     speed_of,
     speeds_of,
+    title_of,
     whole,
 )
-from flipflow.cli.output import console
+from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -54,6 +58,7 @@ def sensitivity(
             "--branch", metavar="WORD", help="Motion that is meant: from-below, upper or lower."
         ),
     ] = "from-below",
+    case: Case = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
@@ -66,14 +71,15 @@ def sensitivity(
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.io.vary import read_vary  # noqa: PLC0415
 
-    project = load_project(file, force=force)
+    project = in_case(load_project(file, force=force), case)
     for warning in project.warnings:
         typer.echo(f"Warning: {warning}", err=True)
     ranges = read_vary(vary or [], project.screen)
     omega = _omega(project, quantity, speed, speeds)
     options = {"n": n, "rng": seed, "branch": branch}
     with Destination(output, json, [file]) as target:
-        _write(_analysed((project.screen, ranges, quantity, omega), options), target)
+        result = _analysed((project.screen, ranges, quantity, omega), options)
+        _write(result, target, title_of(project, case), marked(project, case))
 
 
 def _omega(
@@ -103,26 +109,26 @@ def _analysed(question: tuple[Any, ...], options: dict[str, Any]) -> Sensitivity
         return analysis(*question, monitor=tell, **options)
 
 
-def _write(result: Sensitivity, target: Destination) -> None:
-    if target.folder is not None:
-        _write_folder(result, target)
-    if target.json is not None:
-        from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+def _write(result: Sensitivity, target: Destination, title: str, subject: str) -> None:
+    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-        target.document(document_of(result))
+    document = document_of(result) | {"name": title}
+    if target.folder is not None:
+        target.data("results.json", document)
+        _write_figures(result, target, subject)
+    target.document(document)
     if target.spoken:
         from flipflow.report import summary  # noqa: PLC0415
+        from flipflow.report.terminal import say  # noqa: PLC0415
 
+        say(console(), printable(title), "bold")
         summary(result, console())
     target.tell()
 
 
-def _write_folder(result: Sensitivity, target: Destination) -> None:
-    from flipflow.io.results import save  # noqa: PLC0415
+def _write_figures(result: Sensitivity, target: Destination, subject: str) -> None:
     from flipflow.plotting.sensitivity import sensitivity_figure, tornado_figure  # noqa: PLC0415
 
-    save(result, target.path("results.json"))
-    target.wrote("results.json")
-    target.picture("sensitivity.html", sensitivity_figure(result))
+    target.picture("sensitivity.html", sensitivity_figure(result), subject)
     if not result.over_frequency:
-        target.picture("tornado.html", tornado_figure(result))
+        target.picture("tornado.html", tornado_figure(result), subject)

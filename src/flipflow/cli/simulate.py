@@ -7,7 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of, whole
+from flipflow.cli.options import (
+    RPM,
+    Case,
+    File,
+    Force,
+    Json,
+    Output,
+    Speed,
+    in_case,
+    marked,
+    speed_of,
+    title_of,
+    whole,
+)
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress
 
@@ -17,7 +30,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from flipflow.model.disturbance import Impulse
-    from flipflow.model.project import Project
     from flipflow.transient.history import History
 
 IMPULSE = "--impulse"
@@ -34,6 +46,7 @@ def simulate(
             IMPULSE, metavar="BLOW", help="A blow, '2 s: main 300' in kg m/s; may be repeated."
         ),
     ] = None,
+    case: Case = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
@@ -46,7 +59,7 @@ def simulate(
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
 
-    project = load_project(file, force=force)
+    project = in_case(load_project(file, force=force), case)
     omega = speed_of(project, speed)
     blows = _blows(impulse or (), periods * 2.0 * math.pi / omega)
     with Destination(output, json, [file]) as target:
@@ -55,13 +68,13 @@ def simulate(
         if output is not None:
             from flipflow.plotting.history import history_figure  # noqa: PLC0415  loads plotly
 
-            target.picture("motion.html", history_figure(history))
+            target.picture("motion.html", history_figure(history), marked(project, case))
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            target.document(document_of(history))
+            target.document(document_of(history) | {"name": title_of(project, case)})
         if target.spoken:
-            _show(project, history, blows, console())
+            _show(title_of(project, case), history, blows, console())
         target.tell()
 
 
@@ -85,13 +98,13 @@ def _spans(history: History, blows: Sequence[Impulse]) -> dict[str, slice]:
     return {"start": slice(0, max(first, 1)), "blow": slice(first, None)}
 
 
-def _show(project: Project, history: History, blows: Sequence[Impulse], out: Console) -> None:
+def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
     omega = float(history.omega[-1])
     last = history.t >= history.t[-1] - 2.0 * math.pi / omega
-    name = printable(project.document.name or project.name)
-    say(out, f"{name} at {omega * RPM:.4g} rpm, {history.t[-1]:.4g} s from rest", "bold")
+    head = f"{printable(title)} at {omega * RPM:.4g} rpm"
+    say(out, f"{head}, {history.t[-1]:.4g} s from rest", "bold")
     if history.distance is None:
         out.print("No periodic motion lies near the end: the motion has not settled.")
     else:

@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flipflow.cli.options import RPM, File, Force, Json, Output, Speed, speed_of
+from flipflow.cli.options import (
+    RPM,
+    Case,
+    File,
+    Force,
+    Json,
+    Output,
+    Speed,
+    in_case,
+    marked,
+    speed_of,
+    title_of,
+)
 from flipflow.cli.output import DOES_NOT_START, console, print_list, printable
 from flipflow.cli.progress import progress
 from flipflow.model.numerals import digits
@@ -53,6 +65,7 @@ def startup(
         str | None,
         typer.Option("--duration", metavar="TIME", help="Longest time, for each run: '120 s'."),
     ] = None,
+    case: Case = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
@@ -66,7 +79,7 @@ def startup(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = load_project(file, force=force)
+    project = in_case(load_project(file, force=force), case)
     if profile is not None:
         given = {"--speed": speed, "--motor-power": motor_power, "--inertia": inertia}
         _refuse_beside_profile(given | {"--duration": duration})
@@ -78,15 +91,14 @@ def startup(
         start, coast = _calculated(project, drive, seconds)
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
         if output is not None:
-            _figures(runs, target)
+            _figures(runs, target, marked(project, case))
         if json is not None:
             from flipflow.io.command_results import Startup  # noqa: PLC0415
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            name = project.document.name or project.name
-            target.document(document_of(Startup(name, start, coast)))
+            target.document(document_of(Startup(title_of(project, case), start, coast)))
         if target.spoken:
-            _show(project, start, coast, console())
+            _show(title_of(project, case), start, coast, console())
         target.tell()
     if _fails_as_given(start):
         raise typer.Exit(DOES_NOT_START)
@@ -196,18 +208,17 @@ def _start(
     return starts_from_rest(screen, fitted, speed, seconds, monitor)[0]
 
 
-def _figures(runs: dict[str, RunUp], target: Destination) -> None:
+def _figures(runs: dict[str, RunUp], target: Destination, subject: str) -> None:
     from flipflow.plotting.transient import run_up_figure  # noqa: PLC0415  keeps --help quick
 
     for name, run in runs.items():
-        target.picture(f"{name}.html", run_up_figure(run))
+        target.picture(f"{name}.html", run_up_figure(run), subject)
 
 
-def _show(project: Project, start: RunUp, coast: RunUp | None, out: Console) -> None:
+def _show(title: str, start: RunUp, coast: RunUp | None, out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
-    name = printable(project.document.name or project.name)
-    say(out, f"{name}: {start.verdict}.", "bold")
+    say(out, f"{printable(title)}: {start.verdict}.", "bold")
     _run(start, "On the way up", out)
     if start.power:
         scale, unit = (1e-3, "kW") if max(start.power.values()) >= 100.0 else (1.0, "W")

@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flipflow.cli.options import RPM, File, Force, Json, Output, speeds_of, whole
+from flipflow.cli.options import (
+    RPM,
+    Case,
+    File,
+    Force,
+    Json,
+    Output,
+    in_case,
+    marked,
+    speeds_of,
+    title_of,
+    whole,
+)
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress, stoppable
 
@@ -61,6 +73,7 @@ def sweep(
         str | None,
         typer.Option("--rate", metavar="RPM/S", help="Glide at this rate, too: how late it jumps."),
     ] = None,
+    case: Case = None,
     output: Output = None,
     json: Json = None,
     force: Force = False,
@@ -72,17 +85,18 @@ def sweep(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = load_project(file, force=force)
+    project = in_case(load_project(file, force=force), case)
     ends = speeds_of(speeds)
     gliding = None if rate is None else _rate(rate, ends)
     with Destination(output, json, [file]) as target:
         found = _passed(project, ends, steps, gliding)
         if json is not None:
-            target.document(_document(project, found))
+            target.document(_document(title_of(project, case), found))
         if output is not None:
-            target.picture("sweep.html", _figure(project, found.sweeps, ends))
+            figure = _figure(project, found.sweeps, ends)
+            target.picture("sweep.html", figure, marked(project, case))
         if target.spoken:
-            _show(project, found, steps, console())
+            _show(title_of(project, case), found, steps, console())
         target.tell()
         if not found.complete:
             raise target.stopped(kept=True)
@@ -147,7 +161,7 @@ def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[R
     return up, down
 
 
-def _document(project: Project, found: Passed) -> dict[str, Any]:
+def _document(title: str, found: Passed) -> dict[str, Any]:
     from flipflow.io.command_results import Glide, Sweeps  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
@@ -156,7 +170,7 @@ def _document(project: Project, found: Passed) -> dict[str, Any]:
         Glide(glide.rate, float(glide.history.omega[-1]), found.whole(glide))
         for glide in found.glides
     )
-    return document_of(Sweeps(project.name, found.up, found.down, late, glides, found.complete))
+    return document_of(Sweeps(title, found.up, found.down, late, glides, found.complete))
 
 
 def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
@@ -187,13 +201,12 @@ def _figure(project: Project, swept: tuple[Sweep, ...], ends: tuple[float, float
     return sweep_figure(swept, frequency_response(project.screen, ends))
 
 
-def _show(project: Project, found: Passed, steps: int, out: Console) -> None:
+def _show(title: str, found: Passed, steps: int, out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
     low, high = min(found.up.omega) * RPM, max(found.up.omega) * RPM
-    name = printable(project.document.name or project.name)
     count = f"{found.up.omega.size}" + ("" if found.up.complete else f" of {steps}")
-    say(out, f"{name}: {count} speeds from {low:.4g} to {high:.4g} rpm", "bold")
+    say(out, f"{printable(title)}: {count} speeds from {low:.4g} to {high:.4g} rpm", "bold")
     for word, swept in zip(("rising", "falling"), found.sweeps, strict=False):
         _show_sweep(word, swept, steps, out)
     for glide in found.glides:

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize_scalar
 
 from flipflow.dynamics.contact_free import complex_amplitudes, span
 from flipflow.model.arguments import checked_speeds
@@ -70,6 +68,8 @@ class LinearResponse(Frozen):
 
     def peaks(self, which: Coordinate) -> tuple[tuple[float, float], ...]:
         """Resonance peaks of a coordinate as (omega in rad/s, amplitude in m), rising in omega."""
+        from scipy.optimize import minimize_scalar  # noqa: PLC0415  slow; files need none of it
+
         vector = self.system.coordinate(which)
         top = 2.0 * float(self.natural_frequencies[-1])
         grid = np.linspace(top / SCAN_POINTS, top, SCAN_POINTS)
@@ -174,6 +174,13 @@ def _amplitude(system: MechanicalSystem, omega: Real, vector: Real) -> Real:
 
 
 def _modes(system: MechanicalSystem) -> tuple[Real, Real]:
-    """Squares of the natural frequencies, rising, and shapes, of the symmetric part of K."""
-    squares, shapes = scipy.linalg.eigh(0.5 * (system.K + system.K.T), system.M)
-    return np.asarray(squares), np.asarray(shapes)
+    """Squares of the natural frequencies, rising, and shapes, of the symmetric part of K.
+
+    With M = L L^T, K v = w^2 M v becomes (L^-1 K L^-T) y = w^2 y, y = L^T v: numpy alone, for
+    scipy.linalg takes longer to load than a machine file takes to read.
+    """
+    L = np.linalg.cholesky(system.M)
+    half = np.linalg.solve(L, 0.5 * (system.K + system.K.T))
+    reduced = np.linalg.solve(L, half.T)
+    squares, y = np.linalg.eigh(0.5 * (reduced + reduced.T))
+    return squares, np.linalg.solve(L.T, y)

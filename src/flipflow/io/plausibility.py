@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from flipflow.errors import InputError
 from flipflow.io.derived import Derived, derive
-from flipflow.io.layout import LOAD_FIELDS, SPEED
-from flipflow.io.units import in_unit, shown
+from flipflow.io.layout import LOAD_FIELDS, MATERIAL, SPEED, entry_of
+from flipflow.io.units import in_unit, measured, parse_quantity, shown, with_three_decimals
 from flipflow.model.drive import DRIVE_FIELDS, Drive
-from flipflow.model.fields import FIELDS, Field
+from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS, PASSING_FIELDS, Limits
 from flipflow.model.screen import FlipFlowScreen, Load
 
@@ -20,6 +20,8 @@ STATIC_AMPLITUDES = (0.1e-3, 30e-3)
 # Below the lesser, a damper is so weak that kN s/m was likely read as N s/m; zero is a choice.
 DAMPING_RATIOS = (5e-4, 1.5)
 OWN = {"switch_over_speed": "speed", "switch_over_time": "time"}  # names that a part has for them
+# N/m: what is softer is no spring of a screen; such a total is likely the value of one piece.
+LEAST_OF_ONE = {"isolation_stiffness": 20e3, "shear_stiffness": 20e3, "stop_stiffness": 50e3}
 _FORCE = "or let it through with --force (force=True)"
 
 
@@ -37,10 +39,49 @@ def implausible(
     repeat in other words what is wrong already. ``written`` holds values as the file has them.
     """
     values = (
+        *_thousands(written),
         *_values(screen, limits, cases, speed, written),
         *_drive_values(drive, written),
+        *_totals(screen, written),
     )
     return values or tuple(_figures(derive(screen)))
+
+
+def _thousands(written: Mapping[str, object]) -> Iterator[InputError]:
+    """Values such as "6.800 kg", where 6800 kg is as possible as 6.8 kg.
+
+    Three decimals alone are no reason to ask: "9.866 kN s/m" is well measured. A zero at their end
+    is one, or a value that no screen has.
+    """
+    fields = {field.key: field for field in (*FIELDS, SPEED, *LIMIT_FIELDS, *DRIVE_FIELDS)}
+    for key, text in written.items():
+        field = MATERIAL if key.endswith(", material") else fields.get(key.removesuffix("_each"))
+        both = with_three_decimals(text)
+        if both is None or field is None or measured(str(text)) != field.unit:
+            continue
+        as_point, as_thousand = (parse_quantity(one, field.unit, field=key) for one in both)
+        odd = both[0] != text or not field.is_plausible(as_point)
+        if odd and field.plausible is not None and field.is_plausible(as_thousand):
+            yield InputError(
+                key, text,
+                f"it is read as {both[0]}, the point being the decimal sign, write {both[0]!r} or "
+                f"{both[1]!r} {_FORCE}",
+            )  # fmt: skip
+
+
+def _totals(screen: FlipFlowScreen, written: Mapping[str, object]) -> Iterator[InputError]:
+    """Totals whose pieces would be softer than any, while one such piece would not be."""
+    for name, least in LEAST_OF_ONE.items():
+        field, total = FIELD[name], getattr(screen, name)
+        count = getattr(screen, str(field.count)) or 1.0
+        if field.key in written and total / count < least <= total and count > 1.0:
+            one = shown(total / count, field.file_unit, field.unit)
+            each = f"{entry_of(field).key}_each"
+            yield InputError(
+                field.key, written[field.key],
+                f"shared by {FIELD[str(field.count)].key} = {count:g} it leaves {one} for one, "
+                f"which looks wrong, write {each} if it is the value of one piece {_FORCE}",
+            )  # fmt: skip
 
 
 def _values(

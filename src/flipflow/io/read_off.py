@@ -14,6 +14,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.results.codec import exact, plain
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
+from flipflow.studies.compare import Comparison
 from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import CaseLoads, FoundationLoads, RunLoads
 from flipflow.studies.jump_risk import JumpRisk, Throw
@@ -176,6 +177,20 @@ def _support_loads(
         return {"peaks": vars(loads.of_support(one.peaks))}
     static = loads.static_on(support, one)
     return {"static": vars(static), "running": vars(loads.of_support(one.running))}
+
+
+@read_off.register
+def comparison_summary(found: Comparison) -> dict[str, Any]:
+    """Inputs that differ, and every result with its changes against the first machine, SI."""
+    others = range(1, len(found.names))
+    return {
+        "names": list(found.names),
+        "verdicts": [one.verdict for one in found.assessments],
+        "inputs": [exact(vars(one)) for one in found.inputs],
+        "results": [
+            exact(vars(row) | {"changes": [row.change(k) for k in others]}) for row in found.results
+        ],
+    }
 
 
 def _transients(found: Transients | None) -> dict[str, Any] | None:

@@ -23,6 +23,7 @@ from flipflow.results.store import json_text, write_file
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.compare import Comparison
 from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
@@ -60,12 +61,13 @@ SCHEMAS: dict[type, str] = {
     ResponseFamily: "flipflow/response-family/1",
     Sensitivity: "flipflow/sensitivity/1",
     Assessment: "flipflow/assessment/1",
+    Comparison: "flipflow/comparison/1",
     Startup: "flipflow/startup/1",
     Sweeps: "flipflow/sweeps/1",
     Check: "flipflow/check/1",
 }
 # Of these a file holds a summary, and beside it under a key what opens again.
-SUMMARISED: set[type] = {Assessment}
+SUMMARISED: set[type] = {Assessment, Comparison}
 WHOLE = "whole"
 # The layers above have results of their own; the module of one makes it known when it is loaded.
 ABOVE: Mapping[str, str] = {"flipflow/claims/1": "flipflow.paper.reproduce"}

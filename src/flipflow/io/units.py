@@ -42,12 +42,25 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
             "N/(m/s)": 1.0,
             "kN/(m/s)": 1e3,
             "kg/s": 1.0,
+            "Ns/m": 1.0,
+            "kNs/m": 1e3,
         },
     ),
     "kg m": (
         "a static moment",
         "4168.25 kg mm",
-        {"kg m": 1.0, "kg mm": 1e-3, "kg cm": 1e-2, "g m": 1e-3, "g mm": 1e-6},
+        {
+            "kg m": 1.0,
+            "kg mm": 1e-3,
+            "kg cm": 1e-2,
+            "g m": 1e-3,
+            "g mm": 1e-6,
+            "kgm": 1.0,
+            "kgmm": 1e-3,
+            "kgcm": 1e-2,
+            "gm": 1e-3,
+            "gmm": 1e-6,
+        },
     ),
     "m/s^2": (
         "an acceleration",
@@ -55,8 +68,12 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
         {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": GRAVITY, "g_n": GRAVITY},
     ),
     "rad/s^2": ("a rise of speed", "15 rad/s^2", {"rad/s^2": 1.0, "rpm/s": _TURN / 60.0}),
-    "kg m^2": ("a moment of inertia", "0.8 kg m^2", {"kg m^2": 1.0, "kg cm^2": 1e-4}),
-    "N m": ("a torque", "40 N m", {"N m": 1.0, "kN m": 1e3}),
+    "kg m^2": (
+        "a moment of inertia",
+        "0.8 kg m^2",
+        {"kg m^2": 1.0, "kg cm^2": 1e-4, "kgm^2": 1.0, "kgcm^2": 1e-4},
+    ),
+    "N m": ("a torque", "40 N m", {"N m": 1.0, "kN m": 1e3, "Nm": 1.0, "kNm": 1e3}),
     "s": ("a time", "20 s", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}),
     "W": ("a power", "2 kW", {"W": 1.0, "kW": 1e3, "MW": 1e6}),
     "W/K": ("a thermal conductance", "1.5 W/K", {"W/K": 1.0}),
@@ -67,7 +84,11 @@ _UNITS: Mapping[str, tuple[str, str, Mapping[str, float]]] = {
     "rad/s": (
         "a shaft speed",
         "850 rpm",
-        {"rad/s": 1.0, "rpm": _TURN / 60.0, "1/min": _TURN / 60.0, "Hz": _TURN},
+        {
+            "rad/s": 1.0,
+            "Hz": _TURN,
+            **dict.fromkeys(("rpm", "1/min", "min^-1", "U/min", "r/min", "rev/min"), _TURN / 60.0),
+        },
     ),
     "degC": ("a temperature", "50 degC", {"degC": 1.0, "°C": 1.0, "K": 1.0, "degF": 5.0 / 9.0}),
     "": ("a ratio", "20 %", {"": 1.0, "%": 1e-2}),
@@ -80,9 +101,19 @@ _OFFSET: Mapping[tuple[str, str], float] = {
 _NEVER_PINT = frozenset({"rad", "rad/s", "rad/s^2", "degC", ""})
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# Thousands set apart by blanks, as "6 800 kg"; no comma or point ever does that here.
+_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?: [0-9]{3})+(?![0-9])(?:\.[0-9]*)?")
+_DIGIT = re.compile("[^eE]*[1-9]")  # one that is not 0, before the power of ten
+_BLANKS = re.compile("[\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{THIN SPACE}]")
+# Where a point sets thousands apart, "6.800 kg" is 6800 kg.
+_THREE_DECIMALS = re.compile(r"[+-]?[0-9]{1,3}\.[0-9]{3}(?![0-9eE.])")
 # Only names with small exponents go to pint: it evaluates arithmetic, however large.
 _SAFE_UNIT = re.compile(r"[A-Za-zµ_]+(?:\^-?[1-4])?(?:[ /][A-Za-zµ_]+(?:\^-?[1-4])?)*")
-_SPELLINGS = (("**", "^"), ("²", "^2"), ("·", " "), ("*", " "), ("m2", "m^2"), ("s2", "s^2"))
+_SPELLINGS = (
+    ("**", "^"), ("²", "^2"), ("·", " "), ("*", " "), ("m2", "m^2"), ("s2", "s^2"),
+    ("\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE}", "^-1"), ("\N{MINUS SIGN}", "-"),
+    ("min-1", "min^-1"),
+)  # fmt: skip
 
 
 def parse_quantity(
@@ -120,7 +151,7 @@ def parse_quantity(
         return _bare(written, unit, field, example, allow_infinite=allow_infinite)
     if not isinstance(written, str):
         raise InputError(field, _toml(written), f"{what} belongs here, for example {example!r}")
-    text = written.strip()
+    text = _BLANKS.sub(" ", written).strip()
     if allow_infinite and text in {"inf", "+inf"}:
         return math.inf
     if "," in text:
@@ -129,11 +160,10 @@ def parse_quantity(
             written,
             f"write a point as the decimal sign and no commas, for example {example!r}",
         )
-    match = _NUMBER.match(text)
-    if match is None:
+    number, name = _parts(text)
+    if not number:
         raise InputError(field, written, f"{what} belongs here, for example {example!r}")
-    name = _normal(text[match.end() :])
-    value = _convert(match.group(), name, unit, field=field, written=written, example=example)
+    value = _convert(number, name, unit, field=field, written=written, example=example)
     if not math.isfinite(value):
         raise InputError(field, written, f"give a finite value, for example {example!r}")
     return value
@@ -164,9 +194,26 @@ def shown(value: float, unit: str, si_unit: str) -> str:
 
 def measured(text: str) -> str | None:
     """SI unit of the quantity in ``text``, None when its unit is not in the table."""
-    match = _NUMBER.match(text.strip())
-    name = _normal(text.strip()[match.end() :]) if match else ""
+    _, name = _parts(_BLANKS.sub(" ", text).strip())
     return next((si for si, (_, _, known) in _UNITS.items() if name and name in known), None)
+
+
+def with_three_decimals(written: object) -> tuple[str, str] | None:
+    """A quantity such as "6.800 kg" read both ways: "6.8 kg" and "6800 kg"; else None."""
+    text = written.strip() if isinstance(written, str) else ""
+    match = _THREE_DECIMALS.match(text)
+    if match is None:
+        return None
+    number, unit = match.group(), text[match.end() :]
+    return f"{number.rstrip('0').rstrip('.')}{unit}", f"{number.replace('.', '')}{unit}"
+
+
+def _parts(text: str) -> tuple[str, str]:
+    """Number and unit of a quantity; no number where there is none."""
+    match = _GROUPED.match(text) or _NUMBER.match(text)
+    if match is None:
+        return "", ""
+    return match.group().replace(" ", ""), _normal(text[match.end() :])
 
 
 def _bare(written: float, unit: str, field: str, example: str, *, allow_infinite: bool) -> float:
@@ -196,6 +243,9 @@ def _normal(unit: str) -> str:
 
 def _convert(number: str, name: str, unit: str, *, field: str, written: str, example: str) -> float:
     what, _, known = _UNITS[unit]
+    if float(number) == 0.0 and _DIGIT.match(number):
+        remedy = f"give a value that can be told from 0, for example {example!r}"
+        raise InputError(field, written, remedy)
     if name in known:
         return _times(number, known[name]) + _OFFSET.get((unit, name), 0.0)
     if not name:

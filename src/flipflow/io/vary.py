@@ -13,15 +13,18 @@ from flipflow.model.vary import Normal, variations
 
 OPTION = "--vary"
 EXAMPLE = 'write for example "clearance=5.4 mm..6.6 mm"'
-PLUS_MINUS, SPREAD = "+-", "+/-"
+PLUS_MINUS, SPREAD, EACH = "+-", "+/-", "_each"
 BY_KEY: Mapping[str, Field] = {field.key: field for field in FIELD.values()}
+WORDS = ", ".join(key for key, field in BY_KEY.items() if not field.whole)
 
 
 def read_vary(words: Iterable[str], screen: FlipFlowScreen) -> dict[str, object]:
     """Convert words to the mapping that analyses take, SI.
 
     A word is ``field=low..high`` (uniform), ``field=+-5 %`` (uniform about the machine's value) or
-    ``field=mean +/- std`` (normal). The field is named as in Python or by its key in the file.
+    ``field=mean +/- std`` (normal). The field is named as in Python, by its place in the file such
+    as ``stops.clearance``, or by its last part where no other section has it. ``_each`` behind a
+    name means one piece.
 
     Raises
     ------
@@ -33,29 +36,48 @@ def read_vary(words: Iterable[str], screen: FlipFlowScreen) -> dict[str, object]
         name, sign, text = (part.strip() for part in word.partition("="))
         if not sign or not text:
             raise InputError(OPTION, word, EXAMPLE)
+        name, count = _pieces(name, word, screen)
         field = _field(name, word)
         if field.name in found:
             raise InputError(OPTION, word, f"{field.name} is given twice, name each field once")
-        found[field.name] = _checked(field, text, word, screen)
+        found[field.name] = _checked(field, text, word, screen, count)
     if not found:
-        raise InputError(OPTION, "(left out)", EXAMPLE)
+        raise InputError(OPTION, "(left out)", f"{EXAMPLE}, the field one of {WORDS}")
     return found
 
 
 def _field(name: str, word: str) -> Field:
-    known = {**FIELD, **BY_KEY}
-    if name not in known:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"perhaps {near[0]!r} is meant" if near else "name a field such as clearance"
-        raise InputError(OPTION, word, f"the field {name!r} is not known, {hint}")
-    return known[name]
+    if name in FIELD:
+        return FIELD[name]
+    fitting = [key for key in BY_KEY if name in (key, key.rpartition(".")[2])]
+    if len(fitting) == 1:
+        return BY_KEY[fitting[0]]
+    if fitting:
+        raise InputError(OPTION, word, f"{name!r} may be {' or '.join(fitting)}, write one of them")
+    near = difflib.get_close_matches(name, [*FIELD, *BY_KEY], n=1)
+    hint = f"perhaps {near[0]!r} is meant; " if near else ""
+    raise InputError(OPTION, word, f"the field {name!r} is not known, {hint}choose one of {WORDS}")
 
 
-def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen) -> object:
+def _pieces(name: str, word: str, screen: FlipFlowScreen) -> tuple[str, float]:
+    """The name of a total, and how many pieces make it where one piece is named."""
+    total = name.removesuffix(EACH)
+    if total == name:
+        return name, 1.0
+    counter = _field(total, word).count
+    if counter is None:
+        raise InputError(OPTION, word, f"{total} is not made of pieces, leave {EACH} out")
+    count = getattr(screen, counter)
+    if count is None:
+        raise InputError(OPTION, word, f"say in the machine file how many: {FIELD[counter].key}")
+    return total, float(count)
+
+
+def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen, count: float) -> object:
     """A range that analyses take; what they would refuse names the option as it was written."""
     if field.whole:
         raise InputError(OPTION, word, f"{field.name} is counted, vary what has values between")
-    given = _range(field, text, word, screen)
+    given = _range(field, text, word, screen, count)
     if isinstance(given, tuple) and not given[0] < given[1]:
         raise InputError(OPTION, word, "the range is empty or reversed, give the lower end first")
     try:
@@ -65,18 +87,18 @@ def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen) -> obje
     return given
 
 
-def _range(field: Field, text: str, word: str, screen: FlipFlowScreen) -> object:
+def _range(field: Field, text: str, word: str, screen: FlipFlowScreen, count: float) -> object:
     if text.startswith(PLUS_MINUS):
         return _about(field, text.removeprefix(PLUS_MINUS), word, screen)
     if SPREAD in text:
-        mean, std = (_number(field, part) for part in text.split(SPREAD, 1))
+        mean, std = (count * _number(field, part) for part in text.split(SPREAD, 1))
         if not std > 0.0:
             raise InputError(OPTION, word, "give a standard deviation above 0")
         return Normal(mean, std)
     low, dots, high = text.partition("..")
     if not dots:
         raise InputError(OPTION, word, EXAMPLE)
-    return _number(field, low), _number(field, high)
+    return count * _number(field, low), count * _number(field, high)
 
 
 def _about(field: Field, text: str, word: str, screen: FlipFlowScreen) -> tuple[float, float]:

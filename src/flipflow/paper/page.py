@@ -70,21 +70,47 @@ def write_reproduction(
         When a file cannot be written.
     """
     say = monitor or silent
-    drawn = [one for one in found.figures if one.figure is not None]
-    names = []
-    for k, one in enumerate(drawn):
-        for ending in ENDINGS:
-            name = f"{one.name}{ending}"
-            say(f"writing {name}", k / len(drawn))
-            if one.figure is not None:
-                one.figure.write(folder / name)
-            names.append(name)
+    names: list[str] = []
+    for k, one in enumerate(found.figures):
+        say(f"writing {one.name}", k / len(found.figures))
+        names += write_figure(one, folder)
+    return (write_page(found, folder), *names)
+
+
+def write_figure(one: ReproducedFigure, folder: Path) -> tuple[str, ...]:
+    """Write one figure as HTML, SVG and PDF into an existing folder; names of the files.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    StoreError
+        When a file cannot be written.
+    """
+    if one.figure is None:
+        return ()
+    names = tuple(f"{one.name}{ending}" for ending in ENDINGS)
+    for name in names:
+        one.figure.write(folder / name)
+    return names
+
+
+def write_page(found: Reproduction, folder: Path) -> str:
+    """Write the page of all figures and claims into an existing folder; name of the file.
+
+    Raises
+    ------
+    MissingExtra
+        When jinja2 is not installed.
+    StoreError
+        When the file cannot be written.
+    """
     text = page(
         tuple(blocks(found)), title=TITLE, kind="figures and claims",
         footer=f"flipflow {__version__}: {PAPER}",
     )  # fmt: skip
     write_file(folder / PAGE, text)
-    return (PAGE, *names)
+    return PAGE
 
 
 def blocks(found: Reproduction) -> Iterator[Block]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.figure import Figure
+from flipflow.plotting.layout import within
 from flipflow.plotting.palette import CASES, HATCHES, case_colour
 from flipflow.plotting.panels import Axis, Band, Bar, Line, Note, Panel
 from flipflow.plotting.scales import RPM
@@ -20,6 +22,7 @@ TAKERS = {
     "normal": "isolation, normal direction (c1n)",
 }
 LEAST_KILOWATTS = 100.0  # W
+MOST_BARS, FAR_APART, NAME_LETTERS = 50, 20, 36
 LIMIT_WORDS = {"stability": "returns after a disturbance", "speed": "speed of the drive"}
 
 
@@ -59,6 +62,9 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
         bars.append(Bar(rows[1], heights[rows[1]], lower, upper, 0.6, "mark"))
     for k, case in enumerate(region.cases):
         bars += _case_bars(k, case, len(region.cases), heights)
+    few = len(region.cases) <= CASES
+    if not few:
+        bars = [replace(bar, legend=False) for bar in bars]
     ticks = tuple((heights[name], _word(name)) for name in rows)
     lines = tuple(
         Line("x", at * RPM, text, "mark")
@@ -72,19 +78,25 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
         Axis("shaft speed", "rpm", ends), Axis("", "", (-0.6, len(rows) - 0.4), ticks),
         bars=tuple(bars), lines=lines, bands=bands, notes=tuple(words),
     )  # fmt: skip
+    order = "" if few else ", one below the other in the order of their table"
     caption = (
-        "Each bar: the speeds at which a limit is met in a load case. The machine may run where "
-        "all bars overlap, within the operating region (contact begins at w_cs; equal amplitudes "
-        "at w_ea; antiresonance of the main frame at w_ar; jump speeds w_lb and w_ub)."
+        f"Each bar: the speeds at which a limit is met in a load case{order}. The machine may run "
+        "where all bars overlap, within the operating region (contact begins at w_cs; equal "
+        "amplitudes at w_ea; antiresonance of the main frame at w_ar; jump speeds w_lb and w_ub)."
     )
     return Figure("Allowed speed range", caption, (panel,), height=120 + 28 * len(rows))
 
 
 def energy_figure(assessment: Assessment) -> Figure | None:
-    """Power fed in by the exciter and where it goes, for each load case."""
-    cases = [case for case in assessment.cases if case.energy]
+    """Power fed in by the exciter and where it goes, for each load case; the first fifty of many.
+
+    A name longer than a third of the width is cut off: the tables have it whole.
+    """
+    cases = [case for case in assessment.cases if case.energy][:MOST_BARS]
     if not cases:
         return None
+    # Two lines of words where bars are that far apart.
+    pitch, lines = (34, 2) if len(cases) <= FAR_APART else (18, 1)
     takers = [name for name in TAKERS if any(case.energy.get(name) for case in cases)]
     totals = [sum(case.energy.get(name, 0.0) for name in takers) for case in cases]
     scale, unit = (1e-3, "kW") if max(totals) >= LEAST_KILOWATTS else (1.0, "W")
@@ -92,7 +104,7 @@ def energy_figure(assessment: Assessment) -> Figure | None:
     ticks = []
     for k, case in enumerate(cases):
         y = float(len(cases) - 1 - k)
-        ticks.append((y, case.name))
+        ticks.append((y, within(case.name, NAME_LETTERS, lines)))
         total = 0.0
         for name in takers:
             power = case.energy.get(name, 0.0) * scale
@@ -112,7 +124,7 @@ def energy_figure(assessment: Assessment) -> Figure | None:
         "Mean power over a turn that each damper turns into heat; together they are what the "
         "exciter feeds in. The motor also needs what bearings, belt and material take."
     )
-    return Figure("Energy balance", caption, (panel,), height=120 + 34 * len(cases))
+    return Figure("Energy balance", caption, (panel,), height=120 + pitch * len(cases))
 
 
 def _labelled(bar: Bar, text: str) -> Bar:

@@ -14,6 +14,7 @@ from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.bifurcation import bifurcation_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
+from flipflow.plotting.compare import comparison_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.history import history_figure
@@ -28,6 +29,7 @@ from flipflow.plotting.transient import run_up_figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.compare import Comparison
 from flipflow.studies.loading import Loading
 from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
@@ -103,6 +105,11 @@ def _(result: OperatingRegion) -> Figure:
 @_figure.register
 def _(result: Assessment) -> Figure:
     return cases_figure(result)
+
+
+@_figure.register
+def _(result: Comparison) -> Figure:
+    return comparison_figure(result)
 
 
 @_figure.register

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -81,6 +82,13 @@ def legend_names(figure: PanelGrid) -> list[str]:
     names = [t.name for p in figure.panels for t in p.traces if t.legend]
     names += [b.name for p in figure.panels for b in p.bars if b.legend]
     return list(dict.fromkeys(names))
+
+
+def within(text: str, width: int, lines: int = 1) -> str:
+    """Text in at most so many lines of so many letters; dots stand for what is cut off."""
+    return "\n".join(
+        textwrap.wrap(text, width, max_lines=lines, placeholder=" ...", break_on_hyphens=False)
+    )
 
 
 def legend_columns(figure: PanelGrid) -> int:
@@ -174,5 +182,6 @@ def _columns(
 def _left(panel: Panel) -> float:
     """Room for the labels of the y axis."""
     if panel.y.ticks:
-        return 14.0 + CHARACTER * max(len(word) for _, word in panel.y.ticks)
+        lines = (line for _, word in panel.y.ticks for line in word.splitlines())
+        return 14.0 + CHARACTER * max(map(len, lines), default=0)
     return float(LEFT if panel.y.title else BARE_GAP)

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.model.elements import ClearanceSpring
+from flipflow.model.load_case import case_words
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.palette import case_colour, case_symbol
+from flipflow.plotting.layout import within
 from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
-from flipflow.plotting.response import coordinates, label
+from flipflow.plotting.response import case_look, case_names, coordinates, label
 from flipflow.plotting.scales import MM, RPM
 from flipflow.studies.assessment import Assessment, CaseAssessment
 
@@ -25,6 +26,7 @@ TURNS = 2
 POINTS = 181
 MOTION_HEIGHT = 186
 ORBIT_WIDTH, ORBIT_HEIGHTS, ORBIT_WORDS = 277.0, (60.0, 140.0), 71.0
+PAGE_ROOM, TITLE_LETTERS = 980.0, 48  # pixels of a page for a figure; letters over a panel
 MARGIN, BESIDE = 1.08, 1.5  # round a portrait; a gap within this of its width is shown
 TICKS = tuple((90.0 * k, f"{90 * k}") for k in range(0, 4 * TURNS + 1, 2))
 CONTACT_WORDS = "Shaded: a stop is touched; dark on the plus side, light on the minus side."
@@ -78,14 +80,18 @@ def motions_figure(assessment: Assessment) -> Figure | None:
     if not found:
         return None
     _, case, orbit = found[0]
-    traces = tuple(_in_time(o, "relative", c.name, k, legend=False) for k, c, o in found)
+    traces = tuple(
+        _in_time(o, "relative", c.name, k, len(found), legend=False) for k, c, o in found
+    )
     turns = Panel(
         _shaft(), Axis("relative motion (x2)", "mm"), traces,
         bands=tuple(contact_bands(orbit)), lines=gap_lines(orbit),
     )  # fmt: skip
-    said = f"The stop is not reached in case {case.name}." if case.screen.has_stop else NO_STOP
+    said = (
+        f"The stop is not reached in {case_words(case.name)}." if case.screen.has_stop else NO_STOP
+    )
     if case.stop_reached:
-        said = f"Shaded: the stop is touched, {_shares_of_turn(orbit)} (case {case.name})."
+        said = f"Shaded: the stop is touched, {_shares_of_turn(orbit)} ({case_words(case.name)})."
     orbits = _orbits(found)
     if orbits is None:
         return Figure("Relative motion over two turns", said, (turns,), height=MOTION_HEIGHT)
@@ -101,7 +107,11 @@ def portrait_figure(assessment: Assessment) -> Figure | None:
     found = _with_motion(assessment)
     if not found:
         return None
-    traces = tuple(_loop(orbit, "relative", case.name, k) for k, case, orbit in found)
+    names = case_names([case.name for _, case, _ in found])
+    traces = tuple(
+        _loop(orbit, "relative", name, k, len(found))
+        for name, (k, _, orbit) in zip(names, found, strict=True)
+    )
     width = MARGIN * max(float(np.abs(trace.x).max()) for trace in traces)
     height = MARGIN * max(float(np.abs(trace.y).max()) for trace in traces)
     lines = gap_lines(found[0][2], "x")
@@ -121,24 +131,34 @@ def portrait_figure(assessment: Assessment) -> Figure | None:
     return Figure("Phase portrait", caption, (panel,), height=380)
 
 
-def orbits_figure(assessment: Assessment) -> Figure | None:
-    """Paths of both frames in the x-y plane at true scale, one panel for each load case."""
+def orbits_figures(assessment: Assessment) -> tuple[Figure, ...]:
+    """Paths of both frames in the x-y plane at true scale, one panel for each load case.
+
+    Each figure fits a page; without the normal direction there is none.
+    """
     found = [one for one in _with_motion(assessment) if one[1].normal is not None]
-    if not found:
-        return None
     whole = _orbits(found)
     if whole is None:
-        return None
-    panels = tuple(
-        Panel(whole.x, whole.y, tuple(_paths([one], legend=k == 0)), title=one[1].name, equal=True)
-        for k, one in enumerate(found)
-    )
+        return ()
     columns = 2
-    rows = math.ceil(len(panels) / columns)
     # At true scale the orbits are only as high as this; the rest of a row is for words.
     orbit = min(max(ORBIT_WIDTH * _height_over_width(whole), ORBIT_HEIGHTS[0]), ORBIT_HEIGHTS[1])
-    height = 12 + round((ORBIT_WORDS + orbit) * rows)
-    return Figure("Orbits of both frames", ORBITS, panels, columns, height)
+    row = ORBIT_WORDS + orbit
+    count = columns * int(PAGE_ROOM / row)
+    figures = []
+    for first in range(0, len(found), count):
+        some = found[first : first + count]
+        panels = tuple(
+            Panel(
+                whole.x, whole.y, tuple(_paths([one], legend=k == 0)), equal=True,
+                title=within(one[1].name, TITLE_LETTERS),
+            )
+            for k, one in enumerate(some)
+        )  # fmt: skip
+        title = "Orbits of both frames" + (", continued" if first else "")
+        height = 12 + round(row * math.ceil(len(panels) / columns))
+        figures.append(Figure(title, ORBITS, panels, columns, height))
+    return tuple(figures)
 
 
 def contact_bands(orbit: Orbit) -> Iterator[Band]:
@@ -224,21 +244,24 @@ def _shaft() -> Axis:
 
 
 def _in_time(
-    orbit: Orbit, which: Coordinate, name: str, index: int = 0, *, legend: bool = True
-) -> Trace:
+    orbit: Orbit, which: Coordinate, name: str, index: int = 0, count: int = 1, *,
+    legend: bool = True,
+) -> Trace:  # fmt: skip
     angle = np.linspace(0.0, 360.0 * TURNS, TURNS * POINTS)
     t = np.radians(angle) / orbit.omega
+    colour, symbol = case_look(index, count)
     return Trace(
-        name, angle, orbit.displacement(which, t) * MM, "motion", case_colour(index),
-        symbol=case_symbol(index), bold=index == 0, legend=legend,
+        name, angle, orbit.displacement(which, t) * MM, "motion", colour, symbol=symbol,
+        bold=index == 0, legend=legend,
     )  # fmt: skip
 
 
-def _loop(orbit: Orbit, which: Coordinate, name: str, index: int = 0) -> Trace:
+def _loop(orbit: Orbit, which: Coordinate, name: str, index: int = 0, count: int = 1) -> Trace:
+    colour, symbol = case_look(index, count)
     t = np.linspace(0.0, orbit.period, POINTS * orbit.periods)
     return Trace(
         name, orbit.displacement(which, t) * MM, orbit.velocity(which, t), "motion",
-        case_colour(index), symbol=case_symbol(index), bold=index == 0,
+        colour, symbol=symbol, bold=index == 0,
     )  # fmt: skip
 
 
@@ -265,7 +288,7 @@ def _paths(found: Found, *, legend: bool) -> Iterator[Trace]:
         first = k == found[0][0]
         for name in ("floating", "main"):
             x = orbit.displacement(name, t) * MM
-            symbol = None if first else case_symbol(k)
+            symbol = None if first else case_look(k, len(found))[1]
             yield Trace(
                 label(name), x, y, "motion", name, symbol, bold=first, legend=legend and first,
                 dash="dashdot" if name == "floating" else "",

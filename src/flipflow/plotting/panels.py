@@ -196,6 +196,8 @@ class PanelGrid:
         Height in pixels at the width of an A4 page, 96 pixels an inch.
     shares
         Relative widths of the columns; empty for equal ones.
+    subject
+        What it belongs to, machine, load case, revision and date, for a figure on its own.
     """
 
     title: str
@@ -204,3 +206,4 @@ class PanelGrid:
     columns: int = 1
     height: int = 360
     shares: tuple[float, ...] = ()
+    subject: str = ""

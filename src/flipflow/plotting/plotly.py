@@ -48,17 +48,24 @@ PAGE = """<!DOCTYPE html>
 <link rel="icon" href="data:,">
 <style>body {{ font: 14px {family}; color: {ink}; width: {width}px; margin: 1.5em auto; }}
 h1 {{ font-size: 1.3em; }}</style></head>
-<body><h1>{title}</h1>{figure}<p>{caption}</p>
+<body><h1>{title}</h1>{subject}{figure}<p>{caption}</p>
 <script>{library}</script><script>{start}</script></body></html>
 """
 
 
 def page(figure: PanelGrid) -> str:
     """One HTML page with the figure, plotly.js embedded."""
+    subject = f"<p>{html.escape(figure.subject)}</p>" if figure.subject else ""
     return PAGE.format(
-        title=html.escape(figure.title), caption=html.escape(figure.caption), family=FAMILY,
-        ink=INK, width=WIDTH, figure=element(figure), library=library(), start=START,
+        subject=subject, title=html.escape(figure.title), caption=html.escape(figure.caption),
+        family=FAMILY, ink=INK, width=WIDTH, figure=element(figure), library=library(), start=START,
     )  # fmt: skip
+
+
+def words(text: str) -> str:
+    """Text as plotly.js shows it: it reads "<i>" and some entities, but not the one of a quote."""
+    plain = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return plain.replace("\n", "<br>")
 
 
 def element(figure: PanelGrid) -> str:
@@ -119,7 +126,7 @@ def _axis(axis: Axis, rect: Rect, figure: PanelGrid, key: str, *, across: bool) 
     made: Json = {
         "domain": [start / whole, min((start + length) / whole, 1.0)],
         "anchor": f"{'y' if across else 'x'}{key}",
-        "title": {"text": axis.title, "standoff": 5, "font": {"size": FONT}},
+        "title": {"text": words(axis.title), "standoff": 5, "font": {"size": FONT}},
         "ticks": "outside", "ticklen": 4, "tickcolor": INK, "linecolor": INK, "mirror": True,
         "showline": True, "gridcolor": FAINT, "zeroline": False, "automargin": False,
         "exponentformat": "none", "separatethousands": False,
@@ -127,15 +134,18 @@ def _axis(axis: Axis, rect: Rect, figure: PanelGrid, key: str, *, across: bool) 
     if axis.bounds is not None:
         made["range"] = list(axis.bounds)
     if axis.ticks:
-        made |= {"tickvals": [at for at, _ in axis.ticks], "ticktext": [w for _, w in axis.ticks]}
+        made |= {
+            "tickvals": [at for at, _ in axis.ticks],
+            "ticktext": [words(w) for _, w in axis.ticks],
+        }
         made["showgrid"] = across
     return made
 
 
 def _trace(trace: Trace, panel: Panel, key: str) -> Iterator[Json]:
     base = {
-        "type": "scatter", "name": trace.name, "xaxis": f"x{key}", "yaxis": f"y{key}",
-        "legendgroup": trace.name, "x": _plain(trace.x),
+        "type": "scatter", "name": words(trace.name), "xaxis": f"x{key}", "yaxis": f"y{key}",
+        "legendgroup": words(trace.name), "x": _plain(trace.x),
     }  # fmt: skip
     if trace.lower is not None:
         hidden = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
@@ -198,7 +208,7 @@ def _look(trace: Trace, colour: str) -> Json:
 def _hover(trace: Trace, panel: Panel) -> str:
     units = [f"%{{x:.4~r}} {panel.x.unit}"]
     units += [f"%{{customdata[{k}]:.4~r}} {unit}" for k, (unit, _) in enumerate(trace.x_also)]
-    rows = [f"<b>{html.escape(trace.name)}</b>", " = ".join(units)]
+    rows = [f"<b>{words(trace.name)}</b>", " = ".join(units)]
     rows.append(f"{panel.y.label}: %{{y:.4~r}} {panel.y.unit}")
     if trace.role in STABILITY_WORDS:
         rows.append(STABILITY_WORDS[trace.role])
@@ -212,13 +222,14 @@ def _bars(bars: tuple[Bar, ...], key: str) -> Iterator[Json]:
         kinds.setdefault((bar.name, bar.colour, bar.hatch), []).append(bar)
     for (name, colour, hatch), some in kinds.items():
         yield {
-            "type": "bar", "orientation": "h", "name": name, "legendgroup": name,
+            "type": "bar", "orientation": "h", "name": words(name), "legendgroup": words(name),
             "showlegend": any(bar.legend for bar in some), "xaxis": f"x{key}", "yaxis": f"y{key}",
             "base": [bar.low for bar in some], "x": [bar.high - bar.low for bar in some],
             "y": [bar.y for bar in some], "width": [bar.thickness for bar in some],
-            "text": [bar.text for bar in some], "textposition": "outside", "cliponaxis": False,
+            "text": [words(bar.text) for bar in some], "textposition": "outside",
+            "cliponaxis": False,
             "customdata": [[bar.low, bar.high] for bar in some],
-            "hovertemplate": f"<b>{html.escape(name)}</b><br>"
+            "hovertemplate": f"<b>{words(name)}</b><br>"
             "%{customdata[0]:.4~r} to %{customdata[1]:.4~r}<extra></extra>",
             "marker": {"color": COLOURS[colour], "line": {"width": 0.6, "color": INK},
                        "pattern": {"shape": hatch, "bgcolor": COLOURS[colour],
@@ -262,7 +273,7 @@ def _annotations(panel: Panel, key: str, geometry: Geometry, index: int) -> Iter
     data = {"xref": f"x{key}", "yref": f"y{key}"}
     if panel.title:
         above = geometry.titles[index] + 2
-        yield over | {"text": f"<b>{html.escape(panel.title)}</b>", "x": 0, "y": 1,
+        yield over | {"text": f"<b>{words(panel.title)}</b>", "x": 0, "y": 1,
                       "xanchor": "left", "yanchor": "bottom", "yshift": above}  # fmt: skip
     for k, line in enumerate(panel.lines):
         if line.text:
@@ -274,13 +285,14 @@ def _annotations(panel: Panel, key: str, geometry: Geometry, index: int) -> Iter
             "ay": arrow.y0, "axref": data["xref"], "ayref": data["yref"],
         }  # fmt: skip
     for note in panel.notes:
-        yield data | {"text": note.text, "x": note.x, "y": note.y, "showarrow": False,
+        text = "<br>".join(map(words, note.text.split("<br>")))
+        yield data | {"text": text, "x": note.x, "y": note.y, "showarrow": False,
                       "xanchor": note.anchor, "align": note.anchor, "bgcolor": VEIL,
                       "font": {"color": COLOURS[note.colour]}}  # fmt: skip
 
 
 def _line_label(line: Line, data: Json, over: Json, place: Label | None) -> Json:
-    label = {"text": line.text, "showarrow": False, "font": {"color": COLOURS[line.colour]}}
+    label = {"text": words(line.text), "showarrow": False, "font": {"color": COLOURS[line.colour]}}
     if place is not None:
         return label | {"xref": data["xref"], "yref": over["yref"], "x": line.at, "y": 1,
                         "yanchor": "bottom", "yshift": LABEL_ROW * place.level,

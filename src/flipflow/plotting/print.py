@@ -46,6 +46,7 @@ STYLE = {
     "svg.hashsalt": "flipflow",  # the same figure makes the same file
     "pdf.fonttype": 42,
     "hatch.linewidth": 0.6,
+    "text.parse_math": False,  # a load case may be called "$x$"
 }
 
 

@@ -14,7 +14,7 @@ from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.plotting.curves import Curve, Jump
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.layout import LEGEND_ROW, legend_rows
+from flipflow.plotting.layout import LEGEND_ROW, legend_rows, within
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
 from flipflow.plotting.panels import Arrow, Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, MM, RPM, SPEEDS
@@ -28,6 +28,8 @@ KIND_WORDS = {
 }  # fmt: skip
 KIND_SYMBOLS = {"fold": "diamond", "contact begin": "circle-open", "contact end": "cross"}
 BAND_POINTS = 300
+ROWS, ROW_HEIGHT = 5, 186  # of load cases one below the other on a page, pixels
+OTHER_CASES, LEGEND_LETTERS = "the other load cases", 48
 NEAR = 0.35
 MOST_COORDINATES = CASES
 LEGEND_WITHIN = 2  # rows of the legend of all load cases that its height has room for
@@ -77,6 +79,45 @@ def branch_figure(branch: Branch, omega: float | None = None, title: str = "") -
     return Figure(title or "Response over speed", caption, (top, bottom), height=430)
 
 
+def responses_figures(
+    branches: Sequence[tuple[str, Branch]], omega: float | None = None
+) -> tuple[Figure, ...]:
+    """Amplitude and phase along many branches, one below the other; each figure fits a page.
+
+    Parameters
+    ----------
+    branches
+        Names of load cases and their branches.
+    omega
+        Working speed in rad/s, marked where it is given.
+    """
+    figures = []
+    for first in range(0, len(branches), ROWS):
+        some = branches[first : first + ROWS]
+        panels = [panel for name, branch in some for panel in _row(name, branch, omega)]
+        title = "Response over speed" + (", continued" if first else "")
+        caption = f"Left amplitude, right phase of each load case. {READING}"
+        figures.append(
+            Figure(title, caption, tuple(panels), 2, 40 + ROW_HEIGHT * len(some), (0.56, 0.44))
+        )
+    return tuple(figures)
+
+
+def _row(name: str, branch: Branch, omega: float | None) -> tuple[Panel, Panel]:
+    """Amplitude and phase of one load case side by side, without marks at special points."""
+    names = coordinates(branch.system)
+    curves = [Curve.of(branch, one) for one in names]
+    pairs = list(zip(names, curves, strict=True))
+    axis, lines = speed_axis(branch.omega), _working(omega, text=False)
+    left = Panel(
+        axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        traces=tuple(t for n, c in pairs for t in _traces(n, c, "amplitude")), lines=lines,
+        arrows=_arrows(curves[-1].jumps()), title=within(name, LEGEND_LETTERS),
+    )  # fmt: skip
+    phase = tuple(t for n, c in pairs for t in _traces(n, c, "phase"))
+    return left, Panel(axis, _phase_axis(curves), traces=phase, lines=lines)
+
+
 def linear_figure(response: LinearResponse) -> Figure:
     """Amplitude and phase without contact over rpm, with the natural frequencies marked."""
     names = coordinates(response.system)
@@ -124,7 +165,7 @@ def cases_figure(assessment: Assessment) -> Figure:
         only the whole range.
     """
     curves = [Curve.of(case.branch, "relative") for case in assessment.cases]
-    names = [case.name for case in assessment.cases]
+    names = case_names([case.name for case in assessment.cases])
     whole = _cases_panel(assessment, names, curves, None)
     near = near_range(assessment)
     close = () if near is None else (_cases_panel(assessment, names, curves, near),)
@@ -139,6 +180,26 @@ def cases_figure(assessment: Assessment) -> Figure:
     )  # fmt: skip
     beyond = max(legend_rows(figure) - LEGEND_WITHIN, 0)
     return dataclasses.replace(figure, height=figure.height + LEGEND_ROW * beyond)
+
+
+def case_names(names: Sequence[str]) -> list[str]:
+    """What load cases are called in a legend: all but the first alike where they are many.
+
+    Colours and marks tell no more than six apart.
+    """
+    if len(names) > CASES:
+        return [within(names[0], LEGEND_LETTERS), *[OTHER_CASES] * (len(names) - 1)]
+    shown = [within(name, LEGEND_LETTERS) for name in names]
+    if len(set(shown)) == len(shown):
+        return shown
+    return [f"{k}: {within(name, LEGEND_LETTERS - 3)}" for k, name in enumerate(names, start=1)]
+
+
+def case_look(index: int, count: int) -> tuple[str, str | None]:
+    """Colour and symbol of a load case; all but the first are grey where they are many."""
+    if count > CASES and index:
+        return case_colour(CASES - 1), None
+    return case_colour(index), case_symbol(index)
 
 
 def coordinates(system: MechanicalSystem) -> tuple[Coordinate, ...]:
@@ -226,9 +287,10 @@ def _cases_panel(
     first = near is not None or near_range(assessment) is None
     traces = [t for t in (_case_band(curves, near, legend=first),) if t is not None]
     for k, (name, curve) in enumerate(zip(names, drawn, strict=True)):
+        colour, symbol = case_look(k, len(names))
         traces += curve_traces(
-            name, curve, curve.amplitude * MM, colour=case_colour(k), symbol=case_symbol(k),
-            bold=k == 0, legend=first,
+            name, curve, curve.amplitude * MM, colour=colour, symbol=symbol, bold=k == 0,
+            legend=first,
         )  # fmt: skip
     jumps = curves[0].jumps() if near is None else ()
     limits = assessment.project.limits.relative_amplitude or ()

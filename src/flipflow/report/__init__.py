@@ -2,6 +2,7 @@
 
 from flipflow.report import (  # noqa: F401  they register sections
     appendix,
+    compare,
     details,
     first_page,
     foundation,

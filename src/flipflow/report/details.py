@@ -8,12 +8,13 @@ from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
+from flipflow.model.load_case import case_words
 from flipflow.model.quantities import quantities_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.bars import energy_figure, region_figure
 from flipflow.plotting.drawing import Drawing
-from flipflow.plotting.motion import orbits_figure, portrait_figure
-from flipflow.plotting.response import branch_figure
+from flipflow.plotting.motion import orbits_figures, portrait_figure
+from flipflow.plotting.response import branch_figure, responses_figures
 from flipflow.plotting.schematic import schematic
 from flipflow.report.blocks import (
     Block,
@@ -24,9 +25,10 @@ from flipflow.report.blocks import (
     Heading,
     Note,
     Table,
+    Text,
     cells,
 )
-from flipflow.report.first_page import overleaf
+from flipflow.report.first_page import OVERLEAF_TITLE, overleaf, packed
 from flipflow.report.numbers import four_digits, named, rpm
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
@@ -36,6 +38,14 @@ SCHEMATIC = (
     "relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds the gap per "
     "side (e), that on the other side when x2 falls below -e."
 )
+MACHINE_TITLE = "The machine"
+MODEL_LIMITS = (
+    "Both frames are rigid bodies that move along the surface and, together, normal to it; they do "
+    "not pitch, roll or bend, and what lies off the centre of mass or varies over the deck is not "
+    "seen. The panels appear by what their load case says of them, not as elastic or stretched "
+    "parts of their own. Material is mass attached to the frames: it neither bounces nor flows. "
+    "Springs and dampers are linear but for the stops, and the foundation does not move."
+)
 CASES_ABREAST = 6  # load cases for which a table has columns on an A4 page
 SYMBOLS = {
     "clearance": "gap per side e",
@@ -44,11 +54,19 @@ SYMBOLS = {
 }
 
 
+@section(Assessment, Part.DETAILS, 1)
+def model_limits(assessment: Assessment) -> Iterator[Block]:
+    """What the model leaves out, on the back of the first page."""
+    yield Heading(OVERLEAF_TITLE if _overflows(assessment) else MACHINE_TITLE, 1)
+    yield Text(MODEL_LIMITS, "Model limits:")
+
+
 @section(Assessment, Part.DETAILS, 10)
 def machine(assessment: Assessment) -> Iterator[Block]:
     """The machine as a drawing."""
     screen = assessment.project.screen
-    yield Heading("The machine", 1, new_page=not list(overleaf(assessment)))
+    if _overflows(assessment):
+        yield Heading(MACHINE_TITLE, 1, new_page=False)
     yield DrawingBlock(Drawing("Schematic", SCHEMATIC, schematic(screen, drawn_values(screen))))
 
 
@@ -56,11 +74,17 @@ def machine(assessment: Assessment) -> Iterator[Block]:
 def parameters(assessment: Assessment) -> Iterator[Block]:
     """All values of the machine file with their sources."""
     check = check_project(assessment.project)
-    columns = (Column("Value"), Column("Symbol"), Column("As written"), Column("Source"))
+    titles = ("Value", "Symbol", "As written", "Source")
+    columns = tuple(Column(title) for title in titles)
     rows = tuple(_parameter(value) for value in check.values)
+    if not any(value.source for value in check.values):
+        columns, rows = columns[:-1], tuple(row[:-1] for row in rows)
     yield Table("Values of the machine file", columns, rows)
     yield _derived(check)
     yield _load_cases(check.load_cases)
+    unsourced = _without_source(check)
+    if unsourced:
+        yield Note(f"No source given for {unsourced}.")
     yield from (Note(f"Sum of pieces, {key}: {text}") for key, text in check.sums.items())
     yield from (Note(f"Assumed: {text}") for text in check.assumed)
     yield from (Note(f"Missing: {g.missing}; not available: {g.disables}") for g in check.missing)
@@ -74,8 +98,9 @@ def quantities(assessment: Assessment) -> Iterator[Block]:
         return
     yield Heading("Results", 1, new_page=False)
     speed = "" if assessment.omega is None else f" at {rpm(assessment.omega)} rpm"
-    for group in (found[k : k + CASES_ABREAST] for k in range(0, len(found), CASES_ABREAST)):
-        yield _quantities(f"Quantities{speed}", group)
+    for k in range(0, len(found), CASES_ABREAST):
+        title = f"Quantities{speed}" + (", continued" if k else "")
+        yield _quantities(title, found[k : k + CASES_ABREAST], explained=k == 0)
 
 
 @section(Assessment, Part.DETAILS, 40)
@@ -87,16 +112,27 @@ def allowed_speeds(assessment: Assessment) -> Iterator[Block]:
 @section(Assessment, Part.DETAILS, 50)
 def portrait(assessment: Assessment) -> Iterator[Block]:
     """Orbits case by case, phase portrait and energy balance."""
-    figures = [make(assessment) for make in (orbits_figure, portrait_figure, energy_figure)]
+    yield from (FigureBlock(figure) for figure in orbits_figures(assessment))
+    figures = [make(assessment) for make in (portrait_figure, energy_figure)]
     yield from (FigureBlock(figure) for figure in figures if figure is not None)
 
 
 @section(Assessment, Part.DETAILS, 60)
 def responses(assessment: Assessment) -> Iterator[Block]:
     """Response of main frame, floating frame and relative motion, case by case."""
-    for case in assessment.cases:
-        title = f"Response over speed, case {case.name}"
+    cases = assessment.cases
+    if len(cases) > CASES_ABREAST:
+        branches = [(case.name, case.branch) for case in cases]
+        yield from map(FigureBlock, responses_figures(branches, assessment.omega))
+        return
+    for case in cases:
+        title = f"Response over speed, {case_words(case.name)}"
         yield FigureBlock(branch_figure(case.branch, assessment.omega, title))
+
+
+def _overflows(assessment: Assessment) -> bool:
+    """Whether something of the first page stands overleaf."""
+    return bool(list(overleaf(assessment))) or packed(assessment)
 
 
 def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
@@ -109,13 +145,14 @@ def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
     }
 
 
-def _quantities(title: str, cases: Sequence[CaseAssessment]) -> Table:
+def _quantities(title: str, cases: Sequence[CaseAssessment], *, explained: bool) -> Table:
     columns = (Column("Quantity"), Column("Symbol"), *(Column(c.name, numeric=True) for c in cases))
     rows = []
     for one in quantities_of("motion"):
         values = [named(one.name, case.values.get(one.name)) for case in cases]
         label = one.label[:1].upper() + one.label[1:]
-        rows.append((Cell(label, one.sentence), Cell(one.symbol), *cells(*values)))
+        sentence = one.sentence if explained else ""
+        rows.append((Cell(label, sentence), Cell(one.symbol), *cells(*values)))
     return Table(title, columns, tuple(rows))
 
 
@@ -126,8 +163,22 @@ def _parameter(value: Value) -> tuple[Cell, ...]:
         Cell(value.key, sentence),
         Cell(value.symbol),
         Cell(value.written),
-        Cell(value.source or "no source given"),
+        Cell(value.source),
     )
+
+
+def _without_source(check: Check) -> str:
+    """How many values and load cases have no source, in words; empty where all have one."""
+    counts = (
+        ("value", sum(not value.source for value in check.values), len(check.values)),
+        ("load case", sum(not case.source for case in check.load_cases), len(check.load_cases)),
+    )
+    parts = [
+        f"{count} of {every} {word}{'' if every == 1 else 's'}"
+        for word, count, every in counts
+        if count
+    ]
+    return " and ".join(parts)
 
 
 def _derived(check: Check) -> Table:
@@ -167,7 +218,7 @@ def _load_cases(cases: tuple[Case, ...]) -> Table:
             *(f"{x:.4g}" for x in (case.stop_stiffness_factor, case.stop_damping_factor)),
             *(f"{x:.4g}" for x in (case.main_mass, case.floating_mass)),
             "-" if case.temperature is None else f"{case.temperature:.4g}{_of_air(case)}",
-            case.source or "no source given",
+            case.source,
         )
         for case in cases
     )

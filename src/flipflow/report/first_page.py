@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
+import textwrap
 from collections.abc import Iterator
 
 from flipflow.model.limits import PASSAGES
+from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
-from flipflow.plotting.response import LEGEND_WITHIN, cases_figure
+from flipflow.plotting.response import LEGEND_WITHIN, case_names, cases_figure
 from flipflow.report.blocks import (
     Block,
     Cell,
     Column,
     FigureBlock,
-    Heading,
     Note,
     Table,
     Text,
@@ -42,6 +43,11 @@ NO_NORMAL = (
 # What an A4 page has room for beside all that stands there always: rows of load cases, a line of
 # a note being as high as so many rows; lines of notes when the table of load cases is overleaf.
 MOST_ROWS, NOTE_ROWS, NOTE_LINES, LINE_LENGTH = 4, 1.5, 4, 118
+# Lines beyond which what the surroundings bear goes overleaf, too.
+MOST_LINES = 5
+# Letters that fit one line: the title, cells of its block (by column, less those of the label),
+# the verdict, the name of a load case in the table of limits.
+TITLE_LETTERS, CELL_LETTERS, VERDICT_LETTERS, CASE_LETTERS = 48, (31, 31, 42), 98, 34
 MOST_NAMED = 4
 OVERLEAF, OVERLEAF_TITLE = 'under "Load cases and notes" on the next page', "Load cases and notes"
 CASE_COLUMNS = (
@@ -57,8 +63,12 @@ CASE_COLUMNS = (
 @section(Assessment, Part.FIRST_PAGE, 10)
 def title_block(assessment: Assessment) -> Iterator[Block]:
     """Name, project, customer, drawing, and who signs."""
+    yield _title_block(assessment)
+
+
+def _title_block(assessment: Assessment) -> TitleBlock:
     document, omega = assessment.project.document, assessment.omega
-    yield TitleBlock(
+    return TitleBlock(
         document.name or assessment.project.name,
         (
             ("Project", document.project),
@@ -168,8 +178,6 @@ def overleaf(assessment: Assessment) -> Iterator[Block]:
     """What the first page has no room for: the table of many load cases, further notes."""
     notes = assessment.notes[notes_that_fit(assessment) :]
     table = assessment.omega is not None and crowded(assessment)
-    if table or notes:
-        yield Heading(OVERLEAF_TITLE, 1)
     if table:
         yield _cases_table(assessment)
     yield from (Note(note) for note in notes)
@@ -189,12 +197,22 @@ def _cases_table(assessment: Assessment) -> Table:
 
 @section(Assessment, Part.FIRST_PAGE, 70)
 def surroundings(assessment: Assessment) -> Iterator[Block]:
-    """What goes into the ground; one line each on springs, exciter and bearings."""
-    if assessment.omega is None:
-        return
+    """One line each on foundation, springs, exciter and bearings, if they fit."""
+    if assessment.omega is not None and not packed(assessment):
+        yield _surroundings(assessment)
+
+
+@section(Assessment, Part.DETAILS, 6)
+def further_surroundings(assessment: Assessment) -> Iterator[Block]:
+    """The same where the first page has no room for it."""
+    if assessment.omega is not None and packed(assessment):
+        yield _surroundings(assessment)
+
+
+def _surroundings(assessment: Assessment) -> Values:
     loads, screen = assessment.foundation, assessment.project.screen
     bearing = "bearing_force" if QUANTITIES["bearing_load"].missing(screen) else "bearing_load"
-    yield Values(
+    return Values(
         (
             ("Into the ground", "not known" if loads is None else loads.sentence),
             ("Springs", _springs(assessment)),
@@ -210,6 +228,12 @@ def crowded(assessment: Assessment) -> bool:
     return len(assessment.cases) + NOTE_ROWS * lines > MOST_ROWS
 
 
+def packed(assessment: Assessment) -> bool:
+    """Whether what foundation and springs bear goes overleaf, too."""
+    shown = assessment.notes[: notes_that_fit(assessment)]
+    return sum(map(_note_lines, shown)) + _other_lines(assessment) > MOST_LINES
+
+
 def notes_that_fit(assessment: Assessment) -> int:
     """How many notes the first page has room for; where not all fit, a line says so."""
     room = NOTE_LINES - _other_lines(assessment)
@@ -219,14 +243,35 @@ def notes_that_fit(assessment: Assessment) -> int:
 
 def _other_lines(assessment: Assessment) -> int:
     """Lines of the first page that not every machine needs."""
-    names = ["band of load cases", *(case.name for case in assessment.cases)]
+    names = ["band of load cases", *case_names([case.name for case in assessment.cases])]
     return (
-        max(legend_lines(names) - LEGEND_WITHIN, 0)
+        max(legend_lines(list(dict.fromkeys(names))) - LEGEND_WITHIN, 0)
         + bool(contact_sentence(assessment.region))
         + (not any(case.normal for case in assessment.cases))
         + _note_lines(f"Does it start: {does_it_start(assessment.transients)}")
         - 1
+        + _title_lines(_title_block(assessment))
+        + _wrapped(assessment.verdict, VERDICT_LETTERS)
+        + _wrapped(stop_sentence(assessment), LINE_LENGTH)
+        + sum(_wrapped(row.case, CASE_LETTERS) for row in assessment.limits_table)
     )
+
+
+def _title_lines(block: TitleBlock) -> int:
+    """Lines of the title and its block beyond one a row; a line of the title is two high."""
+    lines = 2 * _wrapped(block.title, TITLE_LETTERS)
+    columns = len(CELL_LETTERS)
+    for row in (block.rows[k : k + columns] for k in range(0, len(block.rows), columns)):
+        lines += max(
+            _wrapped(text, room - len(label))
+            for (label, text), room in zip(row, CELL_LETTERS, strict=False)
+        )
+    return lines
+
+
+def _wrapped(text: str, letters: int) -> int:
+    """Lines beyond the first."""
+    return max(len(textwrap.wrap(text, letters)) - 1, 0)
 
 
 def _note_lines(note: str) -> int:
@@ -287,12 +332,15 @@ def _reached(omega: float, cases: tuple[CaseAssessment, ...]) -> str:
 def _bound(bound: Bound, region_end: str) -> str:
     """What ends the allowed range; ``region_end`` says what ends the operating region there."""
     if bound.limit == REGION:
-        return region_end
+        words = region_end.removesuffix(")")
+        return f"{words}{', ' if words != region_end else ' ('}empty machine)"
     if bound.limit == "speed":
         return "the limit on speed"
     if bound.limit == STABILITY:
-        return f"where the motion is not sure to return after a disturbance (case {bound.case})"
-    return f"the limit on {QUANTITIES[bound.limit].label} (case {bound.case})"
+        return (
+            f"where the motion is not sure to return after a disturbance ({case_words(bound.case)})"
+        )
+    return f"the limit on {QUANTITIES[bound.limit].label} ({case_words(bound.case)})"
 
 
 def _limit_row(row: LimitRow) -> tuple[Cell, ...]:
@@ -344,7 +392,7 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
         for name in names
         if case.values.get(name) is not None
     ]
-    where = f" (case {case.name})" if len(assessment.cases) > 1 else ""
+    where = f" ({case_words(case.name)})" if len(assessment.cases) > 1 else ""
     return f"{', '.join(parts)}{where}"
 
 

@@ -14,11 +14,22 @@ from flipflow.report.blocks import Block
 from flipflow.report.registry import blocks_of
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
+from flipflow.studies.compare import Comparison
 
 if TYPE_CHECKING:
     import jinja2
 
 TEMPLATES = "templates"
+# Where the first page runs over by some lines, what follows goes on behind them: no sheet is left
+# with those lines alone. 1054 pixels are an A4 page within its margins.
+BREAKS = """
+const begin = document.querySelector("main > :first-child");
+const next = document.querySelector("h2.page");
+if (begin && next) {
+  const height = next.getBoundingClientRect().top - begin.getBoundingClientRect().top - 22;
+  if (height > 1054 && height % 1054 < 1054 / 3) next.classList.remove("page");
+}
+"""
 
 
 def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
@@ -58,6 +69,17 @@ def html(assessment: Assessment) -> str:
     )
 
 
+def comparison_html(found: Comparison) -> str:
+    """The page of machines compared as text."""
+    inputs = ", ".join(one.input_hash for one in found.assessments)
+    return page(
+        blocks_of(found),
+        title=" and ".join(found.names),
+        kind="comparison",
+        footer=f"flipflow {found.version}, inputs {inputs}",
+    )
+
+
 def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
     """Blocks as one self-contained HTML page.
 
@@ -86,6 +108,7 @@ def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
             style=_template("report.css"),
             library=library(),
             start=START,
+            breaks=BREAKS,
             element=element,
         )
     )

@@ -38,7 +38,12 @@ def summary(result: object, console: Console) -> None:
         Where to print.
     """
     for block in blocks_of(result, brief=True):
-        _show(block, console)
+        show(block, console)
+
+
+def show(block: Block, console: Console) -> None:
+    """Print one block; one that a terminal cannot show is left out."""
+    _show(block, console)
 
 
 def say(console: Console, text: str, style: str = "") -> None:

@@ -24,6 +24,7 @@ from flipflow.model.limits import (
     Passage,
     limit_bounds,
 )
+from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
 from flipflow.model.numerals import digits
 from flipflow.model.project import Project
@@ -517,9 +518,12 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
     names = [case.name for case in cases if sum(orbit.stable for orbit in case.orbits) > 1]
     if not names:
         return ()
+    head = f"Cases {'; '.join(names)}"
+    if len(names) == 1:
+        head = case_words(names[0], capital=True)
     sentence = (
-        f"{'Case' if len(names) == 1 else 'Cases'} {'; '.join(names)}: another motion is possible "
-        "at this speed; shown is the one reached when the speed is raised from below."
+        f"{head}: another motion is possible at this speed; shown is the one reached when the "
+        "speed is raised from below."
     )
     return (sentence,)
 

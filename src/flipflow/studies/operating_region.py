@@ -11,6 +11,7 @@ from flipflow.continuation.special_points import CONTACT_BEGIN
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_all, checked_interval, checked_monitor
 from flipflow.model.limits import Limits
+from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -165,7 +166,7 @@ def operating_region(
         ((), *(case.notes for case in cases)), strict=True,
     )  # fmt: skip
     unfinished = dict.fromkeys(
-        f"Case {name}: {text}"
+        f"{case_words(name, capital=True)}: {text}"
         for name, one, own_notes in named
         for text in (*one.notes, *own_notes, *([] if one.complete else [one.status.value]))
     )

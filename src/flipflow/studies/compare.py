@@ -1,0 +1,341 @@
+"""Machines side by side: which inputs differ, and how each result changes."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from flipflow import __version__
+from flipflow.errors import InputError
+from flipflow.model.arguments import checked_monitor, members_of
+from flipflow.model.drive import DRIVE_FIELDS
+from flipflow.model.fields import FIELDS
+from flipflow.model.limits import LIMIT_FIELDS, Limits, limit_bounds
+from flipflow.model.load_case import case_words
+from flipflow.model.monitor import Monitor
+from flipflow.model.project import Document, Project
+from flipflow.model.quantities import QUANTITIES, quantities_of
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.results.frozen import Frozen
+from flipflow.studies.assessment import Assessment, CaseAssessment, assess, relative_margin
+
+# The layer above reads files; `plot` and `save` are bound as late.
+READER = "flipflow.io.project"
+REMEDY = "give a list of at least two projects, screens or paths of machine files"
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+ROUNDING = 1e-9  # of a value: what the solution of one motion leaves open
+EMPTY = "empty machine"
+REGION = (
+    ("omega_cs", "contact begins (w_cs)"),
+    ("omega_lb", "jump when the speed falls (w_lb)"),
+    ("omega_ub", "jump when the speed rises (w_ub)"),
+    ("omega_ea", "equal amplitudes (w_ea)"),
+    ("omega_ar", "antiresonance of the main frame (w_ar)"),
+    ("lower", "operating region from"),
+    ("upper", "operating region to"),
+)
+LOAD_UNITS: Mapping[str, tuple[str, str]] = {
+    "main_mass": ("kg", "kg"), "floating_mass": ("kg", "kg"), "temperature": ("degC", "degC"),
+}  # fmt: skip
+
+Given = float | str | None
+Flat = dict[str, tuple[str, str, Given]]
+
+
+@dataclass(frozen=True)
+class InputDifference:
+    """An input in which machines differ.
+
+    Parameters
+    ----------
+    key
+        Its place in the machine file.
+    unit, shown_unit
+        SI unit, and the unit it is written in.
+    values
+        Of each machine, SI or a word; None where it is not given.
+    """
+
+    key: str
+    unit: str
+    shown_unit: str
+    values: tuple[Given, ...]
+
+
+@dataclass(frozen=True)
+class ResultChange:
+    """One result of every machine.
+
+    Parameters
+    ----------
+    name, label
+        Key and words. A margin is "margin of" a limit, as a share of it.
+    case
+        The load case; the empty machine for characteristic speeds.
+    unit, shown_unit
+        SI unit, and the unit to show.
+    values
+        Of each machine, SI; None where it has none.
+    """
+
+    name: str
+    label: str
+    case: str
+    unit: str
+    shown_unit: str
+    values: tuple[float | None, ...]
+
+    def change(self, of: int = 1, against: int = 0) -> float | None:
+        """Value of one machine less that of another, SI; None where either has none.
+
+        It changes its sign where the machines are swapped.
+        """
+        one, other = self.values[of], self.values[against]
+        if one is None or other is None:
+            return None
+        return 0.0 if one == other else one - other
+
+    @property
+    def changes(self) -> bool:
+        """Whether the machines differ in it by more than rounding."""
+        first, *others = self.values
+        return any(not _alike(first, other) for other in others)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Frozen):
+    """Machines compared.
+
+    Parameters
+    ----------
+    names
+        What each is called here, all different.
+    assessments
+        Each machine judged at its own working speed, against its own limits.
+    version
+        The version that compared them.
+    """
+
+    names: tuple[str, ...]
+    assessments: tuple[Assessment, ...]
+    version: str = __version__
+
+    def __repr__(self) -> str:
+        changed = sum(row.changes for row in self.results)
+        return (
+            f"Comparison({', '.join(self.names)}: {len(self.inputs)} inputs differ, {changed} of "
+            f"{len(self.results)} results change)"
+        )
+
+    @cached_property
+    def inputs(self) -> tuple[InputDifference, ...]:
+        """The inputs that differ, in the order of the machine file."""
+        flat = [_inputs_of(one.project) for one in self.assessments]
+        keys = dict.fromkeys(key for inputs in flat for key in inputs)
+        return tuple(_differences(keys, flat))
+
+    @cached_property
+    def results(self) -> tuple[ResultChange, ...]:
+        """Every result: characteristic speeds, then case by case quantities and margins."""
+        flat = [_results_of(one) for one in self.assessments]
+        rows = []
+        for key in dict.fromkeys(key for results in flat for key in results):
+            head = next(results[key][0] for results in flat if key in results)
+            values = tuple(results[key][1] if key in results else None for results in flat)
+            rows.append(ResultChange(key[1], head[0], key[0], head[1], head[2], values))
+        return tuple(sorted(rows, key=lambda row: self._order.index(row.case)))
+
+    @cached_property
+    def _order(self) -> list[str]:
+        """Load cases in the order of the files, the empty machine's speeds first."""
+        names = (case.name for one in self.assessments for case in one.cases)
+        return list(dict.fromkeys((EMPTY, *names)))
+
+    def result(self, name: str, case: str = EMPTY) -> ResultChange:
+        """One result by its name and load case.
+
+        Raises
+        ------
+        InputError
+            For a name that no machine has a result of in that case.
+        """
+        for row in self.results:
+            if (row.name, row.case) == (name, case):
+                return row
+        known = ", ".join(dict.fromkeys(row.name for row in self.results if row.case == case))
+        what = f"choose one of {known}" if known else f"give a case of {', '.join(self._order)}"
+        raise InputError("result", f"{name}, {case_words(case)}", what)
+
+
+def compare(
+    machines: Sequence[Project | FlipFlowScreen | str | os.PathLike[str]],
+    *,
+    omega: float | None = None,
+    monitor: Monitor | None = None,
+) -> Comparison:
+    """Compare machines: which inputs differ, and how each result changes.
+
+    Parameters
+    ----------
+    machines
+        At least two: projects, screens, paths of machine files or bundled names. The first is
+        what the others are compared with.
+    omega
+        Speed in rad/s at which all are looked at; None: each at its own working speed.
+    monitor
+        Called with a sentence and the share done, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        For fewer than two machines, and for what is none.
+    """
+    given = members_of(machines)
+    if given is None or isinstance(machines, (str, os.PathLike)) or len(given) < 2:
+        raise InputError("machines", machines, REMEDY)
+    say = checked_monitor(monitor)
+    projects = [_project(one) for one in given]
+    if omega is not None:
+        projects = [replace(project, speed=omega) for project in projects]
+    names = distinct_names(projects)
+    found = []
+    for k, (name, project) in enumerate(zip(names, projects, strict=True)):
+
+        def during(sentence: str, share: float, k: int = k, name: str = name) -> None:
+            say(f"{name}, {sentence}", (k + share) / len(projects))
+
+        found.append(assess(project, during))
+    return Comparison(names, tuple(found))
+
+
+def distinct_names(projects: Sequence[Project]) -> tuple[str, ...]:
+    """What each machine is called; a letter tells those of one name apart."""
+    names = [project.document.name or project.name for project in projects]
+    if len(set(names)) == len(names):
+        return tuple(names)
+    stems = [project.name for project in projects]
+    if len(set(stems)) == len(stems):
+        return tuple(stems)
+    return tuple(f"{name} ({_letter(k)})" for k, name in enumerate(names))
+
+
+def _letter(k: int) -> str:
+    return LETTERS[k] if k < len(LETTERS) else str(k + 1)
+
+
+def _alike(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return math.isclose(one, other, rel_tol=ROUNDING)
+
+
+def _project(given: object) -> Project:
+    """The project of whatever stands for a machine."""
+    if isinstance(given, Project):
+        return given
+    if isinstance(given, FlipFlowScreen):
+        return Project(
+            screen=given, limits=Limits(), load_cases=(Load(name="empty"),), speed=None,
+            document=Document(name="screen"), sources={}, name="screen", path=None, written={},
+            sums={}, assumed=(),
+        )  # fmt: skip
+    if isinstance(given, (str, os.PathLike)):
+        read: Project = importlib.import_module(READER).load_project(given)
+        return read
+    raise InputError("machines", type(given).__name__, REMEDY)
+
+
+def _differences(keys: Mapping[str, None], flat: Sequence[Flat]) -> Iterator[InputDifference]:
+    for key in keys:
+        unit, shown_unit, _ = next(inputs[key] for inputs in flat if key in inputs)
+        values = tuple(inputs[key][2] if key in inputs else None for inputs in flat)
+        if any(value != values[0] for value in values):
+            yield InputDifference(key, unit, shown_unit, values)
+
+
+def _inputs_of(project: Project) -> Flat:
+    """Every input that decides a result, by its place in the machine file; None is left out."""
+    flat: Flat = {}
+    units = {field.name: (field.key, field.unit, field.file_unit) for field in FIELDS}
+    for name, value in _parts(project.screen):
+        key, *pair = units.get(name, (name, "", ""))
+        flat[key] = (pair[0], pair[1], value)
+    flat["operation.speed"] = ("rad/s", "rpm", project.speed)
+    if project.drive is not None:
+        units = {field.name: (field.key, field.unit, field.file_unit) for field in DRIVE_FIELDS}
+        for name, value in _parts(project.drive):
+            last = name.rpartition(".")[2]
+            key, *pair = units.get(last, (f"drive.{name}", "", ""))
+            flat[key] = (pair[0], pair[1], value)
+    units = {field.name: (field.key, field.unit, field.file_unit) for field in LIMIT_FIELDS}
+    for name, value in _parts(project.limits):
+        field, _, end = name.partition("[")
+        key, *pair = units.get(field, (f"limits.{field}", "", ""))
+        words = {"0]": ", least", "1]": ", most"}.get(end, "")
+        flat[f"{key}{words}"] = (pair[0], pair[1], value)
+    for load in project.load_cases:
+        flat[f"load case {load.name}"] = ("", "", "given")
+        for name, value in _parts(load):
+            if name != "name":
+                pair = list(LOAD_UNITS.get(name, ("", "")))
+                flat[f"load case {load.name}, {name}"] = (pair[0], pair[1], value)
+    return {key: one for key, one in flat.items() if one[2] is not None}
+
+
+def _parts(value: object, name: str = "") -> Iterator[tuple[str, Given]]:
+    """Numbers and words of a dataclass by name, those of others in it as ``a.b`` or ``a[0]``."""
+    if dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from _parts(getattr(value, field.name), f"{name}.{field.name}".lstrip("."))
+    elif isinstance(value, (tuple, list)):
+        for k, one in enumerate(value):
+            yield from _parts(one, f"{name}[{k}]")
+    elif value is None or isinstance(value, (float, str)):
+        yield name, value
+    elif isinstance(value, bool):
+        yield name, str(value).lower()
+    elif isinstance(value, int):
+        yield name, float(value)
+    else:
+        yield name, str(value)
+
+
+Head = tuple[str, str, str]
+Results = dict[tuple[str, str], tuple[Head, float | None]]
+
+
+def _results_of(found: Assessment) -> Results:
+    """Results by load case and name: words, unit, unit to show, and the value."""
+    region = found.region
+    speed = ("rad/s", "rpm")
+    rows: Results = {}
+    for name, label in REGION:
+        rows[EMPTY, name] = ((label, *speed), getattr(region, name))
+    ends = (region.feasible[0][0], region.feasible[-1][1]) if region.feasible else (None, None)
+    for word, end in zip(("from", "to"), ends, strict=True):
+        rows[EMPTY, f"allowed_{word}"] = ((f"allowed speed range {word}", *speed), end)
+    for case in found.cases:
+        rows |= {(case.name, name): one for name, one in _case_results(found, case)}
+    return rows
+
+
+def _case_results(
+    found: Assessment, case: CaseAssessment
+) -> Iterator[tuple[str, tuple[Head, float | None]]]:
+    for one in quantities_of("motion"):
+        value = case.values.get(one.name)
+        yield one.name, ((one.label, one.unit, one.shown_unit), value)
+    for k, fold in enumerate(sorted(point.omega for point in case.branch.folds), start=1):
+        yield f"fold_{k}", ((f"jump speed {k} (fold)", "rad/s", "rpm"), fold)
+    for name in found.project.limits.given:
+        quantity = QUANTITIES[name]
+        value = found.omega if quantity.of == "operation" else case.values.get(name)
+        margin = None
+        if value is not None and not math.isnan(value):
+            margin = relative_margin(value, *limit_bounds(found.project.limits, name))
+        yield f"margin of {name}", ((f"{quantity.label}: margin", "", "%"), margin)

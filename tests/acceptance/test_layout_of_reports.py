@@ -1,0 +1,152 @@
+"""Many load cases, long names and odd ones: nothing is cut, squashed or taken for markup."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+import flipflow as ff
+from flipflow.plotting.bars import energy_figure
+from flipflow.plotting.layout import WIDTH, arrange
+from flipflow.plotting.plotly import described
+from flipflow.plotting.response import case_names, cases_figure
+from flipflow.report.blocks import FigureBlock, Heading, Note, Table, Text
+from flipflow.report.html import html
+from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import assess
+
+CHROMIUM = shutil.which("chromium")
+READER = shutil.which("pdftotext")
+SHEET = 1054  # pixels of an A4 page within its margins
+ODD = 'voll <i> "Öl" & $x_1$'
+LONG = "vollbeladen mit nassem, klebrigem Schüttgut bei halber Aufgabeleistung und Frost"
+CUSTOMER = "Gesellschaft für Aufbereitungstechnik und Siebmaschinenbau mbH"
+
+
+@pytest.fixture(scope="module")
+def project():
+    return ff.load_project("ffs0827")
+
+
+@pytest.fixture(scope="module")
+def odd(project):
+    """Load cases with names that a figure could choke on."""
+    loads = tuple(
+        ff.Load(name=name, stiffness_factor=1.0 + 0.1 * k)
+        for k, name in enumerate(("empty", ODD, LONG))
+    )
+    return assess(dataclasses.replace(project, load_cases=loads))
+
+
+@pytest.fixture(scope="module")
+def many(project):
+    """Thirty load cases."""
+    loads = tuple(
+        ff.Load(name=f"Fall {k + 1}: Steifigkeit", stiffness_factor=1.0 + 0.01 * k)
+        for k in range(30)
+    )
+    return assess(dataclasses.replace(project, load_cases=loads))
+
+
+def figures_of(assessment):
+    return [b.figure for b in blocks_of(assessment) if isinstance(b, FigureBlock)]
+
+
+def printed_pages(assessment, folder):
+    """The text of each page of the report as a browser prints it."""
+    report, sheet = folder / "report.html", folder / "report.pdf"
+    report.write_text(html(assessment), encoding="utf-8")
+    subprocess.run(
+        [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000",
+         f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer",
+         f"--print-to-pdf={sheet}", report.as_uri()],
+        capture_output=True, timeout=120, check=True,
+    )  # fmt: skip
+    text = subprocess.run([READER, "-layout", sheet, "-"], capture_output=True, check=True).stdout
+    return text.decode().split("\f")[:-1]
+
+
+def test_no_word_of_a_name_is_markup_or_an_entity(odd):
+    """plotly.js reads "<i>" as markup and shows entities it does not know, "&quot;" say."""
+    escaped = 'voll &lt;i&gt; "Öl" &amp; $x_1$'
+    for figure in figures_of(odd):
+        text = json.dumps(described(figure), ensure_ascii=False)
+        assert "&quot;" not in text
+        assert "<i>" not in text
+    names = {item["name"] for item in described(cases_figure(odd))["data"]}
+    assert escaped in names
+
+
+def test_a_name_in_dollars_is_no_formula_in_print(odd, tmp_path):
+    path = cases_figure(odd).write(tmp_path / "cases.svg")
+    assert "$x_1$" in path.read_text(encoding="utf-8")
+
+
+def test_a_long_name_leaves_the_energy_chart_its_room(odd):
+    figure = energy_figure(odd)
+    (rect,) = arrange(figure).rects
+    assert rect.width > 0.5 * WIDTH
+    words = [word for _, word in figure.panels[0].y.ticks]
+    assert words[2].startswith("vollbeladen mit nassem")
+    assert max(len(line) for word in words for line in word.splitlines()) <= 36
+
+
+def test_long_names_that_begin_alike_stay_apart():
+    names = [f"{LONG}, Fall {k}" for k in range(3)]
+    assert len(set(case_names(names))) == 3
+
+
+def test_every_figure_of_many_cases_fits_a_page(many):
+    for figure in figures_of(many):
+        assert figure.height < SHEET - 60, figure.title
+    orbits = [f for f in figures_of(many) if f.title.startswith("Orbits of both frames")]
+    shown = [panel.title for figure in orbits for panel in figure.panels if panel.equal]
+    assert [title for title in shown if title] == [case.name for case in many.cases]
+
+
+def test_the_model_limits_stand_on_the_back_of_the_first_page(odd, many):
+    for assessment in (odd, many):
+        blocks = blocks_of(assessment)
+        first = next(k for k, b in enumerate(blocks) if isinstance(b, Heading) and b.new_page)
+        paragraph = blocks[first + 1]
+        assert isinstance(paragraph, Text)
+        assert paragraph.lead == "Model limits:"
+        for word in ("rigid", "pitch", "panels", "mass attached"):
+            assert word in paragraph.text
+        assert sum(isinstance(b, Text) and b.lead == "Model limits:" for b in blocks) == 1
+
+
+def test_values_without_a_source_are_one_line(project):
+    bare = dataclasses.replace(project, sources={}, load_cases=project.load_cases[:2])
+    blocks = blocks_of(assess(bare))
+    notes = [b.text for b in blocks if isinstance(b, Note) and "No source given" in b.text]
+    assert len(notes) == 1
+    assert re.fullmatch(r"No source given for (\d+) of \1 values and 2 of 2 load cases\.", notes[0])
+    cells = [c.text for b in blocks if isinstance(b, Table) for row in b.rows for c in row]
+    assert not any("no source" in text.lower() for text in cells)
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None or READER is None, reason="chromium or pdftotext is missing")
+def test_thirty_cases_stand_on_fewer_than_thirty_pages(many, tmp_path):
+    pages = printed_pages(many, tmp_path)
+    assert len(pages) < 30
+    for page in pages[:-1]:
+        assert len(page.split()) > 40
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None or READER is None, reason="chromium or pdftotext is missing")
+@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize("name", ["FFS0827", "Spannwellensiebmaschine für Rostasche, " + LONG])
+def test_a_long_title_block_leaves_no_page_of_five_lines(project, tmp_path, count, name):
+    document = dataclasses.replace(project.document, customer=CUSTOMER, name=name)
+    changed = dataclasses.replace(project, document=document, load_cases=project.load_cases[:count])
+    _, second, *_ = printed_pages(assess(changed), tmp_path)
+    assert len(second.split()) > 150
+    assert "Model limits" in second

@@ -1,0 +1,96 @@
+"""Ctrl-C and SIGTERM end a command by a sentence, at its first moment as in its midst."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import flipflow as ff
+
+BOTH = [signal.SIGINT, signal.SIGTERM]
+# Sends itself a signal while the command line loads what it is built with.
+EARLY = """
+import os, sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "typer":
+            os.kill(os.getpid(), int(sys.argv[1]))
+sys.meta_path.insert(0, Interrupting())
+from flipflow.cli.main import main
+main()
+"""
+
+
+def started(*words, folder):
+    environment = os.environ | {"COLUMNS": "80"}
+    return subprocess.Popen(
+        [sys.executable, "-m", "flipflow.cli.main", *words], cwd=folder, env=environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def until(holds, seconds=120.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_in_the_first_moment_it_is_a_sentence(number):
+    run = subprocess.run(
+        [sys.executable, "-c", EARLY, str(int(number))], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 130
+    assert run.stdout == ""
+    assert run.stderr == "Stopped by the user; nothing is written.\n"
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_a_stopped_simulation_says_that_nothing_is_written(tmp_path, number):
+    run = started("simulate", "ffs0827", "--periods", "100000", "-o", "out", folder=tmp_path)
+    until((tmp_path / "out").exists)
+    time.sleep(1.0)
+    run.send_signal(number)
+    _, error = run.communicate(timeout=60.0)
+    assert run.returncode == 130
+    assert error == "Stopped by the user; nothing is written.\n"
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_a_stopped_reproduction_keeps_what_is_finished_and_says_so(tmp_path, number):
+    """Figures are written as they are made, so that only the page is left to write."""
+    run = started("reproduce", "2c", "4", "6", "7", "-o", "out", folder=tmp_path)
+    figures = [f"figure-{name}.pdf" for name in ("02c", "04", "06")]
+    until(lambda: all((tmp_path / "out" / name).exists() for name in figures))
+    begun = time.monotonic()
+    run.send_signal(number)
+    _, error = run.communicate(timeout=60.0)
+    passed = time.monotonic() - begun
+    assert run.returncode == 130
+    assert error == "Stopped by the user; what was finished is in out.\n"
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert "reproduction.html" in names
+    assert not any(name.startswith("figure-07") for name in names)
+    assert passed < 5.0  # of a shared machine; on a quiet one half a second
+
+
+def test_a_long_simulation_is_drawn_thin_and_kept_whole():
+    """What is drawn does not grow with the turns; what is kept does."""
+    screen = ff.load("ffs0827")
+    drawn, kept = [], []
+    for turns in (500, 2000):
+        history = ff.simulate(screen, 89.0, turns)
+        figure = ff.figure(history)
+        drawn.append(sum(trace.x.size for panel in figure.panels for trace in panel.traces))
+        kept.append(history.t.size)
+        whole = [trace for trace in figure.panels[0].traces if trace.name == "relative (x2)"]
+        greatest = max(trace.y.max() for trace in whole)
+        assert greatest == pytest.approx(1e3 * history.displacement("relative").max(), rel=1e-12)
+    assert drawn[1] == pytest.approx(drawn[0], rel=0.01)
+    assert kept[1] > 3.9 * kept[0]
