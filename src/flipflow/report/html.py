@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import jinja2
 
 TEMPLATES = "templates"
+KIND = "vibration report"
 
 
 def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
@@ -52,10 +53,20 @@ def html(assessment: Assessment) -> str:
     """The report as text."""
     return page(
         blocks_of(assessment),
-        title=assessment.project.document.name or assessment.project.name,
-        kind="vibration report",
-        footer=f"flipflow {assessment.version}, input {assessment.input_hash}",
+        title=title_of(assessment),
+        kind=KIND,
+        footer=footer_of(assessment),
     )
+
+
+def title_of(assessment: Assessment) -> str:
+    """What the report is called."""
+    return assessment.project.document.name or assessment.project.name
+
+
+def footer_of(assessment: Assessment) -> str:
+    """What stands at the foot of every sheet."""
+    return f"flipflow {assessment.version}, input {assessment.input_hash}"
 
 
 def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:

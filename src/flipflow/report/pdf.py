@@ -1,0 +1,132 @@
+"""The report as PDF: the same blocks, set by typst with the fonts that it carries."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from types import MappingProxyType
+from typing import Any
+
+from flipflow.errors import InputError, MissingExtra
+from flipflow.plotting.layout import WIDTH
+from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
+from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
+from flipflow.report.html import KIND, footer_of, title_of
+from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import Assessment
+
+PAPERS: Mapping[str, str] = MappingProxyType({"a4": "a4", "letter": "us-letter"})
+LETTER_SHARE = 0.9  # of a figure's width on the shorter sheet, so that page 1 stays one page
+TEMPLATE = "report.typ"
+
+
+def pdf(assessment: Assessment, paper: str = "a4") -> bytes:
+    """The report of an assessment as a PDF.
+
+    Parameters
+    ----------
+    assessment
+        What :func:`flipflow.assess` returns.
+    paper
+        "a4" or "letter".
+
+    Raises
+    ------
+    InputError
+        For another paper.
+    MissingExtra
+        When typst or matplotlib is not installed.
+    """
+    return sheets(
+        blocks_of(assessment),
+        title=title_of(assessment),
+        kind=KIND,
+        footer=footer_of(assessment),
+        paper=paper,
+    )
+
+
+def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper: str) -> bytes:
+    """Blocks as a PDF; the arguments are those of :func:`flipflow.report.html.page`.
+
+    Raises
+    ------
+    InputError
+        For a paper that is not known.
+    MissingExtra
+        When typst or matplotlib is not installed.
+    """
+    width = WIDTH * POINT * (LETTER_SHARE if checked_paper(paper) == "letter" else 1.0)
+    report = {
+        "title": title,
+        "kind": kind,
+        "footer": footer,
+        "paper": PAPERS[paper],
+        "figure-width": width,
+        "blocks": [_shown(block) for block in blocks],
+    }
+    source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()
+    content = require_typst()(
+        source,
+        format="pdf",
+        # Fonts of the machine are asked for letters that these have not, as Chinese ones.
+        font_paths=[font_folder()],
+        sys_inputs={"report": json.dumps(report)},
+    )
+    return bytes(content)
+
+
+def checked_paper(paper: str, field: str = "paper") -> str:
+    """A name of a paper.
+
+    Raises
+    ------
+    InputError
+        For another.
+    """
+    if paper not in PAPERS:
+        raise InputError(field, paper, f"choose one of {', '.join(PAPERS)}")
+    return paper
+
+
+def require_typst() -> Callable[..., Any]:
+    """What sets the pages; called before long work, so that it is not lost for want of it.
+
+    Raises
+    ------
+    MissingExtra
+        When typst or matplotlib is not installed.
+    """
+    try:
+        import typst  # noqa: PLC0415  an extra
+    except ImportError as error:
+        raise MissingExtra("A PDF needs typst: pip install 'flipflow[report]'.") from error
+    require_matplotlib()
+    compiled: Callable[..., Any] = typst.compile
+    return compiled
+
+
+def _shown(block: Block) -> dict[str, Any]:
+    """A block as the template reads it; figures and drawings as vectors."""
+    if isinstance(block, FigureBlock):
+        figure = block.figure
+        svg = searchable_svg(figure)
+        return {"kind": block.kind, "title": figure.title, "caption": figure.caption, "svg": svg}
+    if isinstance(block, DrawingBlock):
+        return {"kind": block.kind, **dataclasses.asdict(block.drawing)}
+    told = {"kind": block.kind, **dataclasses.asdict(block)}
+    if isinstance(block, Table):
+        told["wide"] = _widest(block)
+    return told
+
+
+def _widest(table: Table) -> int | None:
+    """The column of words that takes what room is left, the one with the longest text."""
+    lengths = {
+        k: max((len(row[k].text) + len(row[k].small) for row in table.rows), default=0)
+        for k, column in enumerate(table.columns)
+        if not column.numeric
+    }
+    return max(lengths, key=lambda k: lengths[k], default=None)
