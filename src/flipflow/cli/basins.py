@@ -43,6 +43,7 @@ def basins(
         target.picture("basins.html", figure(found))
         target.data("basins.json", document)
         target.document(document)
+        target.keep()
         if target.spoken:
             _show(found, risk, reason, console())
         target.tell()

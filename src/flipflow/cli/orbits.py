@@ -49,6 +49,7 @@ def orbits(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(found))
+        target.keep()
         if target.spoken:
             _show(project, omega, found, console())
         target.tell()

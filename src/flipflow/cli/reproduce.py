@@ -48,17 +48,19 @@ def reproduce(
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
-        target.all_of([PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)])
+        files = [PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)]
+        aside = target.all_of(files)
 
         def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
             found = _finished(screen, [one.name for one in wanted], monitor)
-            return found, write_reproduction(found, folder, monitor)
+            return found, write_reproduction(found, aside, monitor)
 
         found, written = with_progress(run)
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(found))
+        target.keep()
         if target.spoken:
             _show(found, console())
         count = (len(written) - 1) // 3

@@ -110,6 +110,7 @@ def _write(result: Sensitivity, target: Destination) -> None:
         from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
         target.document(document_of(result))
+    target.keep()
     if target.spoken:
         from flipflow.report import summary  # noqa: PLC0415
 

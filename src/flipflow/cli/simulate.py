@@ -60,6 +60,7 @@ def simulate(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(history))
+        target.keep()
         if target.spoken:
             _show(project, history, console())
         target.tell()

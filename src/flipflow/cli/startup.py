@@ -80,6 +80,7 @@ def startup(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(Startup(project.name, start, coast)))
+        target.keep()
         if target.spoken:
             _show(project, start, coast, console())
         target.tell()

@@ -75,6 +75,7 @@ def sweep(
             target.document(_document(project, found))
         if output is not None:
             target.picture("sweep.html", _figure(project, found.sweeps, ends))
+        target.keep()
         if target.spoken:
             _show(project, found, steps, console())
         target.tell()
