@@ -49,11 +49,11 @@ def reproduce(
 
         require_templates()
         files = [PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)]
-        aside = target.all_of(files)
+        folder = target.all_of(files)
 
         def run(monitor: Monitor) -> tuple[Reproduction, tuple[str, ...]]:
             found = _finished(screen, [one.name for one in wanted], monitor)
-            return found, write_reproduction(found, aside, monitor)
+            return found, write_reproduction(found, folder, monitor)
 
         found, written = with_progress(run)
         if json is not None:

@@ -17,8 +17,11 @@ from flipflow.report.html import KIND, footer_of, title_of
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment
 
-PAPERS: Mapping[str, str] = MappingProxyType({"a4": "a4", "letter": "us-letter"})
-LETTER_SHARE = 0.9  # of a figure's width on the shorter sheet, so that page 1 stays one page
+# The name that typst has for a paper, and the height in points that a figure may have on it.
+PAPERS: Mapping[str, tuple[str, float]] = MappingProxyType(
+    {"a4": ("a4", 720.0), "letter": ("us-letter", 670.0)}
+)
+ROOM = 75  # characters beside the widest column of a table
 TEMPLATE = "report.typ"
 
 
@@ -58,14 +61,13 @@ def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper
     MissingExtra
         When typst or matplotlib is not installed.
     """
-    width = WIDTH * POINT * (LETTER_SHARE if checked_paper(paper) == "letter" else 1.0)
+    name, height = PAPERS[checked_paper(paper)]
     report = {
         "title": title,
         "kind": kind,
         "footer": footer,
-        "paper": PAPERS[paper],
-        "figure-width": width,
-        "blocks": [_shown(block) for block in blocks],
+        "paper": name,
+        "blocks": [_shown(block, height) for block in blocks],
     }
     source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()
     content = require_typst()(
@@ -108,25 +110,31 @@ def require_typst() -> Callable[..., Any]:
     return compiled
 
 
-def _shown(block: Block) -> dict[str, Any]:
-    """A block as the template reads it; figures and drawings as vectors."""
+def _shown(block: Block, highest: float) -> dict[str, Any]:
+    """A block as the template reads it; figures and drawings as vectors no higher than a page."""
+    told: dict[str, Any] = {"kind": block.kind}
     if isinstance(block, FigureBlock):
         figure = block.figure
-        svg = searchable_svg(figure)
-        return {"kind": block.kind, "title": figure.title, "caption": figure.caption, "svg": svg}
+        share = min(1.0, highest / (figure.height * POINT))
+        told |= {"title": figure.title, "caption": figure.caption, "svg": searchable_svg(figure)}
+        return told | {"width": WIDTH * POINT * share}
     if isinstance(block, DrawingBlock):
-        return {"kind": block.kind, **dataclasses.asdict(block.drawing)}
-    told = {"kind": block.kind, **dataclasses.asdict(block)}
-    if isinstance(block, Table):
-        told["wide"] = _widest(block)
-    return told
+        return told | dataclasses.asdict(block.drawing) | {"width": WIDTH * POINT}
+    told |= dataclasses.asdict(block)
+    return told | {"wide": _wide(block)} if isinstance(block, Table) else told
 
 
-def _widest(table: Table) -> int | None:
-    """The column of words that takes what room is left, the one with the longest text."""
-    lengths = {
+def _wide(table: Table) -> int | None:
+    """The column of words that takes what room the others leave; None where they leave little."""
+    lengths = [
+        max(len(column.title) + len(column.unit), *(len(row[k].text) for row in table.rows), 0)
+        for k, column in enumerate(table.columns)
+    ]
+    words = {
         k: max((len(row[k].text) + len(row[k].small) for row in table.rows), default=0)
         for k, column in enumerate(table.columns)
         if not column.numeric
     }
-    return max(lengths, key=lambda k: lengths[k], default=None)
+    widest = max(words, key=lambda k: words[k], default=None)
+    others = sum(length + 2 for k, length in enumerate(lengths) if k != widest)
+    return widest if others <= ROOM else None

@@ -151,7 +151,7 @@ def write_beside(place: Path, content: bytes | str) -> Path:
 
 
 def as_bytes(content: bytes | str) -> bytes:
-    """Text in UTF-8; half of a surrogate pair has none, and JSON reads its escape as what it was."""
+    """Text in UTF-8; half of a surrogate pair has none, JSON reads its escape as what it was."""
     return content.encode(errors="backslashreplace") if isinstance(content, str) else content
 
 
