@@ -114,9 +114,7 @@ def read_choice(table: Table, entry: Entry, notes: Notes, *, default: str) -> st
     return written
 
 
-def read_text(
-    table: Table, entry: Entry, *, label: str | None = None, lines: bool = True
-) -> str:
+def read_text(table: Table, entry: Entry, *, label: str | None = None, lines: bool = True) -> str:
     """Read text; a number or a boolean is refused, and what :func:`checked_words` refuses."""
     written = table.get(entry.key, "")
     if not isinstance(written, str):

@@ -134,7 +134,7 @@ class Stage:
             return False
         own = {path.name for path in new.iterdir()}
         try:
-            for entry in os.scandir(old):
+            for entry in _entries(old):
                 if entry.name not in own | self._dropped:
                     os.link(entry.path, new / entry.name, follow_symlinks=False)
                 elif entry.name not in own:
@@ -158,7 +158,7 @@ class Stage:
         """Remove from aside what is in the folder, too, and give it what came to it meanwhile."""
         if self._aside is None or self._folder is None:
             return
-        for entry in os.scandir(self._aside):
+        for entry in _entries(self._aside):
             there = self._folder / entry.name
             if entry.name in own | self._dropped:
                 continue
@@ -224,9 +224,13 @@ def _plain(folder: Path) -> bool:
         return False
     if folder.stat().st_uid != os.geteuid() or os.listxattr(folder):
         return False
-    with os.scandir(folder) as entries:
-        kinds = [entry.is_file() or entry.is_symlink() for entry in entries]
+    kinds = [entry.is_file() or entry.is_symlink() for entry in _entries(folder)]
     return all(kinds) and len(kinds) <= MOST_KEPT
+
+
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    with os.scandir(folder) as entries:
+        return list(entries)
 
 
 def _exchange(one: Path, other: Path) -> bool:
