@@ -102,7 +102,7 @@ def test_a_killed_analyze_leaves_the_old_set_or_the_new_one(command, tmp_path):
         assert command("analyze", *QUICK, *more, "-o", name)[0] == 0
     sets = [content(tmp_path / name) for name in ("one", "two")]
     assert all(sets[0][name] != sets[1][name] for name in ("report.html", "results.json"))
-    out, moments = tmp_path / "out", random.Random(7)
+    out, moments = tmp_path / "out", random.Random(7)  # noqa: S311
     found = set()
     for _ in range(KILLS):
         with subprocess.Popen(
@@ -237,7 +237,9 @@ def test_a_document_elsewhere_belongs_to_the_set(tmp_path, monkeypatch):
         return beside(place, text)
 
     monkeypatch.setattr(stage, "write_beside", full)
-    with pytest.raises(StoreError, match="--json = 'x.json': it cannot be written .No space left"):
+    with pytest.raises(
+        StoreError, match=r"--json = 'x\.json': it cannot be written .No space left"
+    ):
         write(tmp_path / "out", {"a": "new"}, json="x.json")
     assert content(tmp_path / "out") == old
 

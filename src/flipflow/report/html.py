@@ -97,6 +97,7 @@ def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
             style=_template("report.css"),
             library=library(),
             start=START,
+            fit=_template("fit.js"),
             element=element,
         )
     )
