@@ -145,8 +145,11 @@ def pages(sheet):
 
 def overlaps(words):
     """Pairs of words whose boxes lie over one another."""
-    for k, one in enumerate(words):
-        for other in words[k + 1 :]:
+    down_the_page = sorted(words, key=lambda word: word.top)
+    for k, one in enumerate(down_the_page):
+        for other in down_the_page[k + 1 :]:
+            if other.top > one.foot:
+                break
             across = min(one.right, other.right) - max(one.left, other.left)
             down = min(one.foot, other.foot) - max(one.top, other.top)
             least = min(one.foot - one.top, other.foot - other.top)

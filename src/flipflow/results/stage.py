@@ -23,7 +23,7 @@ from flipflow.errors import StoreError
 from flipflow.results.store import because, checked_place, refused, write_beside, write_file
 
 MOST_KEPT = 1000  # other files of a folder that are carried along
-ABANDONED = 60.0  # s after which files aside that nobody holds are those of a killed command
+ABANDONED = 10.0  # s after which files aside that nobody holds are those of a killed command
 EXCHANGE, HERE = 2, -100  # RENAME_EXCHANGE and AT_FDCWD of Linux
 
 
