@@ -193,14 +193,16 @@ def test_ctrl_c_ends_a_command_with_a_sentence(command, at_work, name):
     assert err == "Stopped by the user; nothing is written.\n"
 
 
-def test_ctrl_c_while_files_are_written_says_what_is_there(command, monkeypatch):
+def test_ctrl_c_while_files_are_written_leaves_none(command, monkeypatch, tmp_path):
     def pressed(_figure, _path):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("flipflow.plotting.figure.Figure.write", pressed)
     code, _, err = command("sensitivity", *QUICK["sensitivity"], "-o", "out")
     assert code == 130
-    assert err == "Stopped by the user; what was finished is in out.\n"
+    assert err == "Stopped by the user; nothing is written.\n"
+    assert list(tmp_path.iterdir()) == [tmp_path / "out"]
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 @pytest.mark.parametrize("rows", [4, 10])

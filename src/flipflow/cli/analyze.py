@@ -12,6 +12,7 @@ from flipflow.cli.options import Files, Folder, Force, Json, Speeds, speed_of, s
 
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
+    from flipflow.cli.report_files import ReportFiles
     from flipflow.model.project import Project
     from flipflow.studies.assessment import Assessment
 
@@ -25,6 +26,16 @@ def analyze(
         int | None,
         whole("--harmonics", "H", 1, 200, "Harmonic balance instead of exact motion."),
     ] = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write the report as PDF, too.")] = False,
+    paper: Annotated[
+        str | None, typer.Option("--paper", metavar="NAME", help="Paper of the PDF: a4 or letter.")
+    ] = None,
+    tables: Annotated[
+        bool, typer.Option("--tables", help="Write every table as XLSX and CSV, too.")
+    ] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the report of another input.")
+    ] = False,
     force: Force = False,
 ) -> None:
     """Analyze machines: verdict, allowed speed range, report.
@@ -33,6 +44,7 @@ def analyze(
     where a machine does not start, or its drive does not fit, as given.
     """
     from flipflow.cli.analyze_several import analyze_several  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.report_files import PAPER, ReportFiles, formats_of  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
 
     options = _options(speeds, harmonics)
@@ -40,12 +52,14 @@ def analyze(
     for project in projects:
         if project.speed is not None:
             speed_of(project, None)
+    formats = formats_of(paper or (PAPER if pdf else None), tables=tables)
+    written = ReportFiles(_written(speeds, harmonics), formats, overwrite)
+    one = partial(_analyze, options=options, written=written)
     if len(files) > 1:
-        one = partial(_analyze, options=options)
         found = analyze_several(files, projects, output, json, one)
     else:
         folder = output or Path(f"{projects[0].name}-flipflow")
-        found = [_analyze(files[0], projects[0], folder, json, options=options)]
+        found = [one(files[0], projects[0], folder, json)]
     if any(assessment.start_fails for assessment in found):
         from flipflow.cli.output import DOES_NOT_START  # noqa: PLC0415
 
@@ -54,41 +68,41 @@ def analyze(
 
 def _analyze(
     file: str, project: Project, folder: Path, json: str | None, *, options: dict[str, Any],
-    quiet: bool = False,
+    written: ReportFiles, quiet: bool = False,
 ) -> Assessment:  # fmt: skip
     """One machine: its report in a folder, its summary in the terminal unless ``quiet``."""
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
 
+    old = written.replaced(folder, project)
     with Destination(folder, json, [file], quiet=quiet) as target:
-        from flipflow.report.html import require_templates  # noqa: PLC0415
-
-        require_templates()
+        target.replaces(old)
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.studies.assessment import assess  # noqa: PLC0415
 
         assessment = with_progress(lambda monitor: assess(project, monitor, **options))
-        _write(assessment, target)
+        _write(assessment, target, written)
     return assessment
 
 
-def _write(assessment: Assessment, target: Destination) -> None:
+def _write(assessment: Assessment, target: Destination, files: ReportFiles) -> None:
     """The report, the numbers behind it, the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.response import NAMES, write_response  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415
-    from flipflow.report.html import write_html  # noqa: PLC0415
     from flipflow.report.terminal import summary  # noqa: PLC0415
 
     document = document_of(assessment)
-    write_html(assessment, target.path("report.html"))
-    target.wrote("report.html")
-    target.data("results.json", document)
-    write_response(assessment, target.all_of(NAMES))
-    target.wrote(*NAMES)
+    files.write(assessment, target, document)
     target.document(document)
+    target.keep()
     if target.spoken:
         summary(assessment, console())
     target.tell()
+
+
+def _written(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, object]:
+    """Options that change what is found, as they are written."""
+    given = {"--speeds": speeds and " ".join(speeds), "--harmonics": harmonics}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def _options(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, Any]:

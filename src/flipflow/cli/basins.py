@@ -57,6 +57,7 @@ def basins(
         target.picture("basins.html", figure(found), marked(project, case))
         target.data("basins.json", document)
         target.document(document)
+        target.keep()
         if target.spoken:
             _show(title_of(project, case), found, risk, reason, console())
         target.tell()

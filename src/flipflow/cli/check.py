@@ -29,6 +29,7 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(result))
+        target.keep()
         if target.spoken:
             _show(result, console())
         target.tell()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import textwrap
-import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
-from flipflow.errors import Cancelled
+from flipflow.errors import Cancelled, StoreError
+from flipflow.results.stage import Stage
 from flipflow.results.store import (
     checked_place,
     json_text,
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
     from flipflow.plotting.figure import Figure
 
-CLOCK = 0.05  # s by which the clock of files may be late
 STOPPED, NOTHING = "Stopped by the user", "nothing is written"
 
 
 class Destination:
     """A folder for figures and data, and a file or the terminal for a JSON document.
 
-    Made before anything is computed, it refuses what cannot be written. In a ``with`` block
-    Ctrl-C ends the command by a sentence that says what is written.
+    Made before anything is computed, it refuses what cannot be written. All that a command writes
+    takes its place together, when :meth:`keep` is called. In a ``with`` block Ctrl-C ends the
+    command by a sentence that says what is written.
 
     Parameters
     ----------
@@ -59,20 +59,29 @@ class Destination:
         if json not in (None, TERMINAL):
             refuse_input(json, self._reads, JSON)
             checked_place(json, JSON)
-        self._begun = time.time()
+        self._stage = Stage(folder, OUTPUT)
         self._names: list[str] = []
         self._places: list[str] = []
+        self._answer = ""
+        self._kept = False
 
     def __enter__(self) -> Self:
         """Begin the work that ends in this destination."""
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, _error: object, _trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        _trace: TracebackType | None,
     ) -> None:
-        """Turn Ctrl-C into the sentence that ends a stopped command."""
+        """Turn Ctrl-C into the sentence that ends a stopped command; drop what is not kept."""
+        told = self._stage.told(str(error))
+        self._stage.discard()
         if kind is not None and issubclass(kind, KeyboardInterrupt):
             raise self.stopped() from None
+        if isinstance(error, StoreError) and told != str(error):
+            raise StoreError(told) from None
 
     @property
     def spoken(self) -> bool:
@@ -84,33 +93,57 @@ class Destination:
         replace(figure, subject=subject).write(self.path(name))
         self.wrote(name)
 
+    def content(self, name: str, content: bytes | str) -> None:
+        """Write a file into the folder; it is not told yet."""
+        write_file(self.path(name), content, OUTPUT)
+
     def data(self, name: str, document: Mapping[str, object]) -> None:
         """Write a JSON document into the folder."""
-        write_file(self.path(name), json_text(document), OUTPUT)
+        self.content(name, json_text(document))
         self.wrote(name)
 
     def document(self, document: Mapping[str, object]) -> None:
-        """Write the JSON document where ``--json`` asks for it."""
+        """Write the JSON document where ``--json`` asks for it; in the terminal when kept."""
         if self.json is None:
             return
         text = json_text(document)
         if self.json == TERMINAL:
-            sys.stdout.write(text)
+            self._answer = text
         else:
-            write_file(self.json, text, JSON)
+            self._stage.hold(self.json, text, JSON)
             self._places.append(self.json)
 
     def path(self, name: str) -> Path:
-        """Where a file of the folder stands; a file that is read is refused."""
+        """Where to write a file of the folder; a file that is read is refused."""
         place = Path(self.folder or "") / name
         refuse_input(place, self._reads, OUTPUT)
-        return place
+        checked_place(place, OUTPUT)
+        return self._stage.aside / name
 
     def all_of(self, names: Iterable[str]) -> Path:
-        """The folder, for something else to write these files into."""
+        """The folder that something else is to write these files into."""
         for name in names:
             self.path(name)
-        return Path(self.folder or "")
+        return self._stage.aside
+
+    def replaces(self, names: Iterable[str]) -> None:
+        """Files of the folder that go when the new ones come: those of the set they replace."""
+        for name in names:
+            self.path(name)
+        self._stage.drop(names)
+
+    def keep(self) -> None:
+        """Let all that is written take its place, at once; before the first word is said of it.
+
+        Raises
+        ------
+        StoreError
+            When that cannot be; then every file is as it was.
+        """
+        if not self._kept:
+            self._stage.commit()
+            self._kept = True
+            sys.stdout.write(self._answer)
 
     def wrote(self, *names: str) -> None:
         """Note files of the folder that something else has written."""
@@ -118,21 +151,17 @@ class Destination:
 
     def tell(self) -> None:
         """Say in the terminal what is written where; nothing where nothing is."""
+        self.keep()
         for line in self._lines() if self.spoken else ():
             # A path stays on one line, so that it can be copied.
             console().print(line, soft_wrap=True)
 
     def stopped(self, *, kept: bool = False) -> Cancelled:
         """The error that ends a command after Ctrl-C; ``kept``: what was finished is shown."""
-        places = [str(self.folder)] * self._touched() + self._places
-        if places:
+        places = [str(self.folder)] * bool(self._names) + self._places
+        if self._kept and places:
             return Cancelled(f"{STOPPED}; what was finished is in {' and '.join(places)}.")
         return Cancelled(f"{STOPPED}; {'what was finished is shown' if kept else NOTHING}.")
-
-    def _touched(self) -> bool:
-        """Whether a file of the folder was written since the command began."""
-        files = () if self.folder is None else self.folder.iterdir()
-        return any(file.stat().st_mtime > self._begun - CLOCK for file in files)
 
     def _lines(self) -> Iterable[str]:
         if self._names:
@@ -142,6 +171,10 @@ class Destination:
             else:
                 yield head
                 yield from textwrap.wrap(
-                    names, COLUMNS, initial_indent="  ", subsequent_indent="  "
+                    names,
+                    COLUMNS,
+                    initial_indent="  ",
+                    subsequent_indent="  ",
+                    break_on_hyphens=False,
                 )
         yield from (f"Written to {place}" for place in self._places)

@@ -62,6 +62,7 @@ def orbits(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(found) | {"name": title_of(project, case)})
+        target.keep()
         if target.spoken:
             _show(title_of(project, case), omega, found, console())
         target.tell()

@@ -48,7 +48,8 @@ def reproduce(
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
         require_templates()
-        target.all_of([PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)])
+        files = [PAGE, *(one.name + ending for one in wanted for ending in ENDINGS)]
+        folder = target.all_of(files)
 
         found = with_progress(
             lambda monitor: _finished(screen, [one.name for one in wanted], folder, monitor)
@@ -58,6 +59,7 @@ def reproduce(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(found))
+        target.keep()
         if target.spoken:
             _show(found, console())
         count = sum(one.figure is not None for one in found.figures)

@@ -117,6 +117,7 @@ def _write(result: Sensitivity, target: Destination, title: str, subject: str) -
         target.data("results.json", document)
         _write_figures(result, target, subject)
     target.document(document)
+    target.keep()
     if target.spoken:
         from flipflow.report import summary  # noqa: PLC0415
         from flipflow.report.terminal import say  # noqa: PLC0415

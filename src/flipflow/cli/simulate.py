@@ -73,6 +73,7 @@ def simulate(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(history) | {"name": title_of(project, case)})
+        target.keep()
         if target.spoken:
             _show(title_of(project, case), history, blows, console())
         target.tell()

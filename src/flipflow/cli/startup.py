@@ -97,6 +97,7 @@ def startup(
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
             target.document(document_of(Startup(title_of(project, case), start, coast)))
+        target.keep()
         if target.spoken:
             _show(title_of(project, case), start, coast, console())
         target.tell()

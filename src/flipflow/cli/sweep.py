@@ -95,6 +95,7 @@ def sweep(
         if output is not None:
             figure = _figure(project, found.sweeps, ends)
             target.picture("sweep.html", figure, marked(project, case))
+        target.keep()
         if target.spoken:
             _show(title_of(project, case), found, steps, console())
         target.tell()

@@ -37,7 +37,7 @@ def read_load_cases(tables: list[Table], screen: FlipFlowScreen, notes: Notes) -
 def _read_case(table: Table, label: str, screen: FlipFlowScreen, notes: Notes) -> Load:
     entries = SECTIONS["load_cases"]
     refuse_unknown(table, [entry.key for entry in entries], place=f"{label}, ")
-    name = read_text(table, entries[0], label=f"{label}, name")
+    name = read_text(table, entries[0], label=f"{label}, name", lines=False)
     if not name.strip():
         raise InputError(f"{label}, name", table.get("name", LEFT_OUT), 'give one, such as "full"')
     values: dict[str, Any] = {}

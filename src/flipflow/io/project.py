@@ -14,7 +14,14 @@ from flipflow.io.load_cases import read_load_cases
 from flipflow.io.machine import Tables, read_screen
 from flipflow.io.plausibility import implausible
 from flipflow.io.source import read_source
-from flipflow.io.values import Notes, Table, read_interval, read_number, read_text
+from flipflow.io.values import (
+    Notes,
+    Table,
+    checked_words,
+    read_interval,
+    read_number,
+    read_text,
+)
 from flipflow.model.arguments import checked_flag
 from flipflow.model.limits import (
     LIMIT_FIELDS,
@@ -185,4 +192,5 @@ def _sources(table: Table, cases: list[Table]) -> Mapping[str, str]:
     for key, text in flat.items():
         if not isinstance(text, str):
             raise InputError(f"sources.{key}", text, 'write text in quotes, such as "drawing 4711"')
+        checked_words(text, f"sources.{key}")
     return {key: str(text) for key, text in flat.items()}

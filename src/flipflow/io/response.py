@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch
+from flipflow.io.spreadsheet import csv_text
 from flipflow.model.constants import RPM
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
@@ -98,12 +98,10 @@ def _netcdf(columns: Columns, attributes: Mapping[str, str]) -> bytes:
 
 
 def _csv(columns: Columns, case: str | None = None, *, head: bool = True) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    if head:
-        units = [own.get("units", "") for _, own in columns.values()]
-        heads = [f"{n} [{u}]" if u else n for n, u in zip(columns, units, strict=True)]
-        writer.writerow(heads if case is None else ["case", *heads])
-    for row in zip(*(values.tolist() for values, _ in columns.values()), strict=True):
-        writer.writerow(row if case is None else (case, *row))
-    return text.getvalue().encode()
+    units = [own.get("units", "") for _, own in columns.values()]
+    heads = [f"{n} [{u}]" if u else n for n, u in zip(columns, units, strict=True)]
+    rows = zip(*(values.tolist() for values, _ in columns.values()), strict=True)
+    if case is None:
+        return csv_text(heads, rows).encode()
+    text = csv_text(["case", *heads], ((case, *row) for row in rows))
+    return (text if head else text.partition("\n")[2]).encode()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -113,11 +114,26 @@ def read_choice(table: Table, entry: Entry, notes: Notes, *, default: str) -> st
     return written
 
 
-def read_text(table: Table, entry: Entry, *, label: str | None = None) -> str:
-    """Read text; a number or a boolean is refused."""
+def read_text(table: Table, entry: Entry, *, label: str | None = None, lines: bool = True) -> str:
+    """Read text; a number or a boolean is refused, and what :func:`checked_words` refuses."""
     written = table.get(entry.key, "")
     if not isinstance(written, str):
         raise InputError(label or entry.label, written, 'write text in quotes, for example "A"')
+    return checked_words(written, label or entry.label, lines=lines)
+
+
+def checked_words(written: str, label: str, *, lines: bool = True) -> str:
+    """Text that any program can show: without control characters, but line breaks where ``lines``.
+
+    Raises
+    ------
+    InputError
+        Naming ``label``, the character and its place.
+    """
+    for place, character in enumerate(written, 1):
+        if unicodedata.category(character) == "Cc" and not (lines and character == "\n"):
+            what = f"character {place} is a control character (U+{ord(character):04X})"
+            raise InputError(label, written, f"{what}, remove it")
     return written
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flipflow.errors import MissingExtra
@@ -58,16 +59,52 @@ def printed(figure: PanelGrid, form: str) -> bytes:
     MissingExtra
         When matplotlib is not installed.
     """
+    require_matplotlib()
+    return _saved(figure, form, {"font.family": _families()})
+
+
+def searchable_svg(figure: PanelGrid) -> str:
+    """The figure as SVG whose words stay text, to be set in the fonts of the page around it.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    require_matplotlib()
+    return _saved(figure, "svg", {"font.family": FAMILIES[-1], "svg.fonttype": "none"}).decode()
+
+
+def require_matplotlib() -> None:
+    """See that figures can be printed.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
     try:
-        import matplotlib as mpl  # noqa: PLC0415  slow to import
-        from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
+        import matplotlib  # noqa: F401, ICN001, PLC0415  slow to import
     except ImportError as error:
         raise MissingExtra(
             "Figures for print need matplotlib: pip install 'flipflow[report]'."
         ) from error
+
+
+def font_folder() -> str:
+    """Where matplotlib keeps the font of :func:`searchable_svg`."""
+    import matplotlib as mpl  # noqa: PLC0415  slow to import
+
+    return str(Path(mpl.get_data_path()) / "fonts" / "ttf")
+
+
+def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
+    import matplotlib as mpl  # noqa: PLC0415  slow to import
+    from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
+
     size = (WIDTH / PIXELS_AN_INCH, figure.height / PIXELS_AN_INCH)
     buffer = io.BytesIO()
-    style: Any = {**STYLE, "font.family": _families()}
+    style: Any = {**STYLE, **own}
     with mpl.rc_context(style):
         sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
         _draw(sheet, figure, arrange(figure))

@@ -29,7 +29,7 @@ def branches(assessment: Assessment) -> Iterator[Block]:
     yield Heading("Appendix", 1, new_page=False)
     columns = (
         Column("Load case"),
-        Column("Range", "rpm"),
+        Column("Range", "rpm", ends=True),
         Column("Points", numeric=True),
         Column("Unstable", numeric=True),
         Column("Median error", "mm", numeric=True),

@@ -69,12 +69,17 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table; ``brief`` columns are also shown in the terminal."""
+    """One column of a table.
+
+    ``brief`` columns are also shown in the terminal; ``ends`` says that its cells are "5 to 8 mm",
+    "at most 3 g" or the like, which are two numbers to other programs.
+    """
 
     title: str
     unit: str = ""
     numeric: bool = False
     brief: bool = True
+    ends: bool = False
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ def limits(assessment: Assessment) -> Iterator[Block]:
     """Every limit with its worst case."""
     columns = (
         Column("Limit"),
-        Column("Allowed"),
+        Column("Allowed", ends=True),
         Column("Worst", numeric=True),
         Column("Case"),
         Column("Margin", numeric=True),

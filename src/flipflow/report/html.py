@@ -20,16 +20,7 @@ if TYPE_CHECKING:
     import jinja2
 
 TEMPLATES = "templates"
-# Where the first page runs over by some lines, what follows goes on behind them: no sheet is left
-# with those lines alone. 1054 pixels are an A4 page within its margins.
-BREAKS = """
-const begin = document.querySelector("main > :first-child");
-const next = document.querySelector("h2.page");
-if (begin && next) {
-  const height = next.getBoundingClientRect().top - begin.getBoundingClientRect().top - 22;
-  if (height > 1054 && height % 1054 < 1054 / 3) next.classList.remove("page");
-}
-"""
+KIND = "vibration report"
 
 
 def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
@@ -63,9 +54,9 @@ def html(assessment: Assessment) -> str:
     """The report as text."""
     return page(
         blocks_of(assessment),
-        title=assessment.project.document.name or assessment.project.name,
-        kind="vibration report",
-        footer=f"flipflow {assessment.version}, input {assessment.input_hash}",
+        title=title_of(assessment),
+        kind=KIND,
+        footer=footer_of(assessment),
     )
 
 
@@ -78,6 +69,16 @@ def comparison_html(found: Comparison) -> str:
         kind="comparison",
         footer=f"flipflow {found.version}, inputs {inputs}",
     )
+
+
+def title_of(assessment: Assessment) -> str:
+    """What the report is called."""
+    return assessment.project.document.name or assessment.project.name
+
+
+def footer_of(assessment: Assessment) -> str:
+    """What stands at the foot of every sheet."""
+    return f"flipflow {assessment.version}, input {assessment.input_hash}"
 
 
 def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
@@ -108,7 +109,7 @@ def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
             style=_template("report.css"),
             library=library(),
             start=START,
-            breaks=BREAKS,
+            fit=_template("fit.js"),
             element=element,
         )
     )

@@ -44,9 +44,7 @@ def write_file(
     InputError
         When it exists and may not.
     """
-    if isinstance(content, str):
-        # Half of a surrogate pair has no UTF-8; JSON reads this escape as what it was.
-        content = content.encode(errors="backslashreplace")
+    content = as_bytes(content)
     place = checked_place(target, field)
     try:
         if fresh:
@@ -59,7 +57,7 @@ def write_file(
         remedy = "it exists and is not overwritten, choose another name"
         raise InputError(field, str(target), remedy) from None
     except OSError as error:
-        raise _refused(field, target, _because(error)) from None
+        raise refused(field, target, because(error)) from None
 
 
 def checked_place(target: str | Path, field: str = "path") -> Path:
@@ -76,17 +74,17 @@ def checked_place(target: str | Path, field: str = "path") -> Path:
     except FileNotFoundError:
         mode = 0
     except (OSError, ValueError) as error:
-        raise _refused(field, target, _because(error)) from None
+        raise refused(field, target, because(error)) from None
     if stat.S_ISDIR(mode):
-        raise _refused(field, target, "it cannot be written (this is a folder), name a file in it")
+        raise refused(field, target, "it cannot be written (this is a folder), name a file in it")
     if mode and not stat.S_ISREG(mode):
         return named
     place = Path(os.path.realpath(named))
     if not place.parent.is_dir():
         why = f"it cannot be written (there is no folder {str(named.parent)!r})"
-        raise _refused(field, target, f"{why}, make it or name another")
+        raise refused(field, target, f"{why}, make it or name another")
     if not all(os.access(one, os.W_OK) for one in ([place] if mode else []) + [place.parent]):
-        raise _refused(field, target, "it may not be written, name a file in a folder you own")
+        raise refused(field, target, "it may not be written, name a file in a folder you own")
     return place
 
 
@@ -104,9 +102,9 @@ def prepare_folder(folder: Path, field: str) -> None:
             pass
     except (FileExistsError, NotADirectoryError):
         why = "it cannot be written (a file is in its way), name a folder you own"
-        raise _refused(field, folder, why) from None
+        raise refused(field, folder, why) from None
     except (OSError, ValueError) as error:
-        raise _refused(field, folder, _because(error, "a folder")) from None
+        raise refused(field, folder, because(error, "a folder")) from None
 
 
 def refuse_input(target: str | Path, inputs: Iterable[str], field: str) -> None:
@@ -130,16 +128,37 @@ def _same(target: str | Path, other: str) -> bool:
         return False
 
 
-def _put(place: Path, content: bytes) -> None:
-    """Write beside a file, then take its place."""
+def write_beside(place: Path, content: bytes | str) -> Path:
+    """Write a whole file beside its place, with the mode of the one that stands there.
+
+    Raises
+    ------
+    OSError
+        When it cannot be written; nothing is left.
+    """
     part = place.with_name(f".{uuid.uuid4().hex}.part")
     try:
         with part.open("xb") as file:
-            file.write(content)
+            file.write(as_bytes(content))
             file.flush()
             if place.exists():
                 part.chmod(stat.S_IMODE(place.stat().st_mode))
             os.fsync(file.fileno())
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    return part
+
+
+def as_bytes(content: bytes | str) -> bytes:
+    """Text in UTF-8; half of a surrogate pair has none, JSON reads its escape as what it was."""
+    return content.encode(errors="backslashreplace") if isinstance(content, str) else content
+
+
+def _put(place: Path, content: bytes) -> None:
+    """Write beside a file, then take its place."""
+    part = write_beside(place, content)
+    try:
         part.replace(place)
     finally:
         part.unlink(missing_ok=True)
@@ -155,13 +174,14 @@ def _put_new(place: Path, content: bytes) -> None:
         raise
 
 
-def _because(error: OSError | ValueError, what: str = "a file in a folder") -> str:
-    """Why writing ended, and what to do."""
+def because(error: OSError | ValueError, what: str = "a file in a folder") -> str:
+    """Why writing ended, and what to do: the second half of a sentence of :func:`refused`."""
     reason = error.strerror if isinstance(error, OSError) else str(error)
     return f"it cannot be written ({reason}), name {what} you own"
 
 
-def _refused(field: str, target: str | Path, why: str) -> StoreError:
+def refused(field: str, target: str | Path, why: str) -> StoreError:
+    """The error that says where nothing can be written, and why."""
     shown = repr(str(target))
     shown = shown if len(shown) <= MOST_SHOWN else f"{shown[: MOST_SHOWN - 3]}..."
     return StoreError(f"{field} = {shown}: {why}.")

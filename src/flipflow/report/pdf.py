@@ -1,0 +1,140 @@
+"""The report as PDF: the same blocks, set by typst with the fonts that it carries."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from types import MappingProxyType
+from typing import Any
+
+from flipflow.errors import InputError, MissingExtra
+from flipflow.plotting.layout import WIDTH
+from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
+from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
+from flipflow.report.html import KIND, footer_of, title_of
+from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import Assessment
+
+# The name that typst has for a paper, and the height in points that a figure may have on it.
+PAPERS: Mapping[str, tuple[str, float]] = MappingProxyType(
+    {"a4": ("a4", 720.0), "letter": ("us-letter", 670.0)}
+)
+ROOM = 75  # characters beside the widest column of a table
+TEMPLATE = "report.typ"
+
+
+def pdf(assessment: Assessment, paper: str = "a4") -> bytes:
+    """The report of an assessment as a PDF.
+
+    Parameters
+    ----------
+    assessment
+        What :func:`flipflow.assess` returns.
+    paper
+        "a4" or "letter".
+
+    Raises
+    ------
+    InputError
+        For another paper.
+    MissingExtra
+        When typst or matplotlib is not installed.
+    """
+    return sheets(
+        blocks_of(assessment),
+        title=title_of(assessment),
+        kind=KIND,
+        footer=footer_of(assessment),
+        paper=paper,
+    )
+
+
+def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper: str) -> bytes:
+    """Blocks as a PDF; the arguments are those of :func:`flipflow.report.html.page`.
+
+    Raises
+    ------
+    InputError
+        For a paper that is not known.
+    MissingExtra
+        When typst or matplotlib is not installed.
+    """
+    name, height = PAPERS[checked_paper(paper)]
+    report = {
+        "title": title,
+        "kind": kind,
+        "footer": footer,
+        "paper": name,
+        "blocks": [_shown(block, height) for block in blocks],
+    }
+    source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()
+    content = require_typst()(
+        source,
+        format="pdf",
+        # Fonts of the machine are asked for letters that these have not, as Chinese ones.
+        font_paths=[font_folder()],
+        sys_inputs={"report": json.dumps(report)},
+    )
+    return bytes(content)
+
+
+def checked_paper(paper: str, field: str = "paper") -> str:
+    """A name of a paper.
+
+    Raises
+    ------
+    InputError
+        For another.
+    """
+    if paper not in PAPERS:
+        raise InputError(field, paper, f"choose one of {', '.join(PAPERS)}")
+    return paper
+
+
+def require_typst() -> Callable[..., Any]:
+    """What sets the pages; called before long work, so that it is not lost for want of it.
+
+    Raises
+    ------
+    MissingExtra
+        When typst or matplotlib is not installed.
+    """
+    try:
+        import typst  # noqa: PLC0415  an extra
+    except ImportError as error:
+        raise MissingExtra("A PDF needs typst: pip install 'flipflow[report]'.") from error
+    require_matplotlib()
+    compiled: Callable[..., Any] = typst.compile
+    return compiled
+
+
+def _shown(block: Block, highest: float) -> dict[str, Any]:
+    """A block as the template reads it; figures and drawings as vectors no higher than a page."""
+    told: dict[str, Any] = {"kind": block.kind}
+    if isinstance(block, FigureBlock):
+        figure = block.figure
+        share = min(1.0, highest / (figure.height * POINT))
+        told |= {"title": figure.title, "caption": figure.caption, "svg": searchable_svg(figure)}
+        return told | {"width": WIDTH * POINT * share}
+    if isinstance(block, DrawingBlock):
+        return told | dataclasses.asdict(block.drawing) | {"width": WIDTH * POINT}
+    told |= dataclasses.asdict(block)
+    return told | {"wide": _wide(block)} if isinstance(block, Table) else told
+
+
+def _wide(table: Table) -> int | None:
+    """The column of words that takes what room the others leave; None where they leave little."""
+    lengths = [
+        max(len(column.title) + len(column.unit), *(len(row[k].text) for row in table.rows), 0)
+        for k, column in enumerate(table.columns)
+    ]
+    words = {
+        k: max((len(row[k].text) + len(row[k].small) for row in table.rows), default=0)
+        for k, column in enumerate(table.columns)
+        if not column.numeric
+    }
+    widest = max(words, key=lambda k: words[k], default=None)
+    others = sum(length + 2 for k, length in enumerate(lengths) if k != widest)
+    return widest if others <= ROOM else None

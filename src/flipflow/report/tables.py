@@ -1,0 +1,184 @@
+"""The tables of a report for other programs: the same blocks, numbers with their unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from flipflow.io.spreadsheet import Sheet, Value, csv_text, xlsx
+from flipflow.io.units import in_unit
+from flipflow.model.quantities import QUANTITIES
+from flipflow.report.blocks import Block, Cell, Column, Table, TitleBlock, Values, Verdict
+from flipflow.report.html import KIND, footer_of
+from flipflow.report.numbers import NOTHING
+from flipflow.report.registry import blocks_of
+from flipflow.studies.assessment import Assessment, CaseAssessment
+from flipflow.studies.branch_values import branch_values
+
+BOOK, PREFIX = "tables.xlsx", "table-"
+FIGURE = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+MEASURE = re.compile(rf"({FIGURE})(?: ([A-Za-z%/^][A-Za-z0-9%/^ ]*))?")
+ENDS = re.compile(rf"(?:at least )?({FIGURE})?(?: to |at most )?({FIGURE})?(?: (\S+))?")
+UNIT, REMARK = "Unit", "remark"
+KILO = "k"
+RESPONSE = "Response over speed"
+# What the response lists beside speed, in the units of the machine file.
+LISTED = (
+    "main_amplitude", "floating_amplitude", "relative_amplitude", "relative_phase",
+    "main_frame_acceleration", "floating_frame_acceleration", "stop_force", "foundation_force",
+    "exciter_force",
+)  # fmt: skip
+
+
+def table_files(assessment: Assessment) -> dict[str, bytes | str]:
+    """All tables of a report, and the response, by the name of the file: one XLSX, and CSV.
+
+    Raises
+    ------
+    MissingExtra
+        When openpyxl is not installed.
+    """
+    sheets = [*sheets_of(blocks_of(assessment)), response_sheet(assessment)]
+    sheets.insert(0, _report_sheet(assessment))
+    files: dict[str, bytes | str] = {BOOK: xlsx(sheets)}
+    for sheet in sheets:
+        name = _file_name(sheet.name, files)
+        files[name] = csv_text(sheet.head, sheet.rows)
+    return files
+
+
+def sheets_of(blocks: Sequence[Block]) -> Iterator[Sheet]:
+    """Every table among the blocks."""
+    for block in blocks:
+        if isinstance(block, Table):
+            yield _sheet(block)
+
+
+def response_sheet(assessment: Assessment) -> Sheet:
+    """Every motion of every case's branch: speed, amplitudes, phase, g, forces."""
+    head = ["Load case", "Speed [rpm]", "Speed [Hz]", "Returns after a disturbance"]
+    for name in LISTED:
+        one = QUANTITIES[name]
+        head.append(f"{one.label[:1].upper()}{one.label[1:]} [{one.shown_unit}]")
+    rows = [row for case in assessment.cases for row in _response_rows(case)]
+    return Sheet(RESPONSE, tuple(head), tuple(rows))
+
+
+def _response_rows(case: CaseAssessment) -> Iterator[tuple[Value, ...]]:
+    branch = case.branch
+    columns = [branch.omega * in_unit(1.0, "rpm", "rad/s"), branch.omega / (2.0 * np.pi)]
+    values = branch_values(case.screen, branch, LISTED)
+    for name in LISTED:
+        one = QUANTITIES[name]
+        columns.append(values[name] * in_unit(1.0, one.shown_unit, one.unit))
+    for k, word in enumerate(branch.stability):
+        speed, hertz, *others = (float(column[k]) for column in columns)
+        yield (case.name, speed, hertz, str(word), *others)
+
+
+def _report_sheet(assessment: Assessment) -> Sheet:
+    """What the report is of, and what it says in words beside a label."""
+    rows: list[tuple[Value, ...]] = [("Report", KIND), ("Made by", footer_of(assessment))]
+    for block in blocks_of(assessment):
+        if isinstance(block, TitleBlock):
+            rows += [("Machine", block.title), *block.rows]
+        elif isinstance(block, Verdict):
+            rows += [("Verdict", block.text), ("State", block.state)]
+        elif isinstance(block, Values):
+            rows += block.rows
+    return Sheet("Report", ("What", "Text"), tuple(rows))
+
+
+def _sheet(table: Table) -> Sheet:
+    """A table with numbers where its columns are numeric."""
+    parsed = [_column(table, k) for k in range(len(table.columns))]
+    flat = [one for group in parsed for one in group]
+    mixed = [one for one in flat if one.mixed]
+    units = _row_units(mixed, len(table.rows))
+    head: list[str] = []
+    columns: list[list[Value]] = []
+    for one in flat:
+        if mixed and one is mixed[0]:
+            head.append(UNIT)
+            columns.append([unit or None for unit in units])
+        head.append(one.title if one.mixed or not one.unit else f"{one.title} [{one.unit}]")
+        columns.append([one.value(k, units[k] if one.mixed else one.unit) for k in range(one.size)])
+    rows = tuple(zip(*columns, strict=True))
+    return Sheet(table.title or table.columns[0].title, tuple(head), rows)
+
+
+class _Parsed:
+    """One column: of each cell its number and unit, or its text."""
+
+    def __init__(self, title: str, unit: str, cells: Sequence[tuple[Value, str]]) -> None:
+        self.title, self.cells, self.size = title, cells, len(cells)
+        found = {own for value, own in cells if own and not isinstance(value, str)}
+        self.mixed = len(found) > 1
+        self.unit = unit or (found.pop() if len(found) == 1 else "")
+
+    def value(self, row: int, unit: str) -> Value:
+        """The value of a row in a unit; as text with its own unit where that is another."""
+        value, own = self.cells[row]
+        if value is None or isinstance(value, str) or not own or own == unit:
+            return value
+        if unit == f"{KILO}{own}":
+            return value / 1000.0
+        return f"{value:g} {own}"
+
+
+def _column(table: Table, k: int) -> list[_Parsed]:
+    """The columns that a column of a report becomes."""
+    column, cells = table.columns[k], [row[k] for row in table.rows]
+    if column.ends:
+        ends = [_two_ends(cell) for cell in cells]
+        return [
+            _Parsed(f"{column.title}, {word}", column.unit, [(end[i], end[2]) for end in ends])
+            for i, word in enumerate(("least", "most"))
+        ]
+    found = [_Parsed(column.title, column.unit, [_measure(column, cell) for cell in cells])]
+    if any(cell.small for cell in cells):
+        title = f"{column.title}, {REMARK}"
+        found.append(_Parsed(title, "", [(cell.small or None, "") for cell in cells]))
+    return found
+
+
+def _measure(column: Column, cell: Cell) -> tuple[Value, str]:
+    """The number of a cell in a numeric column and its unit; else its text."""
+    if cell.text == NOTHING:
+        return None, ""
+    match = MEASURE.fullmatch(cell.text) if column.numeric else None
+    return (_number(match[1]), match[2] or "") if match else (cell.text, "")
+
+
+def _number(written: str) -> float | int:
+    return int(written) if written.lstrip("+-").isdigit() else float(written)
+
+
+def _two_ends(cell: Cell) -> tuple[Value, Value, str]:
+    """Least and most of "5 to 8 mm", "at most 3 g", "at least 20 %"."""
+    match = ENDS.fullmatch(cell.text)
+    if cell.text == NOTHING or not match:
+        return (None if cell.text == NOTHING else cell.text), None, ""
+    least, most = (None if end is None else _number(end) for end in match.groups()[:2])
+    return least, most, match[3] or ""
+
+
+def _row_units(columns: Sequence[_Parsed], rows: int) -> list[str]:
+    """The unit of each row, over the columns whose unit differs from row to row."""
+    units = []
+    for k in range(rows):
+        own = {column.cells[k][1] for column in columns} - {""}
+        units.append(max(own, key=lambda unit: (unit.startswith(KILO), unit), default=""))
+    return units
+
+
+def _file_name(sheet: str, taken: dict[str, bytes | str]) -> str:
+    """A name of a CSV file that no other has."""
+    words = re.sub(r"[^a-z0-9]+", "-", sheet.lower()).strip("-") or "table"
+    name, count = f"{PREFIX}{words}.csv", 1
+    while name in taken:
+        count += 1
+        name = f"{PREFIX}{words}-{count}.csv"
+    return name
