@@ -251,7 +251,9 @@ def functions() -> tuple[Call, ...]:
         Call("continue_orbit", ff.continue_orbit,
              {"orbit": orbit(), "field": "omega", "interval": narrow, "monitor": None},
              (Branch, FieldBranch)),
-        Call("figure", ff.figure, {"result": tiny_branch()}, (Figure,)),
+        Call("figure", ff.figure,
+             {"result": tiny_branch(), "coordinate": 0, "units": "SI", "width": 84.0,
+              "multipliers": False}, (Figure,)),
         Call("frequency_response", ff.frequency_response,
              {"machine": tiny(), "omega": narrow, "method": FEW}, (Branch,)),
         Call("jump_risk", ff.jump_risk,
@@ -316,6 +318,7 @@ def classes() -> tuple[Call, ...]:
         ff.SampledHarmonicBalance: {
             "harmonics": 3, "samples": 256, "sharpness": 1e6, "points": 300,
         },
+        ff.RungeKutta: {"formula": "dopri5", "tolerance": 1e-8, "step": None},
         ff.Choice: {"values": (1.0, 2.0)},
         ff.Normal: {"mean": 1.0, "std": 0.1},
         ff.ClearanceSpring: {

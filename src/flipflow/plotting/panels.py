@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
+PAGE_WIDTH = 690.0  # of an A4 page within its margins, 96 pixels an inch
 Role = Literal[
     "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"
 ]
@@ -196,6 +197,8 @@ class PanelGrid:
         Height in pixels at the width of an A4 page, 96 pixels an inch.
     shares
         Relative widths of the columns; empty for equal ones.
+    width
+        Width in pixels.
     """
 
     title: str
@@ -204,3 +207,4 @@ class PanelGrid:
     columns: int = 1
     height: int = 360
     shares: tuple[float, ...] = ()
+    width: float = PAGE_WIDTH

@@ -22,6 +22,7 @@ from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
+from flipflow.results.result import Result
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.operating_region import OperatingRegion, operating_region
@@ -116,7 +117,7 @@ class CaseAssessment:
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment:
+class Assessment(Result):
     """A project judged: what ``flipflow analyze`` shows.
 
     Parameters
@@ -164,8 +165,8 @@ class Assessment:
 
 def assess(
     project: Project,
-    monitor: Monitor | None = None,
     *,
+    monitor: Monitor | None = None,
     omega: tuple[float, float] | None = None,
     method: Method | None = None,
 ) -> Assessment:
@@ -193,7 +194,7 @@ def assess(
         project.screen,
         project.limits,
         project.load_cases,
-        monitor,
+        monitor=monitor,
         omega=span if omega is None else omega,
         method=method,
     )

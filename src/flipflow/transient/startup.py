@@ -20,6 +20,7 @@ from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
+from flipflow.results.result import Result
 from flipflow.transient.history import History
 from flipflow.transient.shaft_equations import SHAFT_STATES
 from flipflow.transient.speed_run import (
@@ -59,7 +60,7 @@ class NaturalFrequency(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class RunUp:
+class RunUp(Result):
     """A start or a coast-down, and what it does to the machine.
 
     Parameters
