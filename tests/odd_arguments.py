@@ -260,7 +260,9 @@ def functions() -> tuple[Call, ...]:
              (Branch, FieldBranch)),
         Call("foundation_loads", ff.foundation_loads,
              {"motions": {"empty": running()}, "runs": None}, (FoundationLoads,)),
-        Call("figure", ff.figure, {"result": tiny_branch()}, (Figure,)),
+        Call("figure", ff.figure,
+             {"result": tiny_branch(), "coordinate": 0, "units": "SI", "width": 84.0,
+              "multipliers": False}, (Figure,)),
         Call("frequency_response", ff.frequency_response,
              {"machine": tiny(), "omega": narrow, "method": FEW}, (Branch,)),
         Call("jump_risk", ff.jump_risk,
@@ -325,6 +327,7 @@ def classes() -> tuple[Call, ...]:
         ff.SampledHarmonicBalance: {
             "harmonics": 3, "samples": 256, "sharpness": 1e6, "points": 300,
         },
+        ff.RungeKutta: {"formula": "dopri5", "tolerance": 1e-8, "step": None},
         ff.Choice: {"values": (1.0, 2.0)},
         ff.Normal: {"mean": 1.0, "std": 0.1},
         ff.ClearanceSpring: {

@@ -64,6 +64,36 @@ _HOME = {
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
+    "Assessment": "flipflow.studies.assessment",
+    "Basins": "flipflow.studies.basins",
+    "BifurcationDiagram": "flipflow.studies.bifurcation_diagram",
+    "Branch": "flipflow.continuation.branch",
+    "BranchStatus": "flipflow.continuation.branch_status",
+    "Comparison": "flipflow.studies.compare",
+    "FieldBranch": "flipflow.continuation.field_branch",
+    "Figure": "flipflow.plotting.figure",
+    "FoundationLoads": "flipflow.studies.foundation_loads",
+    "History": "flipflow.transient.history",
+    "JumpRisk": "flipflow.studies.jump_risk",
+    "LinearResponse": "flipflow.dynamics.linear_response",
+    "Loading": "flipflow.studies.loading",
+    "LyapunovExponents": "flipflow.studies.lyapunov",
+    "Machine": "flipflow.model.system",
+    "OperatingRegion": "flipflow.studies.operating_region",
+    "Orbit": "flipflow.periodic.orbit",
+    "Ramp": "flipflow.studies.ramp",
+    "ResponseFamily": "flipflow.studies.response_family",
+    "RungeKutta": "flipflow.transient.time_stepping",
+    "RunUp": "flipflow.transient.startup",
+    "Section": "flipflow.studies.poincare",
+    "Sensitivity": "flipflow.studies.sensitivity",
+    "SpecialPoint": "flipflow.continuation.branch",
+    "Spectrum": "flipflow.studies.poincare",
+    "Sweep": "flipflow.transient.sweep",
+    "Cancelled": "flipflow.errors",
+    "IncompleteError": "flipflow.errors",
+    "MissingExtra": "flipflow.errors",
+    "StoreError": "flipflow.errors",
     "save": "flipflow.io.results",
     "open_result": "flipflow.io.results",
 }
@@ -71,13 +101,23 @@ _HOME = {
 __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
+    from flipflow.continuation.branch import Branch as Branch
+    from flipflow.continuation.branch import SpecialPoint as SpecialPoint
+    from flipflow.continuation.branch_status import BranchStatus as BranchStatus
+
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
     from flipflow.continuation.continue_field import continue_fold as continue_fold
     from flipflow.continuation.continue_orbit import continue_orbit as continue_orbit
     from flipflow.continuation.continue_orbit import switch_branch as switch_branch
+    from flipflow.continuation.field_branch import FieldBranch as FieldBranch
     from flipflow.continuation.frequency_response import frequency_response as frequency_response
+    from flipflow.dynamics.linear_response import LinearResponse as LinearResponse
     from flipflow.dynamics.linear_response import linear_response as linear_response
+    from flipflow.errors import Cancelled as Cancelled
+    from flipflow.errors import IncompleteError as IncompleteError
     from flipflow.errors import InputError as InputError
+    from flipflow.errors import MissingExtra as MissingExtra
+    from flipflow.errors import StoreError as StoreError
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
     from flipflow.io.results import open_result as open_result
@@ -99,6 +139,7 @@ if TYPE_CHECKING:
     from flipflow.model.screen import Load as Load
     from flipflow.model.starter import Converter as Converter
     from flipflow.model.starter import StarDelta as StarDelta
+    from flipflow.model.system import Machine as Machine
     from flipflow.model.system import MechanicalSystem as MechanicalSystem
     from flipflow.model.vary import Choice as Choice
     from flipflow.model.vary import Normal as Normal
@@ -106,26 +147,46 @@ if TYPE_CHECKING:
     from flipflow.periodic.options import HarmonicBalance as HarmonicBalance
     from flipflow.periodic.options import PiecewiseExact as PiecewiseExact
     from flipflow.periodic.options import SampledHarmonicBalance as SampledHarmonicBalance
+    from flipflow.periodic.orbit import Orbit as Orbit
     from flipflow.plotting.dispatch import figure as figure
+    from flipflow.plotting.figure import Figure as Figure
+    from flipflow.studies.assessment import Assessment as Assessment
     from flipflow.studies.assessment import assess as assess
+    from flipflow.studies.basins import Basins as Basins
     from flipflow.studies.basins import basins as basins
+    from flipflow.studies.bifurcation_diagram import BifurcationDiagram as BifurcationDiagram
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
+    from flipflow.studies.compare import Comparison as Comparison
     from flipflow.studies.compare import compare as compare
+    from flipflow.studies.foundation_loads import FoundationLoads as FoundationLoads
     from flipflow.studies.foundation_loads import foundation_loads as foundation_loads
+    from flipflow.studies.jump_risk import JumpRisk as JumpRisk
     from flipflow.studies.jump_risk import jump_risk as jump_risk
+    from flipflow.studies.loading import Loading as Loading
     from flipflow.studies.loading import loading as loading
+    from flipflow.studies.lyapunov import LyapunovExponents as LyapunovExponents
     from flipflow.studies.lyapunov import lyapunov_exponents as lyapunov_exponents
+    from flipflow.studies.operating_region import OperatingRegion as OperatingRegion
     from flipflow.studies.operating_region import operating_region as operating_region
     from flipflow.studies.periodic_orbits import periodic_orbits as periodic_orbits
+    from flipflow.studies.poincare import Section as Section
+    from flipflow.studies.poincare import Spectrum as Spectrum
     from flipflow.studies.poincare import poincare_section as poincare_section
     from flipflow.studies.poincare import spectrum as spectrum
+    from flipflow.studies.ramp import Ramp as Ramp
     from flipflow.studies.ramp import ramp as ramp
+    from flipflow.studies.response_family import ResponseFamily as ResponseFamily
     from flipflow.studies.response_family import response_family as response_family
+    from flipflow.studies.sensitivity import Sensitivity as Sensitivity
     from flipflow.studies.sensitivity import sensitivity as sensitivity
+    from flipflow.transient.history import History as History
     from flipflow.transient.simulate import simulate as simulate
+    from flipflow.transient.startup import RunUp as RunUp
     from flipflow.transient.startup import coast_down as coast_down
     from flipflow.transient.startup import start_up as start_up
+    from flipflow.transient.sweep import Sweep as Sweep
     from flipflow.transient.sweep import sweep as sweep
+    from flipflow.transient.time_stepping import RungeKutta as RungeKutta
 
 
 def __getattr__(name: str) -> object:

@@ -20,9 +20,9 @@ from flipflow.errors import InputError, MissingExtra, StoreError
 from flipflow.plotting.bars import energy_figure, region_figure
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.layout import WIDTH, arrange, place_labels
+from flipflow.plotting.layout import arrange, place_labels
 from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figures, portrait_figure
-from flipflow.plotting.panels import Axis, Line, Panel
+from flipflow.plotting.panels import PAGE_WIDTH, Axis, Line, Panel
 from flipflow.plotting.plotly import described
 from flipflow.plotting.print import _draw
 from flipflow.plotting.response import cases_figure
@@ -302,7 +302,7 @@ def test_region_shows_every_interval_of_every_case(assessment):
 def test_labels_of_lines_do_not_cover_each_other(places):
     lines = tuple(Line("x", at, "1234 rpm") for at in places)
     panel = Panel(Axis("speed", "rpm", (0.0, 1000.0)), Axis("y", "mm"), lines=lines)
-    width = 0.5 * WIDTH
+    width = 0.5 * PAGE_WIDTH
     taken = {}
     for k, label in place_labels(panel, width).items():
         middle = places[k] / 1000.0 * width + label.shift
@@ -318,7 +318,7 @@ def test_many_labels_at_one_place_are_printed_apart(middle):
     lines = tuple(Line("x", at, f"jump (rising) {at:.4g} rpm") for at in places)
     axes = (Axis("speed", "rpm", (0.0, 1000.0)), Axis("y", "mm", (0.0, 1.0)))
     figure = Figure("a", "b.", (Panel(*axes, lines=lines, title="Title"),) * 2, 2, 300)
-    sheet = Sheet(figsize=(WIDTH / 96, 3.0), dpi=96)
+    sheet = Sheet(figsize=(PAGE_WIDTH / 96, 3.0), dpi=96)
     _draw(sheet, figure, arrange(figure))
     renderer = FigureCanvasAgg(sheet).get_renderer()
     boxes = [
@@ -337,7 +337,7 @@ def test_many_labels_at_one_place_are_printed_apart(middle):
 def test_plotly_takes_plain_json(assessment):
     for figure in figures(assessment):
         text = json.dumps(described(figure), allow_nan=False)
-        assert json.loads(text)["layout"]["width"] == WIDTH
+        assert json.loads(text)["layout"]["width"] == PAGE_WIDTH
 
 
 @pytest.mark.parametrize(
@@ -374,7 +374,7 @@ def test_general_systems_are_drawn_by_degree_of_freedom():
         excitation=ff.HarmonicForce([1.0, 0.0]),
     )  # fmt: skip
     figure = ff.figure(ff.frequency_response(system, (0.2, 3.0)))
-    assert {t.name for t in figure.panels[0].traces} == {"x1", "x2"}
+    assert {t.name for t in figure.panels[0].traces} == {"x[0]", "x[1]"}
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,17 @@ from __future__ import annotations
 import inspect
 import typing
 from pathlib import Path
+from types import SimpleNamespace
 
 import flipflow
 
+# Libraries whose types stand in hints, and which are not loaded for them.
+OUTSIDE = {
+    "xr": SimpleNamespace(Dataset=object),
+    "pd": SimpleNamespace(DataFrame=object),
+    "Axes": object,
+    "Coordinate": object,
+}
 SNAPSHOT = Path(__file__).with_name("public_face.txt")
 
 
@@ -75,6 +83,8 @@ def plain(cls, name):
 
 def signature(value):
     """The signature on one line, annotations as written."""
+    if inspect.isclass(value) and issubclass(value, Exception) and "__init__" not in vars(value):
+        return "(*args)"
     found = inspect.signature(value)
     parameters = [
         p if p.annotation is p.empty else p.replace(annotation=Bare(p.annotation))
@@ -97,7 +107,7 @@ def returned(value):
         functions = [value]
     for function in functions:
         if inspect.isfunction(function):
-            yield from parts(typing.get_type_hints(function).get("return"))
+            yield from parts(typing.get_type_hints(function, localns=OUTSIDE).get("return"))
 
 
 def parts(hint):

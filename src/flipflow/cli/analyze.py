@@ -79,7 +79,7 @@ def _analyze(
         from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.studies.assessment import assess  # noqa: PLC0415
 
-        assessment = with_progress(lambda monitor: assess(project, monitor, **options))
+        assessment = with_progress(lambda monitor: assess(project, monitor=monitor, **options))
         _write(assessment, target, written)
     return assessment
 

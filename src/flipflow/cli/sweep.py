@@ -157,8 +157,9 @@ def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[R
     from flipflow.studies.ramp import ramp  # noqa: PLC0415  keeps --help quick
 
     with progress("gliding; the first run of a version compiles") as tell:
-        up = ramp(project.screen, ends, rate, lambda s, share: tell(s, 0.5 * share))
-        down = ramp(project.screen, ends[::-1], rate, lambda s, share: tell(s, 0.5 + 0.5 * share))
+        up = ramp(project.screen, ends, rate, monitor=lambda s, share: tell(s, 0.5 * share))
+        back = ends[::-1]
+        down = ramp(project.screen, back, rate, monitor=lambda s, share: tell(s, 0.5 + 0.5 * share))
     return up, down
 
 

@@ -30,6 +30,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import STABLE, stability_words
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 
 Real = NDArray[np.float64]
 Node = tuple[float, float]  # position along the branch, and omega there
@@ -83,7 +84,7 @@ class ShortenedStep:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(Frozen):
+class Branch(Frozen, Result):
     """Periodic motions followed over frequency, in their order along the branch.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
@@ -135,7 +136,8 @@ class Branch(Frozen):
             array.setflags(write=False)
 
     def __repr__(self) -> str:
-        ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s, " if self.omega.size else ""
+        span = f"{self.omega.min():.6g} to {self.omega.max():.6g}" if self.omega.size else ""
+        ends = f"{span} rad/s, " if span else ""
         counts = Counter(point.kind for point in self.special_points)
         kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
         return f"Branch({self.omega.size} points, {ends}{kinds}, {self.status.name})"

@@ -17,6 +17,7 @@ from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 
 Real = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ class FieldSpecialPoint(SpecialPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class FieldBranch(Frozen):
+class FieldBranch(Frozen, Result):
     """Periodic motions, or folds, followed over a field of the machine.
 
     Arrays are (n,) over its points, in their order along the branch. It is what
@@ -72,7 +73,7 @@ class FieldBranch(Frozen):
     version: str
 
     def __repr__(self) -> str:
-        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}, " if self.orbits else ""
+        ends = f"{self.values.min():.6g} to {self.values.max():.6g}, " if self.orbits else ""
         counts = Counter(point.kind for point in self.special_points)
         kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
         size = len(self.orbits)

@@ -14,13 +14,14 @@ from flipflow.model.arguments import checked_speeds
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 
 Real = NDArray[np.float64]
 SCAN_POINTS = 4000  # frequencies up to twice the highest natural one, to find peaks between
 
 
 @dataclass(frozen=True, eq=False)
-class LinearResponse(Frozen):
+class LinearResponse(Frozen, Result):
     """Response of the machine as long as no stop is touched; bonded stops count as springs.
 
     Parameters

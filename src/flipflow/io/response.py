@@ -20,16 +20,6 @@ NAMES = "response.nc", "response.csv"
 Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]
 
 
-def branch_netcdf(branch: Branch) -> bytes:
-    """The points of a branch as classic NetCDF."""
-    return _netcdf(branch_columns(branch), _attributes(branch))
-
-
-def branch_csv(branch: Branch) -> bytes:
-    """The points of a branch as CSV, a heading with units first."""
-    return _csv(branch_columns(branch))
-
-
 def branch_columns(branch: Branch) -> Columns:
     """The points of a branch by name: values (n,) and attributes such as units."""
     columns: Columns = {

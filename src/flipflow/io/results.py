@@ -13,10 +13,11 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import FlipflowError, InputError, StoreError
+from flipflow.io.arrays import Arrays, arrays_of
 from flipflow.io.check import Check
 from flipflow.io.command_results import Startup, Sweeps
 from flipflow.io.read_off import read_off
-from flipflow.io.response import branch_csv, branch_netcdf
+from flipflow.io.tables import csv_text, netcdf_bytes
 from flipflow.model.arguments import checked_path
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.store import json_text, write_file
@@ -71,7 +72,10 @@ SUMMARISED: set[type] = {Assessment, Comparison}
 WHOLE = "whole"
 # The layers above have results of their own; the module of one makes it known when it is loaded.
 ABOVE: Mapping[str, str] = {"flipflow/claims/1": "flipflow.paper.reproduce"}
-TABLES: Mapping[str, Callable[[Branch], bytes]] = {".nc": branch_netcdf, ".csv": branch_csv}
+TABLES: Mapping[str, Callable[[Arrays], bytes]] = {
+    ".nc": netcdf_bytes,
+    ".csv": lambda arrays: csv_text(arrays).encode(),
+}
 # What reading ends in where a document does not hold what it should: its numbers may be too large
 # to compute with, and its lists too deep to walk.
 DAMAGE = (
@@ -101,13 +105,11 @@ def save(result: object, path: str | os.PathLike[str]) -> None:
     target = checked_path("path", path)
     if target.suffix == ".json":
         write_file(target, json_text(document_of(result)))
-    elif target.suffix in TABLES and isinstance(result, Branch):
-        write_file(target, TABLES[target.suffix](result))
+    elif target.suffix in TABLES:
+        write_file(target, TABLES[target.suffix](arrays_of(result)))
     else:
-        raise InputError(
-            "path", str(path), f"{type(result).__name__} is written as .json; a branch also as "
-            ".nc or .csv"
-        )  # fmt: skip
+        remedy = "give a name that ends in .json (opens again), .nc or .csv"
+        raise InputError("path", str(path), remedy)
 
 
 def open_result(path: str | os.PathLike[str]) -> Any:

@@ -207,7 +207,7 @@ class FlipFlowScreen:
             shear_damping=self.shear_damping * load.damping_factor,
             stop_stiffness=self.stop_stiffness * stop_factor,
             stop_damping=self.stop_damping * load.stop_damping_factor,
-            measured_shift=self.gap_shift + self._sag(load.floating_mass, stiffness),
+            measured_shift=self._shift_under(load, stiffness),
         )
 
     @property
@@ -227,6 +227,12 @@ class FlipFlowScreen:
     def weight_considered(self) -> bool:
         """Whether it is known what the weight does to the gaps."""
         return self.deck_angle is not None
+
+    def _shift_under(self, load: Load, stiffness: float) -> float | None:
+        """The shift under a load; None where the machine still stands as it was measured."""
+        shift = self.gap_shift + self._sag(load.floating_mass, stiffness)
+        measured = self.measured_shift is None and self.clearance_measured == "standing"
+        return None if measured and shift == 0.0 else shift
 
     def _sag(self, mass: float, stiffness: float) -> float:
         """How far a mass on the floating frame hangs down the slope, in m."""

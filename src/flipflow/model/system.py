@@ -195,8 +195,13 @@ class MechanicalSystem:
         """Vector of shape (N,) that picks a coordinate by name or by degree of freedom."""
         if isinstance(which, str):
             if which not in self.coordinates:
-                known = ", ".join(map(repr, self.coordinates)) or "none is named"
-                raise InputError("coordinate", which, f"choose one of {known}, or an index")
+                known = ", ".join(map(repr, self.coordinates))
+                remedy = (
+                    f"choose one of {known}, or an index"
+                    if known
+                    else "none is named: give an index"
+                )
+                raise InputError("coordinate", which, remedy)
             return self.coordinates[which]
         remedy = f"choose an index from 0 to {self.size - 1}, or a name"
         return np.asarray(np.eye(self.size)[checked_index("coordinate", which, self.size, remedy)])

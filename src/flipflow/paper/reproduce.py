@@ -90,6 +90,7 @@ class Reproduction:
 def reproduce(
     screen: FlipFlowScreen | None = None,
     figures: Sequence[str] = (),
+    *,
     monitor: Monitor | None = None,
 ) -> Reproduction:
     """Compute the figures of the paper and decide its claims by the numbers found.

@@ -25,6 +25,7 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 
 GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 POINTS_PER_TURN = 720  # default times in each forcing period
@@ -32,7 +33,7 @@ QUANTITY = "give a function of (t, x, v, a) that returns one number for each tim
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit(Frozen):
+class Orbit(Frozen, Result):
     """A periodic motion of a machine under forcing at ``omega``.
 
     Time is counted from the moment the unbalance points along +x; SI units; arrays over time are

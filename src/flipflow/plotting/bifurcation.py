@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flipflow.model.system import Coordinate
 from flipflow.plotting.branches import field_axis
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Band, Panel, Trace
@@ -14,7 +15,7 @@ DRAWN: tuple[tuple[Direction, str, str, str], ...] = (
 )  # fmt: skip
 
 
-def bifurcation_figure(diagram: BifurcationDiagram) -> Figure:
+def bifurcation_figure(diagram: BifurcationDiagram, which: Coordinate | None = None) -> Figure:
     """Displacement of every coordinate at the beginning of each forcing period."""
     over_omega = diagram.omega is None
     if over_omega:
@@ -25,17 +26,17 @@ def bifurcation_figure(diagram: BifurcationDiagram) -> Figure:
         Band("x", low * scale, high * scale, "contact minus") for low, high in diagram.hysteresis
     )
     panels = []
-    for row, which in enumerate(coordinates(diagram.system)):
+    for row, name in enumerate(coordinates(diagram.system, which)):
         traces = []
         for direction, word, colour, symbol in DRAWN:
-            values, x = diagram.points(which, direction)
+            values, x = diagram.points(name, direction)
             also = (("Hz", values * HZ), ("rad/s", values)) if over_omega else ()
             if x.size:
                 traces.append(
                     Trace(word, values * scale, x * MM, "point", colour, symbol,
                           legend=row == 0, x_also=also)
                 )  # fmt: skip
-        panels.append(Panel(axis, Axis(label(which), "mm"), tuple(traces), bands=bands))
+        panels.append(Panel(axis, Axis(label(name), "mm"), tuple(traces), bands=bands))
     caption = (
         "Points: displacement whenever the unbalance points along +x, of the motion settled to, "
         "each value reached from the one before. One point: the motion repeats after one turn; n "

@@ -32,7 +32,7 @@ from flipflow.plotting.scales import MM, RPM
 Real = NDArray[np.float64]
 
 
-def branches_figure(branches: Sequence[Branch]) -> Figure:
+def branches_figure(branches: Sequence[Branch], which: Coordinate | None = None) -> Figure:
     """Amplitude of the relative motion along several branches of one machine over rpm.
 
     Parameters
@@ -40,6 +40,8 @@ def branches_figure(branches: Sequence[Branch]) -> Figure:
     branches
         Branches over frequency: the one from below, detached ones, those of several periods.
         Each has its own colour and symbol; the legend names its periods and where it comes from.
+    which
+        The coordinate; None: the relative motion of a screen, or the last one there is.
 
     Returns
     -------
@@ -56,7 +58,7 @@ def branches_figure(branches: Sequence[Branch]) -> Figure:
     if not branches or not all(isinstance(branch, Branch) for branch in branches):
         kinds = [type(branch).__name__ for branch in branches]
         raise InputError("result", kinds, "give a list of branches over frequency")
-    which = coordinates(branches[0].system)[-1]
+    which = coordinates(branches[0].system, which)[-1]
     branches = [branch for branch in branches if branch.omega.size] or branches[:1]
     curves = [Curve.of(branch, which) for branch in branches]
     traces: list[Trace] = []
@@ -92,15 +94,16 @@ def branch_name(branch: Branch) -> str:
     return f"{periods}, from below"
 
 
-def field_branch_figure(branch: FieldBranch) -> Figure:
+def field_branch_figure(branch: FieldBranch, which: Coordinate | None = None) -> Figure:
     """Relative amplitude over a field; of a curve of folds the jump speed, too."""
     if not branch.orbits:
         raise InputError("result", "a branch without points", branch.status.value)
     words = branch.field.replace("_", " ")
     axis, scale = field_axis(branch.field, branch.values)
     x = branch.values * scale
-    named = "relative" in branch.machine.system().coordinates
-    which: Coordinate = "relative" if named else 0
+    system = branch.machine.system()
+    named = which is None and "relative" in system.coordinates
+    (which,) = coordinates(system, which or ("relative" if named else 0))
     amplitude = branch.amplitude(which)
     curve = Curve(branch.values, amplitude, amplitude, branch.stability)
     traces = [

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import singledispatch
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
+from flipflow.model.arguments import checked_flag, checked_positive
+from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
@@ -17,37 +19,90 @@ from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.compare import comparison_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
+from flipflow.plotting.foundation_bars import foundation_figure
 from flipflow.plotting.history import history_figure
+from flipflow.plotting.jump_risk import jump_risk_figure
+from flipflow.plotting.layout import PIXELS_A_MM
 from flipflow.plotting.loading import loading_figure
 from flipflow.plotting.lyapunov import lyapunov_figure
-from flipflow.plotting.motion import orbit_figure
+from flipflow.plotting.motion import orbit_figure, orbits_in_time_figure
+from flipflow.plotting.multipliers import multipliers_figure
+from flipflow.plotting.ramp import ramp_figure
 from flipflow.plotting.response import branch_figure, cases_figure, linear_figure
 from flipflow.plotting.section import section_figure, spectrum_figure
 from flipflow.plotting.sensitivity import sensitivity_figure
 from flipflow.plotting.sweep import sweep_figure
 from flipflow.plotting.transient import run_up_figure
+from flipflow.plotting.units import in_units, units_for
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.foundation_loads import FoundationLoads
+from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
 from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
+from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
 
+# The figures of results that have a choice of coordinates, and of those that have none.
+OF_A_COORDINATE: dict[type, Callable[..., Figure]] = {
+    Branch: branch_figure,
+    FieldBranch: field_branch_figure,
+    LinearResponse: linear_figure,
+    Orbit: orbit_figure,
+    History: history_figure,
+    Ramp: ramp_figure,
+    ResponseFamily: family_figure,
+    Section: section_figure,
+    BifurcationDiagram: bifurcation_figure,
+}
+OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
+    OperatingRegion: region_figure,
+    Assessment: cases_figure,
+    RunUp: run_up_figure,
+    Sensitivity: sensitivity_figure,
+    Loading: loading_figure,
+    Basins: basins_figure,
+    Spectrum: spectrum_figure,
+    LyapunovExponents: lyapunov_figure,
+    JumpRisk: jump_risk_figure,
+    Comparison: comparison_figure,
+    FoundationLoads: foundation_figure,
+}
 
-def figure(result: object) -> Figure:
+
+def figure(
+    result: object,
+    *,
+    coordinate: Coordinate | None = None,
+    units: str | None = None,
+    width: float | None = None,
+    multipliers: bool = False,
+) -> Figure:
     """Make the figure of a result; ``figure(result).write("x.html")`` writes it.
 
     Parameters
     ----------
     result
-        What an analysis returns: a branch, an orbit, a sweep, an assessment, ...
+        What an analysis returns: a branch, an orbit, a sweep, an assessment, ...; a list of
+        branches, or the motions of ``periodic_orbits``.
+    coordinate
+        What is drawn of the motion, a name or an index; None: what matters most, or all.
+    units
+        "engineering" (mm, rpm, kN), "SI" or "dimensionless" (no unit is written); None: the first
+        for a screen, the last for any other machine.
+    width
+        Width in mm, such as 84 for a column of a journal; None: an A4 page within its margins.
+    multipliers
+        Of a branch, its multipliers over frequency and in the complex plane, in place of its
+        amplitudes.
 
     Returns
     -------
@@ -60,108 +115,38 @@ def figure(result: object) -> Figure:
     InputError
         For anything else.
     """
-    # A function that dispatches by type takes its argument by position only.
-    return _figure(result)
+    build = _builder(result, coordinate)
+    if checked_flag("multipliers", multipliers):
+        if not isinstance(result, (Branch, FieldBranch)):
+            raise InputError("multipliers", True, "give a branch: only its points have them")
+        build = partial(multipliers_figure, result)
+    drawn = in_units(build(), units_for(result, units))
+    return (
+        drawn if width is None else drawn.narrowed(PIXELS_A_MM * checked_positive("width", width))
+    )
 
 
-@singledispatch
-def _figure(result: object) -> Figure:
-    """The figure of a result of a kind registered below; anything else is refused."""
-    known = ", ".join(sorted(kind.__name__ for kind in _figure.registry if kind is not object))
-    raise InputError("result", type(result).__name__, f"a figure can be made of {known}")
+def _builder(result: object, which: Coordinate | None) -> Callable[[], Figure]:
+    """What makes the figure of a result."""
+    kind = type(result)
+    if isinstance(result, (list, tuple)):
+        return partial(_of_several, result, which)
+    if isinstance(result, Sweep):
+        return partial(sweep_figure, (result,), which=which)
+    if kind in OF_A_COORDINATE:
+        return partial(OF_A_COORDINATE[kind], result, which=which)
+    if kind not in OF_THE_WHOLE:
+        names = sorted(one.__name__ for one in (*OF_A_COORDINATE, *OF_THE_WHOLE, Sweep))
+        remedy = f"a figure can be made of {', '.join(names)}"
+        raise InputError("result", kind.__name__, remedy)
+    if which is not None:
+        raise InputError(
+            "coordinate", which, f"the figure of {kind.__name__} has no choice of them"
+        )
+    return partial(OF_THE_WHOLE[kind], result)
 
 
-@_figure.register
-def _(result: Branch) -> Figure:
-    return branch_figure(result)
-
-
-@_figure.register(list)
-@_figure.register(tuple)
-def _(result: Sequence[Branch]) -> Figure:
-    return branches_figure(result)
-
-
-@_figure.register
-def _(result: FieldBranch) -> Figure:
-    return field_branch_figure(result)
-
-
-@_figure.register
-def _(result: LinearResponse) -> Figure:
-    return linear_figure(result)
-
-
-@_figure.register
-def _(result: Orbit) -> Figure:
-    return orbit_figure(result)
-
-
-@_figure.register
-def _(result: OperatingRegion) -> Figure:
-    return region_figure(result)
-
-
-@_figure.register
-def _(result: Assessment) -> Figure:
-    return cases_figure(result)
-
-
-@_figure.register
-def _(result: Comparison) -> Figure:
-    return comparison_figure(result)
-
-
-@_figure.register
-def _(result: Sweep) -> Figure:
-    return sweep_figure((result,))
-
-
-@_figure.register
-def _(result: History) -> Figure:
-    return history_figure(result)
-
-
-@_figure.register
-def _(result: RunUp) -> Figure:
-    return run_up_figure(result)
-
-
-@_figure.register
-def _(result: Sensitivity) -> Figure:
-    return sensitivity_figure(result)
-
-
-@_figure.register
-def _(result: Loading) -> Figure:
-    return loading_figure(result)
-
-
-@_figure.register
-def _(result: ResponseFamily) -> Figure:
-    return family_figure(result)
-
-
-@_figure.register
-def _(result: Basins) -> Figure:
-    return basins_figure(result)
-
-
-@_figure.register
-def _(result: Section) -> Figure:
-    return section_figure(result)
-
-
-@_figure.register
-def _(result: Spectrum) -> Figure:
-    return spectrum_figure(result)
-
-
-@_figure.register
-def _(result: LyapunovExponents) -> Figure:
-    return lyapunov_figure(result)
-
-
-@_figure.register
-def _(result: BifurcationDiagram) -> Figure:
-    return bifurcation_figure(result)
+def _of_several(result: Sequence[object], which: Coordinate | None) -> Figure:
+    if result and all(isinstance(one, Orbit) for one in result):
+        return orbits_in_time_figure(result, which)  # type: ignore[arg-type]
+    return branches_figure(result, which)  # type: ignore[arg-type]

@@ -31,6 +31,7 @@ def family_figure(
     beneath: ResponseFamily | None = None,
     title: str = "",
     note: str = "",
+    which: Coordinate | None = None,
 ) -> Figure:
     """Amplitude of every coordinate over rad/s, one line for each member.
 
@@ -46,17 +47,20 @@ def family_figure(
         The same family by harmonic balance, drawn wide and pale beneath.
     title, note
         Title, and a sentence for the caption.
+    which
+        The only coordinate to draw; None: all.
     """
     symbol = FIELD[family.field].symbol if family.field in FIELD else family.field
     words = list(labels) or [_value(family.field, member.value) for member in family.members]
     panels = tuple(
-        _panel(which, family.members, words, beneath, first=k == 0)
-        for k, which in enumerate(coordinates(family.machine.system()))
+        _panel(name, family.members, words, beneath, first=k == 0)
+        for k, name in enumerate(coordinates(family.machine.system(), which))
     )
     under = f" Wide and pale beneath: {BALANCE}." if beneath is not None else ""
     caption = f"Half the peak-to-peak motion. {READING}{under} {note}".strip()
-    name = title or f"Response over {symbol}"
-    return Figure(name, caption, panels, height=HEIGHT * len(panels) + 80)
+    return Figure(
+        title or f"Response over {symbol}", caption, panels, height=HEIGHT * len(panels) + 80
+    )
 
 
 def branch_traces(

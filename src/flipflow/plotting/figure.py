@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flipflow.plotting.files import write_rendered
 from flipflow.plotting.panels import PanelGrid
 
+COLUMN = 250.0  # pixels that a column of panels needs at least
+ASPECT, LOWEST = 0.72, 190.0  # height of a panel over its width, and its least height in pixels
 FORMATS = (".html", ".svg", ".pdf", ".png")
 
 
 @dataclass(frozen=True)
 class Figure(PanelGrid):
     """A grid of panels that can be written to a file; its fields are those of the grid."""
+
+    def narrowed(self, width: float) -> Figure:
+        """The same figure at another width in pixels, panels below each other where it is narrow.
+
+        A panel is as high as two thirds of its width, unless it was lower.
+        """
+        columns = self.columns if width >= COLUMN * self.columns else 1
+        rows = -(-len(self.panels) // columns)
+        was = self.height / -(-len(self.panels) // self.columns)
+        row = min(was, max(width / columns * ASPECT, LOWEST))
+        shares = self.shares if columns == self.columns else ()
+        height = int(row * rows)
+        return replace(self, width=width, columns=columns, shares=shares, height=height)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the figure to a file, in the format its ending names.

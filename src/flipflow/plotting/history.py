@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Panel, Trace
@@ -20,13 +21,15 @@ SPANS = 400
 LAST_TURNS = 3
 
 
-def history_figure(history: History) -> Figure:
+def history_figure(history: History, which: Coordinate | None = None) -> Figure:
     """Displacement of every coordinate over time, and the force of each stop below.
 
     Parameters
     ----------
     history
         What :func:`flipflow.simulate` returns.
+    which
+        The only coordinate to draw; None: all.
 
     Returns
     -------
@@ -34,10 +37,10 @@ def history_figure(history: History) -> Figure:
         The whole time by its extremes at the left, the last turns at the right.
     """
     moving = []
-    for k, which in enumerate(coordinates(history.system)):
-        known = isinstance(which, str) and which in LABELS
-        colour = str(which) if known else case_colour(k)
-        moving.append((label(which), colour, history.displacement(which) * MM))
+    for k, name in enumerate(coordinates(history.system, which)):
+        known = isinstance(name, str) and name in LABELS
+        colour = str(name) if known else case_colour(k)
+        moving.append((label(name), colour, history.displacement(name) * MM))
     rows = [("displacement", "mm", moving)]
     if history.force.shape[1]:
         forces = [

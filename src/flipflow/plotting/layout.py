@@ -7,9 +7,9 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from flipflow.plotting.panels import Line, Panel, PanelGrid
+from flipflow.plotting.panels import PAGE_WIDTH, Line, Panel, PanelGrid
 
-WIDTH = 690  # the width of an A4 page within its margins, 96 pixels an inch
+PIXELS_A_MM = 96.0 / 25.4
 FONT = 11
 CHARACTER = 5.9
 LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
@@ -57,10 +57,10 @@ class Geometry:
 
 
 def arrange(figure: PanelGrid) -> Geometry:
-    """Lay out a figure of :data:`WIDTH` pixels."""
+    """Lay out a figure in its width."""
     columns = figure.columns
     rows = [figure.panels[k : k + columns] for k in range(0, len(figure.panels), columns)]
-    spans = list(_columns(rows, figure.shares or (1.0,) * columns))
+    spans = list(_columns(rows, figure.shares or (1.0,) * columns, figure.width))
     legend = LEGEND_ROW * legend_rows(figure)
     heads = [_head(row, spans) for row in rows]
     room = figure.height - legend - sum(heads) - BOTTOM - ROW_GAP * (len(rows) - 1)
@@ -93,22 +93,22 @@ def within(text: str, width: int, lines: int = 1) -> str:
 
 def legend_columns(figure: PanelGrid) -> int:
     """Entries of the legend in a row."""
-    return _entries_in_a_row(legend_names(figure))
+    return _entries_in_a_row(legend_names(figure), figure.width)
 
 
 def legend_rows(figure: PanelGrid) -> int:
     """Rows the legend needs; none where there is one entry only."""
-    return legend_lines(legend_names(figure))
+    return legend_lines(legend_names(figure), figure.width)
 
 
-def legend_lines(names: Sequence[str]) -> int:
+def legend_lines(names: Sequence[str], width: float = PAGE_WIDTH) -> int:
     """Rows that a legend of these entries needs."""
-    return math.ceil(len(names) / _entries_in_a_row(names)) if len(names) > 1 else 0
+    return math.ceil(len(names) / _entries_in_a_row(names, width)) if len(names) > 1 else 0
 
 
-def _entries_in_a_row(names: Sequence[str]) -> int:
+def _entries_in_a_row(names: Sequence[str], width: float) -> int:
     widest = max(map(len, names), default=0)
-    return max(int((WIDTH - RIGHT) / (LEGEND_MARK + CHARACTER * widest)), 1)
+    return max(int((width - RIGHT) / (LEGEND_MARK + CHARACTER * widest)), 1)
 
 
 def place_labels(panel: Panel, width: float) -> dict[int, Label]:
@@ -162,7 +162,7 @@ def _head(row: Sequence[Panel], spans: Sequence[tuple[float, float]]) -> float:
 
 
 def _columns(
-    rows: Sequence[Sequence[Panel]], shares: Sequence[float]
+    rows: Sequence[Sequence[Panel]], shares: Sequence[float], whole: float
 ) -> Iterator[tuple[float, float]]:
     """Left edge and width of each column."""
     lefts = [
@@ -170,7 +170,7 @@ def _columns(
         for k in range(len(shares))
     ]
     lefts = [left if k == 0 else left + 6.0 for k, left in enumerate(lefts)]
-    room = WIDTH - RIGHT - sum(lefts)
+    room = whole - RIGHT - sum(lefts)
     left = 0.0
     for share, own in zip(shares, lefts, strict=True):
         left += own

@@ -38,36 +38,59 @@ ORBITS = (
 PORTRAIT = "Velocity over displacement of the relative motion: one closed loop a turn."
 
 
-def orbit_figure(orbit: Orbit) -> Figure:
+def orbit_figure(orbit: Orbit, which: Coordinate | None = None) -> Figure:
     """Relative motion over two turns and its phase portrait, for one motion.
 
     Parameters
     ----------
     orbit
         A periodic motion.
+    which
+        The coordinate; None: the one across the stop.
 
     Returns
     -------
     Figure
         Two panels side by side.
     """
-    which = _across(orbit)
+    (chosen,) = (_across(orbit),) if which is None else coordinates(orbit.system, which)
+    lines = gap_lines(orbit) if chosen == _across(orbit) else ()
     touched = bool(orbit.contact_intervals)
     said = CONTACT_WORDS if touched else NO_CONTACT if _stops(orbit) else NO_STOP
     caption = f"{said} {PORTRAIT}"
     title = f"Motion at {orbit.omega * RPM:.4g} rpm"
-    name = label(which)
+    name = label(chosen)
     panels = (
         Panel(
-            _shaft(), Axis(f"{name} displacement", "mm"), (_in_time(orbit, which, name),),
-            bands=tuple(contact_bands(orbit)), lines=gap_lines(orbit),
+            _shaft(), Axis(f"{name} displacement", "mm"), (_in_time(orbit, chosen, name),),
+            bands=tuple(contact_bands(orbit)), lines=lines,
         ),
         Panel(
             Axis(f"{name} displacement", "mm"), Axis("velocity", "m/s"),
-            (_loop(orbit, which, name),), lines=gap_lines(orbit, "x", text=False),
+            (_loop(orbit, chosen, name),),
+            lines=gap_lines(orbit, "x", text=False) if lines else (),
         ),
     )  # fmt: skip
     return Figure(title, caption, panels, columns=2, height=300, shares=(0.6, 0.4))
+
+
+def orbits_in_time_figure(orbits: Sequence[Orbit], which: Coordinate | None = None) -> Figure:
+    """Coexisting motions over their turns, and their phase portraits."""
+    (chosen,) = (_across(orbits[0]),) if which is None else coordinates(orbits[0].system, which)
+    words = [f"{orbit.amplitude(chosen) * MM:.4g} mm, {orbit.stability}" for orbit in orbits]
+    pairs = list(enumerate(zip(orbits, words, strict=True)))
+    panels = (
+        Panel(
+            _shaft(), Axis(f"{label(chosen)} displacement", "mm"),
+            tuple(_in_time(orbit, chosen, word, k) for k, (orbit, word) in pairs),
+        ),
+        Panel(
+            Axis(f"{label(chosen)} displacement", "mm"), Axis("velocity", "m/s"),
+            tuple(_loop(orbit, chosen, word, k) for k, (orbit, word) in pairs),
+        ),
+    )  # fmt: skip
+    title = f"Motions at {orbits[0].omega * RPM:.4g} rpm"
+    return Figure(title, PORTRAIT, panels, columns=2, height=340, shares=(0.6, 0.4))
 
 
 def motions_figure(assessment: Assessment) -> Figure | None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
+PAGE_WIDTH = 690.0  # of an A4 page within its margins, 96 pixels an inch
 Role = Literal[
     "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"
 ]
@@ -198,6 +199,8 @@ class PanelGrid:
         Relative widths of the columns; empty for equal ones.
     subject
         What it belongs to, machine, load case, revision and date, for a figure on its own.
+    width
+        Width in pixels.
     """
 
     title: str
@@ -207,3 +210,4 @@ class PanelGrid:
     height: int = 360
     shares: tuple[float, ...] = ()
     subject: str = ""
+    width: float = PAGE_WIDTH

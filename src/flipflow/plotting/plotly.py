@@ -20,7 +20,6 @@ from flipflow.plotting.layout import (
     FONT,
     LABEL_ROW,
     SIDES,
-    WIDTH,
     Geometry,
     Label,
     Rect,
@@ -32,7 +31,7 @@ from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, T
 
 Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
-SYMBOLS = {"triangle": "triangle-up", "cross": "x-thin-open"}
+SYMBOLS = {"triangle": "triangle-up", "triangle-open": "triangle-down-open", "cross": "x-thin-open"}
 VEIL = "rgba(255,255,255,0.85)"  # behind words that lines may cross
 MARKS_SHOWN = 9
 # The bar of tools would cover the legend; zoom, pan and reset work with the mouse alone.
@@ -58,7 +57,8 @@ def page(figure: PanelGrid) -> str:
     subject = f"<p>{html.escape(figure.subject)}</p>" if figure.subject else ""
     return PAGE.format(
         subject=subject, title=html.escape(figure.title), caption=html.escape(figure.caption),
-        family=FAMILY, ink=INK, width=WIDTH, figure=element(figure), library=library(), start=START,
+        family=FAMILY, ink=INK, width=figure.width, figure=element(figure), library=library(),
+        start=START,
     )  # fmt: skip
 
 
@@ -73,7 +73,7 @@ def element(figure: PanelGrid) -> str:
     # "<" inside the data could end the script element early.
     data = json.dumps(described(figure), separators=(",", ":")).replace("<", "\\u003c")
     return (
-        f'<div data-figure style="width:{WIDTH}px;height:{figure.height}px">'
+        f'<div data-figure style="width:{figure.width:g}px;height:{figure.height}px">'
         f'<script type="application/json">{data}</script></div>'
     )
 
@@ -109,7 +109,7 @@ def described(figure: PanelGrid) -> Json:
 def _frame(figure: PanelGrid) -> Json:
     """Paper without margins: every panel is placed by its own domain."""
     return {
-        "width": WIDTH, "height": figure.height, "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "width": figure.width, "height": figure.height, "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "font": {"family": FAMILY, "size": FONT, "color": INK}, "hovermode": "closest",
         "paper_bgcolor": "white", "plot_bgcolor": "white", "barmode": "overlay",
         "hoverlabel": {"bgcolor": "white", "bordercolor": INK, "font": {"color": INK}},
@@ -122,7 +122,7 @@ def _frame(figure: PanelGrid) -> Json:
 
 def _axis(axis: Axis, rect: Rect, figure: PanelGrid, key: str, *, across: bool) -> Json:
     start = rect.left if across else figure.height - rect.top - rect.height
-    length, whole = (rect.width, WIDTH) if across else (rect.height, figure.height)
+    length, whole = (rect.width, figure.width) if across else (rect.height, figure.height)
     made: Json = {
         "domain": [start / whole, min((start + length) / whole, 1.0)],
         "anchor": f"{'y' if across else 'x'}{key}",

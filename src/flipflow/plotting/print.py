@@ -11,7 +11,6 @@ from flipflow.plotting.layout import (
     FONT,
     LABEL_ROW,
     SIDES,
-    WIDTH,
     Geometry,
     Label,
     arrange,
@@ -32,7 +31,7 @@ DATE = {"pdf": "CreationDate", "svg": "Date"}
 STYLES = {"dash": (0, (5, 2.5)), "dot": (0, (1, 2)), "dashdot": (0, (5, 2, 1, 2)), "solid": "-"}
 MARKS = {
     "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
-    "diamond": "D", "cross": "x",
+    "diamond": "D", "diamond-open": "D", "cross": "x", "triangle-open": "v", "star": "*",
 }  # fmt: skip
 MARKS_SHOWN = 9
 VEIL = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0}
@@ -102,7 +101,7 @@ def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
     import matplotlib as mpl  # noqa: PLC0415  slow to import
     from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
 
-    size = (WIDTH / PIXELS_AN_INCH, figure.height / PIXELS_AN_INCH)
+    size = (figure.width / PIXELS_AN_INCH, figure.height / PIXELS_AN_INCH)
     buffer = io.BytesIO()
     style: Any = {**STYLE, **own}
     with mpl.rc_context(style):
@@ -125,7 +124,7 @@ def _draw(sheet: Sheet, figure: PanelGrid, geometry: Geometry) -> None:
     handles: dict[str, Any] = {}
     for k, (panel, rect) in enumerate(zip(figure.panels, geometry.rects, strict=True)):
         foot = figure.height - rect.top - rect.height
-        place = (rect.left / WIDTH, foot / figure.height, rect.width / WIDTH,
+        place = (rect.left / figure.width, foot / figure.height, rect.width / figure.width,
                  rect.height / figure.height)  # fmt: skip
         axes = sheet.add_axes(place)
         _draw_panel(axes, panel, handles)

@@ -26,7 +26,11 @@ SYMBOLS = {"main": "square", "floating": "triangle"}
 KIND_WORDS = {
     "fold": "jump (fold)", "contact begin": "contact begins", "contact end": "contact ends",
 }  # fmt: skip
-KIND_SYMBOLS = {"fold": "diamond", "contact begin": "circle-open", "contact end": "cross"}
+KIND_SYMBOLS = {
+    "fold": "diamond", "contact begin": "circle-open", "contact end": "cross",
+    "period doubling": "triangle", "symmetry breaking": "square", "Neimark-Sacker": "star",
+    "branch point": "triangle-open", "cusp": "diamond-open",
+}  # fmt: skip
 BAND_POINTS = 300
 ROWS, ROW_HEIGHT = 5, 186  # of load cases one below the other on a page, pixels
 OTHER_CASES, LEGEND_LETTERS = "the other load cases", 48
@@ -39,7 +43,12 @@ READING = (
 )
 
 
-def branch_figure(branch: Branch, omega: float | None = None, title: str = "") -> Figure:
+def branch_figure(
+    branch: Branch,
+    omega: float | None = None,
+    title: str = "",
+    which: Coordinate | None = None,
+) -> Figure:
     """Amplitude and phase of every coordinate along a branch.
 
     Parameters
@@ -50,13 +59,15 @@ def branch_figure(branch: Branch, omega: float | None = None, title: str = "") -
         Working speed in rad/s, marked where it is given.
     title
         Title; names the load case in reports.
+    which
+        The only coordinate to draw; None: all.
 
     Returns
     -------
     Figure
         Two panels, amplitude and phase, over rpm.
     """
-    names = coordinates(branch.system)
+    names = coordinates(branch.system, which)
     curves = [Curve.of(branch, name) for name in names]
     amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
     phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
@@ -118,9 +129,9 @@ def _row(name: str, branch: Branch, omega: float | None) -> tuple[Panel, Panel]:
     return left, Panel(axis, _phase_axis(curves), traces=phase, lines=lines)
 
 
-def linear_figure(response: LinearResponse) -> Figure:
+def linear_figure(response: LinearResponse, which: Coordinate | None = None) -> Figure:
     """Amplitude and phase without contact over rpm, with the natural frequencies marked."""
-    names = coordinates(response.system)
+    names = coordinates(response.system, which)
     curves = [
         Curve(
             response.omega,
@@ -202,8 +213,19 @@ def case_look(index: int, count: int) -> tuple[str, str | None]:
     return case_colour(index), case_symbol(index)
 
 
-def coordinates(system: MechanicalSystem) -> tuple[Coordinate, ...]:
-    """What is drawn of a system: its named coordinates, or the first few degrees of freedom."""
+def coordinates(
+    system: MechanicalSystem, which: Coordinate | None = None
+) -> tuple[Coordinate, ...]:
+    """What is drawn of a system: ``which``, its named coordinates, or a few degrees of freedom.
+
+    Raises
+    ------
+    InputError
+        For a coordinate that the system does not have.
+    """
+    if which is not None:
+        system.coordinate(which)
+        return (which,)
     if system.coordinates:
         return tuple(system.coordinates)
     return tuple(range(min(system.size, MOST_COORDINATES)))
@@ -211,7 +233,7 @@ def coordinates(system: MechanicalSystem) -> tuple[Coordinate, ...]:
 
 def label(which: Coordinate) -> str:
     """Words for a coordinate."""
-    return LABELS.get(which, which) if isinstance(which, str) else f"x{which + 1}"
+    return LABELS.get(which, which) if isinstance(which, str) else f"x[{which}]"
 
 
 def speed_axis(omega: Real, bounds: tuple[float, float] | None = None) -> Axis:

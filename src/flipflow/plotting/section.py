@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import coordinates, label
@@ -14,13 +15,13 @@ MOST_HARMONICS = 6.0
 DECADES = 6.0
 
 
-def section_figure(section: Section) -> Figure:
+def section_figure(section: Section, which: Coordinate | None = None) -> Figure:
     """Velocity over displacement of every coordinate, one point a forcing period."""
     panels = []
-    for which in coordinates(section.system):
-        x, v = section.displacement(which) * MM, section.velocity(which)
+    for name in coordinates(section.system, which):
+        x, v = section.displacement(name) * MM, section.velocity(name)
         points = Trace("once a turn", x, v, "point", symbol="circle", legend=False)
-        panels.append(Panel(Axis(label(which), "mm"), Axis("velocity", "m/s"), (points,)))
+        panels.append(Panel(Axis(label(name), "mm"), Axis("velocity", "m/s"), (points,)))
     caption = (
         f"{section.states.shape[0]} turns, a point whenever the unbalance points along +x. A "
         "motion that repeats after n turns shows n points, one that never repeats "

@@ -49,7 +49,7 @@ def sweep_figure(
     """
     if not sweeps:
         raise InputError("sweeps", "none", "give at least one")
-    chosen = coordinates(sweeps[0].system)[-1] if which is None else which
+    chosen = coordinates(sweeps[0].system, which)[-1]
     traces: list[Trace] = []
     if branch is not None:
         curve = Curve.of(branch, chosen)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from flipflow.errors import InputError, MissingExtra
-from flipflow.plotting.layout import WIDTH
+from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
 from flipflow.report.html import KIND, footer_of, title_of
@@ -117,9 +117,9 @@ def _shown(block: Block, highest: float) -> dict[str, Any]:
         figure = block.figure
         share = min(1.0, highest / (figure.height * POINT))
         told |= {"title": figure.title, "caption": figure.caption, "svg": searchable_svg(figure)}
-        return told | {"width": WIDTH * POINT * share}
+        return told | {"width": PAGE_WIDTH * POINT * share}
     if isinstance(block, DrawingBlock):
-        return told | dataclasses.asdict(block.drawing) | {"width": WIDTH * POINT}
+        return told | dataclasses.asdict(block.drawing) | {"width": PAGE_WIDTH * POINT}
     told |= dataclasses.asdict(block)
     return told | {"wide": _wide(block)} if isinstance(block, Table) else told
 

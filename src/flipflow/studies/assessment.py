@@ -33,6 +33,7 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 from flipflow.studies.drive_check import Demand
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.foundation_loads import FoundationLoads, foundation_loads
@@ -138,7 +139,7 @@ class CaseAssessment(Frozen):
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment:
+class Assessment(Result):
     """A project judged: what ``flipflow analyze`` shows.
 
     Parameters
@@ -212,8 +213,8 @@ class Assessment:
 
 def assess(
     project: Project,
-    monitor: Monitor | None = None,
     *,
+    monitor: Monitor | None = None,
     omega: tuple[float, float] | None = None,
     method: Method | None = None,
 ) -> Assessment:
@@ -245,7 +246,7 @@ def assess(
         project.screen,
         project.limits,
         loads,
-        monitor,
+        monitor=monitor,
         omega=span if omega is None else omega,
         method=method,
     )

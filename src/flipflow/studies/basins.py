@@ -22,6 +22,7 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 from flipflow.studies.attractors import Attractors
 
 Int = NDArray[np.int64]
@@ -48,7 +49,7 @@ class GridAxis:
 
 
 @dataclass(frozen=True, eq=False)
-class Basins(Frozen):
+class Basins(Frozen, Result):
     """Which motion each state of a grid settles on; the unbalance points along +x at the start.
 
     Parameters

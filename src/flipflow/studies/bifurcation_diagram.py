@@ -31,6 +31,7 @@ from flipflow.model.parameters import Parameter, parameter_of
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.periodic.solver import STEP_SHARE, Point
+from flipflow.results.result import Result
 from flipflow.transient.settling import (
     MAX_PERIODS,
     MOST_TURNS,
@@ -78,7 +79,7 @@ class Pass:
 
 
 @dataclass(frozen=True, eq=False)
-class BifurcationDiagram:
+class BifurcationDiagram(Result):
     """What a machine settles to while a parameter rises in steps, then falls.
 
     Parameters

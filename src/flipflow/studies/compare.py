@@ -22,6 +22,7 @@ from flipflow.model.project import Document, Project
 from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 from flipflow.studies.assessment import Assessment, CaseAssessment, assess, relative_margin
 
 # The layer above reads files; `plot` and `save` are bound as late.
@@ -108,7 +109,7 @@ class ResultChange:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Frozen):
+class Comparison(Frozen, Result):
     """Machines compared.
 
     Parameters
@@ -209,7 +210,7 @@ def compare(
         def during(sentence: str, share: float, k: int = k, name: str = name) -> None:
             say(f"{name}, {sentence}", (k + share) / len(projects))
 
-        found.append(assess(project, during))
+        found.append(assess(project, monitor=during))
     return Comparison(names, tuple(found))
 
 

@@ -28,6 +28,7 @@ from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.numerals import digits
 from flipflow.model.screen import FlipFlowScreen, Rotation
 from flipflow.periodic.orbit import Orbit
+from flipflow.results.result import Result
 from flipflow.transient.startup import RunUp
 
 Real = NDArray[np.float64]
@@ -142,7 +143,7 @@ class RunLoads:
 
 
 @dataclass(frozen=True, repr=False)
-class FoundationLoads:
+class FoundationLoads(Result):
     """What goes into the ground; forces are those of all supports together.
 
     Parameters

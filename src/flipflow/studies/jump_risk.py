@@ -17,6 +17,7 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point
+from flipflow.results.result import Result
 from flipflow.studies.attractors import Attractors
 from flipflow.studies.blows import Blows
 from flipflow.transient.settling import is_stable
@@ -63,7 +64,7 @@ class Throw:
 
 
 @dataclass(frozen=True, eq=False)
-class JumpRisk:
+class JumpRisk(Result):
     """How little it takes to throw a motion onto another one.
 
     Parameters

@@ -17,6 +17,7 @@ from flipflow.model.arguments import checked_interval
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Coordinate
 from flipflow.periodic.options import Method, checked_method
+from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 
 Real = NDArray[np.float64]
@@ -153,7 +154,7 @@ class LoadedMachine:
 
 
 @dataclass(frozen=True, eq=False)
-class Loading:
+class Loading(Result):
     """What a load does to a screen; returned by :func:`flipflow.loading`.
 
     Parameters

@@ -12,6 +12,7 @@ from flipflow.model.arguments import checked_count, checked_monitor, checked_spe
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.results.result import Result
 from flipflow.transient.exponents import BATCHES, grown
 from flipflow.transient.settling import MAX_PERIODS, Settling, Word
 
@@ -20,7 +21,7 @@ MOST_PERIODS = 1_000_000  # forcing periods that may be asked for
 
 
 @dataclass(frozen=True, eq=False)
-class LyapunovExponents:
+class LyapunovExponents(Result):
     """Mean rates at which neighbouring motions part (above 0) or meet (below 0).
 
     Parameters

@@ -16,6 +16,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
+from flipflow.results.result import Result
 from flipflow.studies.feasible import Bound, CaseWindow, Intervals, case_window, common_window
 from flipflow.studies.landmarks import analysed_range, landmarks
 
@@ -26,7 +27,7 @@ PEAK_WORDS = "peak of the relative amplitude"
 
 
 @dataclass(frozen=True, eq=False)
-class OperatingRegion:
+class OperatingRegion(Result):
     """Characteristic frequencies of a screen and where it may run; all in rad/s.
 
     Parameters
@@ -107,8 +108,8 @@ def operating_region(
     screen: FlipFlowScreen,
     limits: Limits | None = None,
     load_cases: Sequence[Load] = (),
-    monitor: Monitor | None = None,
     *,
+    monitor: Monitor | None = None,
     omega: tuple[float, float] | None = None,
     method: Method | None = None,
 ) -> OperatingRegion:

@@ -47,6 +47,7 @@ def periodic_orbits(
     omega: float,
     max_periods: int = 1,
     rng: int | np.random.Generator = 0,
+    *,
     monitor: Monitor | None = None,
 ) -> tuple[Orbit, ...]:
     """Periodic motions at ``omega`` that repeat after up to ``max_periods`` forcing periods.

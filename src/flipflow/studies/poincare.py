@@ -12,6 +12,7 @@ from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_kind, checked_speed
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
+from flipflow.results.result import Result
 from flipflow.transient.exponents import with_word
 from flipflow.transient.history import History
 from flipflow.transient.settling import MAX_PERIODS, UNDECIDED, Settling, Word
@@ -20,7 +21,7 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class Section(Result):
     """States of a motion once a forcing period, when the unbalance points along +x.
 
     Parameters
@@ -58,7 +59,7 @@ class Section:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(Result):
     """Amplitudes of the harmonic parts of a motion.
 
     Parameters

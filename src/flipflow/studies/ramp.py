@@ -19,6 +19,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
+from flipflow.results.result import Result
 from flipflow.studies.periodic_orbits import attracting_orbits
 from flipflow.transient.history import History
 from flipflow.transient.speed_run import Start, normal_direction, run_history, swings
@@ -53,7 +54,7 @@ class LateJump:
 
 
 @dataclass(frozen=True, eq=False)
-class Ramp:
+class Ramp(Result):
     """A motion while the speed glides at a constant rate.
 
     Parameters
@@ -77,8 +78,8 @@ class Ramp:
     jumps: tuple[LateJump, ...]
 
     def __repr__(self) -> str:
-        first, last = self.history.omega[0], self.history.omega[-1]
-        ends = f"{first:.6g} to {last:.6g} rad/s"
+        least, most = self.history.omega.min(), self.history.omega.max()
+        ends = f"{least:.6g} to {most:.6g} rad/s"
         return f"Ramp({ends} at {self.rate:.4g} rad/s^2, {len(self.jumps)} jumps)"
 
     def amplitude(self, which: Coordinate) -> tuple[Real, Real]:
@@ -89,7 +90,11 @@ class Ramp:
 
 
 def ramp(
-    machine: Machine, omega: tuple[float, float], rate: float, monitor: Monitor | None = None
+    machine: Machine,
+    omega: tuple[float, float],
+    rate: float,
+    *,
+    monitor: Monitor | None = None,
 ) -> Ramp:
     """Let the speed glide from one value to another at a constant rate.
 

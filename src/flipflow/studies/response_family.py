@@ -21,6 +21,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, system_of
 from flipflow.periodic.options import Method
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.studies.loading import amplitude_from_below
 
@@ -105,7 +106,7 @@ class Member(Frozen):
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseFamily(Frozen):
+class ResponseFamily(Frozen, Result):
     """Responses of machines that differ in one field; returned by ``response_family``.
 
     Parameters
@@ -123,8 +124,8 @@ class ResponseFamily(Frozen):
     members: tuple[Member, ...]
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{member.value:.6g}" for member in self.members)
-        return f"ResponseFamily({self.field}: {values})"
+        span = f"{self.values.min():.6g} to {self.values.max():.6g}"
+        return f"ResponseFamily({self.field}: {len(self.members)} values, {span})"
 
     @property
     def screen(self) -> Machine:

@@ -24,6 +24,7 @@ from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.system import Machine, system_of
 from flipflow.model.vary import Distribution, Variation, Vary, variations
+from flipflow.results.result import Result
 from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.sensitivity_samples import (
     Columns,
@@ -38,7 +39,7 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(Result):
     """Sobol indices of a quantity; it is what :func:`flipflow.sensitivity` returns.
 
     Arrays over the D fields are (D,) where ``omega`` is one frequency or None, and (n_omega, D)

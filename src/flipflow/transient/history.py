@@ -14,6 +14,7 @@ from flipflow.errors import IncompleteError
 from flipflow.model.arguments import checked_index
 from flipflow.model.contact_law import WHOLE, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
+from flipflow.results.result import Result
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class ContactChange:
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Result):
     """A motion over time in SI units; n rows, N degrees of freedom, m springs.
 
     Where a contact changes the same time may stand twice: once before, once after.

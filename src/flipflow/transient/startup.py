@@ -25,6 +25,7 @@ from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
+from flipflow.results.result import Result
 from flipflow.transient.chosen_drive import NOT_SETTLED, default_drive, fitted_drive
 from flipflow.transient.history import History
 from flipflow.transient.shaft_equations import SHAFT_STATES
@@ -79,7 +80,7 @@ class RunSummary:
 
 
 @dataclass(frozen=True, eq=False)
-class RunUp:
+class RunUp(Result):
     """A start or a coast-down, and what it does to the machine.
 
     Parameters

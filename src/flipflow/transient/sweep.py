@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.errors import Cancelled
+from flipflow.errors import Cancelled, InputError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_speeds
 from flipflow.model.monitor import Monitor
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.periodic.solver import Formulation, Point
 from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
 from flipflow.transient.exponents import with_word
 from flipflow.transient.settling import MAX_PERIODS, MOST_TURNS, Settled, Settling, Word
 
@@ -42,7 +43,7 @@ class Jump:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep(Frozen):
+class Sweep(Frozen, Result):
     """What a machine settles to while its speed is changed in steps; arrays are (n,).
 
     Parameters
@@ -77,7 +78,7 @@ class Sweep(Frozen):
     complete: bool = True
 
     def __repr__(self) -> str:
-        ends = f"{self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s"
+        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
         return f"Sweep({self.omega.size} speeds, {ends}, {len(self.jumps)} jumps)"
 
     @property
@@ -208,6 +209,9 @@ def sweep(
         For frequencies that are not finite and above 0, a count below 1, a state of wrong shape,
         or a machine without damping, which never settles.
     """
+    if isinstance(omega, tuple) and len(omega) == 2:
+        remedy = "a pair is an interval elsewhere; give an array, such as np.linspace(190, 210, 21)"
+        raise InputError("omega", omega, remedy)
     speeds = checked_speeds(omega)
     max_periods = checked_count("max_periods", max_periods, MAX_PERIODS)
     most_turns = checked_count("most_turns", most_turns, 10_000_000)

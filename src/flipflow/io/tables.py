@@ -1,0 +1,174 @@
+"""Arrays of results in the hands of others: xarray, pandas, NetCDF, CSV, HTML."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.errors import MissingExtra
+from flipflow.io.arrays import Arrays, Variable
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+MOST_ROWS = 12  # of an HTML table
+
+
+def dataset(arrays: Arrays) -> xr.Dataset:
+    """The arrays as an xarray Dataset; units and titles stand in attributes.
+
+    Raises
+    ------
+    MissingExtra
+        Where xarray is not installed.
+    """
+    try:
+        import xarray as xr  # noqa: PLC0415  slow to import
+    except ImportError as error:
+        told = "Labelled arrays need xarray: pip install 'flipflow[data]'."
+        raise MissingExtra(told) from error
+
+    def part(one: Variable) -> tuple[Any, ...]:
+        return one.dims, one.data, {"units": one.units} if one.units else {}
+
+    return xr.Dataset(
+        {name: part(one) for name, one in arrays.variables.items()},
+        {name: part(one) for name, one in arrays.coordinates.items()},
+        {"title": arrays.title, **arrays.attributes},
+    )
+
+
+def dataframe(arrays: Arrays) -> pd.DataFrame:
+    """What stands along the table's dimension as a pandas DataFrame; units in ``attrs``.
+
+    Raises
+    ------
+    MissingExtra
+        Where pandas is not installed.
+    """
+    try:
+        import pandas as pd  # noqa: PLC0415  slow to import
+    except ImportError as error:
+        raise MissingExtra("Tables need pandas: pip install 'flipflow[data]'.") from error
+    columns = dict(table_columns(arrays))
+    frame = pd.DataFrame({name: one.data for name, one in columns.items()})
+    frame.attrs = {
+        "title": arrays.title,
+        "units": {name: one.units for name, one in columns.items() if one.units},
+        **arrays.attributes,
+    }
+    return frame
+
+
+def table_columns(arrays: Arrays) -> Iterator[tuple[str, Variable]]:
+    """Columns of the table by name: values (n,); what has a label more is one column a label."""
+    for name, one in {**arrays.coordinates, **arrays.variables}.items():
+        if one.dims == (arrays.index,):
+            yield name, one
+        elif len(one.dims) == 2 and one.dims[0] == arrays.index:
+            labels = arrays.coordinates.get(one.dims[1])
+            for k, values in enumerate(one.data.T):
+                label = k if labels is None else labels.data[k]
+                yield f"{name}_{label}", Variable((arrays.index,), values, one.units)
+
+
+def csv_text(arrays: Arrays) -> str:
+    """The table as CSV with units in its heading; a complex number is two columns."""
+    columns = [part for name, one in table_columns(arrays) for part in _real_parts(name, one)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([f"{name} [{one.units}]" if one.units else name for name, one in columns])
+    writer.writerows(zip(*(one.data.tolist() for _, one in columns), strict=True))
+    return text.getvalue()
+
+
+def netcdf_bytes(arrays: Arrays) -> bytes:
+    """All of it as classic NetCDF: text in UTF-8, a complex number as _real and _imag."""
+    from scipy.io import netcdf_file  # noqa: PLC0415  only files need it
+
+    content = io.BytesIO()
+    with netcdf_file(content, "w") as file:
+        for name, value in {"title": arrays.title, **arrays.attributes}.items():
+            setattr(file, name, str(value).encode())
+        parts = {
+            name: part
+            for key, one in {**arrays.coordinates, **arrays.variables}.items()
+            for name, part in _real_parts(key, one)
+        }
+        coordinates = " ".join(name for name in arrays.coordinates if name in parts)
+        for name, one in parts.items():
+            values, dims = _classic(name, one)
+            for dim, size in zip(dims, values.shape, strict=True):
+                if dim not in file.dimensions:
+                    file.createDimension(dim, size)
+            variable = file.createVariable(name, values.dtype, dims)
+            if values.size:
+                variable.data[...] = values
+            if one.units:
+                variable.units = one.units.encode()
+            if name not in arrays.coordinates and coordinates:
+                variable.coordinates = coordinates.encode()
+        file.flush()
+        return content.getvalue()
+
+
+def _real_parts(name: str, one: Variable) -> Iterator[tuple[str, Variable]]:
+    """A variable, or the real and the imaginary part of a complex one."""
+    if not np.iscomplexobj(one.data):
+        yield name, one
+        return
+    for word, values in (("real", one.data.real), ("imag", one.data.imag)):
+        yield f"{name}_{word}", Variable(one.dims, np.ascontiguousarray(values), one.units)
+
+
+def _classic(name: str, one: Variable) -> tuple[NDArray[Any], tuple[str, ...]]:
+    """Values and dimensions of types that classic NetCDF knows: text as rows of characters."""
+    values = one.data
+    if values.dtype.kind == "U":
+        coded = np.char.encode(values, "utf-8")
+        width = max(coded.dtype.itemsize, 1)
+        letters = coded.astype(f"S{width}").view("S1").reshape(*values.shape, width)
+        return letters, (*one.dims, f"{name}_letters")
+    if values.dtype.kind == "b":
+        return values.astype(np.int8), one.dims
+    if values.dtype.kind in "iu":
+        return values.astype(np.int32), one.dims
+    return np.asarray(values, float), one.dims
+
+
+def html_table(arrays: Arrays) -> str:
+    """What a notebook shows: each array with its shape, unit, least and greatest value."""
+    rows = []
+    every = {**arrays.coordinates, **arrays.variables}
+    for name, one in list(every.items())[:MOST_ROWS]:
+        shape = " x ".join(f"{dim} {n}" for dim, n in zip(one.dims, one.data.shape, strict=True))
+        cells = (name, shape, one.units, _span(one.data))
+        rows.append("".join(f"<td>{html.escape(str(cell))}</td>" for cell in cells))
+    said = "; ".join(f"{key}: {value}" for key, value in arrays.attributes.items())
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    head = "".join(f"<th>{word}</th>" for word in ("array", "along", "unit", "least to greatest"))
+    return (
+        f"<div><b>{html.escape(arrays.title)}</b><table><tr>{head}</tr>{body}</table>"
+        f"<small>{html.escape(said)}</small></div>"
+    )
+
+
+def _span(values: NDArray[Any]) -> str:
+    """Least and greatest of numbers; the words of a text."""
+    if values.size == 0:
+        return "none"
+    if values.dtype.kind == "U":
+        words = list(dict.fromkeys(values.ravel().tolist()))
+        return ", ".join(words[:4]) + (" ..." if len(words) > 4 else "")
+    sizes = np.abs(values) if np.iscomplexobj(values) else values.astype(float)
+    known = sizes[np.isfinite(sizes)]
+    if known.size == 0:
+        return "not known"
+    return f"{known.min():.5g} to {known.max():.5g}"

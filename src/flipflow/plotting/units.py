@@ -1,0 +1,86 @@
+"""Figures in the units of their reader: an engineer's, SI, or none."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Literal, get_args
+
+from flipflow.model.arguments import checked_word
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.panels import Axis, Panel, Trace
+from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
+
+Units = Literal["engineering", "SI", "dimensionless"]
+# What one of an axis' unit is in SI, and the SI unit.
+TO_SI = {
+    "mm": (1.0 / MM, "m"), "um": (1e-6, "m"), "kN": (1.0 / KN, "N"), "rpm": (1.0 / RPM, "rad/s"),
+    "Hz": (1.0 / HZ, "rad/s"), "deg": (1.0 / DEGREES, "rad"), "kW": (1e3, "W"),
+}  # fmt: skip
+WORDS = {"shaft speed": "angular frequency", "shaft angle": "phase of the force"}
+
+
+def units_for(result: object, units: str | None) -> str:
+    """The units asked for; else an engineer's for a screen and none for any other machine.
+
+    Raises
+    ------
+    InputError
+        For units that are not known.
+    """
+    if units is not None:
+        return checked_word("units", units, get_args(Units))
+    first = result[0] if isinstance(result, (list, tuple)) and result else result
+    if isinstance(getattr(first, "machine", None), FlipFlowScreen):
+        return "engineering"
+    # A history knows only its system; that of a screen has a relative motion.
+    known = getattr(getattr(first, "system", None), "coordinates", {"relative": None})
+    return "engineering" if "relative" in known else "dimensionless"
+
+
+def in_units(figure: Figure, units: str) -> Figure:
+    """The figure, which is drawn in an engineer's units, in others."""
+    if units == "engineering":
+        return figure
+    panels = tuple(_rescaled(panel, units) for panel in figure.panels)
+    return dataclasses.replace(figure, panels=panels)
+
+
+def _rescaled(panel: Panel, units: str) -> Panel:
+    (x, across), (y, upwards) = (_axis_in(axis, units) for axis in (panel.x, panel.y))
+    scale = {"x": across, "y": upwards}
+    if across == 1.0 and upwards == 1.0 and units == "SI":
+        return panel
+
+    def moved(part: Any, **factors: float) -> Any:
+        old = {name: getattr(part, name) for name in factors}
+        new = {k: None if old[k] is None else old[k] * factor for k, factor in factors.items()}
+        return dataclasses.replace(part, **new)
+
+    def trace_in(trace: Trace) -> Trace:
+        known: Trace = moved(trace, x=across, y=upwards, lower=upwards)
+        return dataclasses.replace(known, x_also=())
+
+    return dataclasses.replace(
+        panel,
+        x=x,
+        y=y,
+        traces=tuple(map(trace_in, panel.traces)),
+        bars=tuple(moved(b, low=across, high=across) for b in panel.bars),
+        bands=tuple(moved(b, low=scale[b.axis], high=scale[b.axis]) for b in panel.bands),
+        lines=tuple(moved(line, at=scale[line.axis]) for line in panel.lines),
+        arrows=tuple(moved(a, x0=across, x1=across, y0=upwards, y1=upwards) for a in panel.arrows),
+        notes=tuple(moved(note, x=across, y=upwards) for note in panel.notes),
+        cells=tuple(moved(c, x=across, y=upwards) for c in panel.cells),
+    )
+
+
+def _axis_in(axis: Axis, units: str) -> tuple[Axis, float]:
+    """The axis in SI, or without a unit, and the factor on what is drawn."""
+    factor, unit = TO_SI.get(axis.unit, (1.0, axis.unit))
+    bounds = None if axis.bounds is None else (axis.bounds[0] * factor, axis.bounds[1] * factor)
+    # Ticks of an angle in degrees mean nothing in radians; words and decades stay.
+    ticks = axis.ticks if factor == 1.0 else ()
+    label = WORDS.get(axis.label, axis.label)
+    known = unit if units == "SI" or axis.unit in ("", "%") else ""
+    return Axis(label, known, bounds, ticks), factor

@@ -1,0 +1,85 @@
+"""What every public result can do: become arrays, be drawn, be saved.
+
+Arrays, figures and files stand in rooms above the results; a method calls up to them when it is
+used, so that a result loads neither.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from flipflow.model.system import Coordinate
+
+
+def _above(module: str, name: str) -> Any:
+    return getattr(importlib.import_module(f"flipflow.{module}"), name)
+
+
+class Result:
+    """Base of all public results."""
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the result as labelled arrays, units as attributes, complex numbers kept.
+
+        Raises
+        ------
+        MissingExtra
+            Where xarray is not installed.
+        """
+        return cast("xr.Dataset", _above("io.tables", "dataset")(self._arrays()))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the result as one table, a column for each coordinate; units in ``attrs``.
+
+        Raises
+        ------
+        MissingExtra
+            Where pandas is not installed.
+        """
+        return cast("pd.DataFrame", _above("io.tables", "dataframe")(self._arrays()))
+
+    def _arrays(self) -> Any:
+        return _above("io.arrays", "arrays_of")(self)
+
+    def plot(
+        self,
+        ax: Axes | None = None,
+        *,
+        coordinate: Coordinate | None = None,
+        units: str | None = None,
+    ) -> Axes:
+        """Draw the result on matplotlib Axes, in their style, and return them.
+
+        Parameters
+        ----------
+        ax
+            Where to draw; None: new ones.
+        coordinate
+            What is drawn of the motion; None: what its figure shows first.
+        units
+            "engineering" (mm, rpm, kN), "SI" or "dimensionless" (no unit is written); None: the
+            first for a screen, the last for any other machine.
+
+        Raises
+        ------
+        InputError
+            For a coordinate that the machine does not have, and for other units.
+        MissingExtra
+            Where matplotlib is not installed.
+        """
+        return cast("Axes", _above("plotting.axes", "draw_on")(self, ax, coordinate, units))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result to a file: see :func:`flipflow.save`."""
+        _above("io.results", "save")(self, path)
+
+    def _repr_html_(self) -> str:
+        """A small table and a small picture, for notebooks."""
+        return str(_above("plotting.notebook", "html_of")(self))

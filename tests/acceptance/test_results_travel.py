@@ -1,0 +1,205 @@
+"""Every public result becomes arrays, a table, a plot, a file, a picture in a notebook, a copy."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Callable
+from functools import cache
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.io.results import SCHEMAS
+from flipflow.results.result import Result
+from judge import close
+
+mpl.use("Agg")
+WIDTH = 84.0
+# Results of commands are made of others, and are read by people alone.
+OF_COMMANDS = {"Startup", "Sweeps", "Check", "Reproduction"}
+
+
+def chain() -> ff.MechanicalSystem:
+    """A machine of its user: two masses, a stop, no names and no units."""
+    return ff.MechanicalSystem(
+        np.eye(2), [[0.06, -0.03], [-0.03, 0.06]], [[2.0, -1.0], [-1.0, 2.0]],
+        [ff.ClearanceSpring([1.0, 0.0], 30.0, 0.3, 0.4)], ff.HarmonicForce([0.3, 0.0]),
+    )  # fmt: skip
+
+
+@cache
+def screen() -> ff.FlipFlowScreen:
+    return ff.load("ffs0827")
+
+
+@cache
+def branch() -> ff.Branch:
+    return ff.frequency_response(screen(), (60.0, 220.0), ff.PiecewiseExact(points=60))
+
+
+def large() -> ff.Orbit:
+    return max(branch().orbits_at(203.0), key=lambda orbit: orbit.amplitude("relative"))
+
+
+MADE: dict[str, Callable[[], object]] = {
+    "Branch": branch,
+    "FieldBranch": lambda: ff.continue_orbit(large(), "clearance", (5e-3, 7e-3)),
+    "Orbit": large,
+    "Basins": lambda: ff.basins(
+        screen(),
+        omega=203.0,
+        displacement={"relative": np.linspace(-0.04, 0.04, 4)},
+        velocity={"relative": [0.0, 2.0]},
+    ),
+    "JumpRisk": lambda: ff.jump_risk(screen(), 203.0),
+    "History": lambda: ff.simulate(screen(), omega=120.0, periods=4),
+    "RunUp": lambda: ff.start_up(screen(), speed=90.0),
+    "Sweep": lambda: ff.sweep(screen(), np.linspace(190.0, 210.0, 4)),
+    "Ramp": lambda: ff.ramp(screen(), (200.0, 209.0), 3.0),
+    "Section": lambda: ff.poincare_section(screen(), 120.0, turns=8),
+    "Spectrum": lambda: ff.spectrum(large(), "relative"),
+    "LyapunovExponents": lambda: ff.lyapunov_exponents(chain(), 1.0, periods=64),
+    "BifurcationDiagram": lambda: ff.bifurcation_diagram(chain(), "omega", [0.8, 0.9, 1.0]),
+    "LinearResponse": lambda: ff.linear_response(screen(), np.linspace(10.0, 60.0, 9)),
+    "OperatingRegion": lambda: ff.operating_region(screen()),
+    "Loading": lambda: ff.loading(screen(), ff.Load(stiffness_factor=1.1)),
+    "ResponseFamily": lambda: ff.response_family(screen(), {"clearance": [5e-3, 6e-3]}),
+    "Sensitivity": lambda: ff.sensitivity(
+        screen(), {"clearance": (5.4e-3, 6.6e-3)}, "relative_amplitude", omega=120.0, n=16, rng=0
+    ),
+    "Comparison": lambda: ff.compare([screen(), screen().replace(clearance=5e-3)], omega=89.0),
+    "FoundationLoads": lambda: ff.foundation_loads({"empty": branch().orbits_at(89.0)[0]}),
+    "Assessment": lambda: ff.assess(ff.load_project("ffs0827")),
+}
+made = cache(lambda name: MADE[name]())
+
+
+def test_the_list_of_results_is_whole() -> None:
+    """One list drives documents, arrays and figures."""
+    assert {kind.__name__ for kind in SCHEMAS} - OF_COMMANDS == set(MADE)
+    public = {kind for kind in SCHEMAS if kind.__name__ not in OF_COMMANDS}
+    assert all(issubclass(kind, Result) for kind in public)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_arrays(name: str) -> None:
+    """Labelled dimensions, units as attributes, nothing that is None."""
+    data = made(name).to_xarray()
+    assert data.attrs["title"]
+    assert data.data_vars
+    for variable in data.variables.values():
+        assert variable.dtype.kind in "fciubU", (name, variable)
+    frame = made(name).to_dataframe()
+    assert len(frame.columns)
+    assert not frame.map(lambda cell: cell is None).to_numpy().any()
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_plots_on_given_axes(name: str) -> None:
+    """The axes that were given are drawn on, and come back; their style stays."""
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
+    with mpl.rc_context({"lines.linewidth": 3.3}):
+        sheet, (left, _) = plt.subplots(1, 2)
+        assert made(name).plot(ax=left, units="SI") is left
+        assert left.has_data()
+        lines = [one for one in left.get_lines() if one.get_linestyle() == "-"]
+        assert all(line.get_linewidth() in (3.3, 0.8) for line in lines)
+        plt.close(sheet)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_said_in_a_line_and_shown_in_a_notebook(name: str) -> None:
+    assert len(repr(made(name))) < 500
+    shown = made(name)._repr_html_()
+    assert "<table>" in shown
+    assert "<svg" in shown
+    assert len(shown) < 400_000
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_files_and_copies(name: str, tmp_path) -> None:
+    """Saved and opened again, pickled, written for others."""
+    result = made(name)
+    result.save(tmp_path / "it.json")
+    again = ff.open_result(tmp_path / "it.json")
+    copy = pickle.loads(pickle.dumps(result))  # noqa: S301
+    first = result.to_dataframe()
+    for other in (again, copy):
+        second = other.to_dataframe()
+        assert list(second.columns) == list(first.columns)
+        numbers = first.select_dtypes("number").columns
+        close(name, second[numbers].to_numpy(), first[numbers].to_numpy(), abs=0.0) if not first[
+            numbers
+        ].isna().to_numpy().any() else None
+    for ending in (".nc", ".csv"):
+        result.save(tmp_path / f"it{ending}")
+        assert (tmp_path / f"it{ending}").stat().st_size
+
+
+def test_netcdf_holds_all_of_a_branch(tmp_path) -> None:
+    """Coordinates, multipliers, special points."""
+    import xarray as xr  # noqa: PLC0415
+
+    branch().save(tmp_path / "branch.nc")
+    with xr.open_dataset(tmp_path / "branch.nc", engine="scipy") as data:
+        mu = data["multipliers_real"].to_numpy() + 1j * data["multipliers_imag"].to_numpy()
+        close("multipliers", mu, branch().multipliers, rel=1e-15)
+        kinds = [kind.decode() for kind in data["special_kind"].to_numpy()]
+        assert kinds == [p.kind for p in branch().special_points]
+        assert "omega" in data.coords
+
+
+def test_units_and_coordinates() -> None:
+    """Engineering for a screen, none for a machine of its user, SI where it is asked for."""
+    by_default = ff.figure(branch()).panels[0]
+    assert by_default.x.title == "shaft speed, rpm"
+    in_si = ff.figure(branch(), units="SI", coordinate="main").panels[0]
+    assert in_si.x.title == "angular frequency, rad/s"
+    close("scale", in_si.traces[0].x * 30.0 / math.pi, by_default.traces[0].x, rel=1e-12)
+    assert in_si.y.title == "amplitude, m"
+    of_chain = ff.figure(ff.frequency_response(chain(), (0.5, 1.5))).panels[0]
+    assert of_chain.x.title == "angular frequency"
+    assert of_chain.y.title == "amplitude"
+    with pytest.raises(ff.InputError, match="coordinate"):
+        ff.figure(branch(), coordinate="third")
+    with pytest.raises(ff.InputError, match="no choice"):
+        ff.figure(made("OperatingRegion"), coordinate="main")
+    with pytest.raises(ff.InputError, match="units"):
+        ff.figure(branch(), units="furlongs")
+
+
+def test_figures_of_a_journal_column(tmp_path) -> None:
+    """84 mm wide, whatever the result, and below each other what stood side by side."""
+    for name in MADE:
+        drawn = ff.figure(made(name), width=WIDTH)
+        close("width", drawn.width, WIDTH * 96.0 / 25.4, rel=1e-12)
+        drawn.write(tmp_path / f"{name}.svg")
+        head = (tmp_path / f"{name}.svg").read_text(encoding="utf-8")[:1200]
+        width = float(head.split('width="')[1].split("pt")[0])
+        close("points", width, WIDTH * 72.0 / 25.4, abs=0.1)
+    assert ff.figure(made("Orbit"), width=WIDTH).columns == 1
+
+
+def test_multipliers_are_tracked() -> None:
+    """Each column is one multiplier: it never jumps to where another stood."""
+    from flipflow.plotting.multipliers import tracked_multipliers  # noqa: PLC0415
+
+    drawn = ff.figure(branch(), multipliers=True)
+    assert drawn.panels[1].traces[0].name == "unit circle"
+    tracked = tracked_multipliers(branch().multipliers)
+    steps, sorted_steps = (
+        np.abs(np.diff(m, axis=0)).sum() for m in (tracked, branch().multipliers)
+    )
+    assert steps <= sorted_steps
+
+
+def test_several_results_in_one_figure() -> None:
+    both = ff.figure([branch(), branch()], coordinate="main")
+    assert "main" in both.panels[0].y.label
+    orbits = branch().orbits_at(203.0)
+    assert len(ff.figure(orbits).panels[0].traces) == 3
+    assert ff.figure(result=branch()).panels
