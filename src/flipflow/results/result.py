@@ -82,4 +82,5 @@ class Result:
 
     def _repr_html_(self) -> str:
         """A small table and a small picture, for notebooks."""
-        return str(_above("plotting.notebook", "html_of")(self))
+        table = _above("io.tables", "html_table")(self._arrays())
+        return str(table + _above("plotting.notebook", "picture_of")(self))
