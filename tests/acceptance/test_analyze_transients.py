@@ -65,7 +65,10 @@ def test_report_has_the_section_with_both_runs_side_by_side(assessment):
     (both,) = (figure for figure in figures if figure.title == "Start and coast-down")
     assert both.columns == 2
     assert [panel.title for panel in both.panels] == ["Start", "Coast-down", "", "", "", ""]
-    assert [panel.y.label for panel in both.panels[4:]] == ["torque at the shaft", "foundation force"]
+    assert [panel.y.label for panel in both.panels[4:]] == [
+        "torque at the shaft",
+        "foundation force",
+    ]
 
 
 def test_words_of_the_worst_case(assessment):
@@ -112,7 +115,9 @@ def test_least_blow_and_lump_of_a_bistable_machine(rig):
     assert found["other_motions"] == len(risk.others) > 0
     assert found["impulse"]["impulse"] == risk.worst_impulse.impulse
     assert found["lump"] is None or found["lump"]["lump"] == risk.worst_lump.lump
-    assert "kg m/s on the " in " ".join(text for lead, text in words(rig).items() if lead.startswith("Blows"))
+    assert "kg m/s on the " in " ".join(
+        text for lead, text in words(rig).items() if lead.startswith("Blows")
+    )
 
 
 def test_without_a_working_speed_nothing_is_checked(project):
