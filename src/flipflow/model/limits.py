@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import NoneType
 from typing import Literal
 
 from flipflow.errors import InputError
@@ -129,7 +130,7 @@ class Limits:
     jump_margin
         Least distance from the jump speed, as a ratio of it.
     start, stop
-        What it may do while it starts, and while it stops.
+        What it may do while it starts, and while it stops; None: nothing is limited.
 
     Raises
     ------
@@ -151,7 +152,9 @@ class Limits:
 
     def __post_init__(self) -> None:
         for passage in PASSAGES:
-            checked_kind(passage, getattr(self, passage), PassingLimits, "give a PassingLimits")
+            given = getattr(self, passage)
+            checked_kind(passage, given, (PassingLimits, NoneType), "give an ff.PassingLimits")
+            object.__setattr__(self, passage, given or PassingLimits())
         for field in LIMIT_FIELDS:
             value = getattr(self, field.name)
             checked = _interval(field, value) if field.interval else field.check(value)

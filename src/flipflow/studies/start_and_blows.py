@@ -270,13 +270,14 @@ def _jump(screen: FlipFlowScreen, omega: float) -> JumpRisk | str:
 def _resonance(
     found: Transients, drive: Drive, screens: Mapping[str, FlipFlowScreen]
 ) -> tuple[Finding, ...]:
-    """The rated power with which a start that is captured passes; nothing for other failures."""
+    """The rated power with which every case passes where the start is captured; else nothing."""
     run = found.start
     if run is None or run.near is None:
         return ()
-    power = power_that_passes(drive, screens[found.case], run.near.omega)
-    if power is None:
+    known = [power_that_passes(drive, screen, run.near.omega) for screen in screens.values()]
+    powers = [power for power in known if power is not None]
+    if not powers:
         return ()
     held = f"{run.near.name} = {run.near.omega * RPM:.4g} rpm (case {found.case})"
-    sentence = f"{power_words(power)} of rated power pass {held} however slowly."
+    sentence = f"{power_words(max(powers))} of rated power pass {held} however slowly."
     return (Finding("resonance", "attention", sentence),)
