@@ -28,8 +28,8 @@ def foundation_drawing(loads: FoundationLoads) -> Drawing:
     caption = (
         "Side view, the surface rising to the right, and plan. Loads count along: up the slope; "
         "normal: into the foundation, at right angles to the surface; horizontal: the way in which "
-        f"the surface rises; vertical: downwards. Positions are {loads.position}. The curved arrow "
-        f"shows the unbalance, {loads.rotation}."
+        f"the surface rises; vertical: downwards. The curved arrow shows the unbalance, "
+        f"{loads.rotation}."
     )
     return Drawing("Supports and directions", caption, "".join(parts))
 
