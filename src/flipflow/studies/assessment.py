@@ -367,10 +367,8 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
     head = f"Cases {'; '.join(names)}"
     if len(names) == 1:
         head = case_words(names[0], capital=True)
-    return (
-        f"{head}: another motion is possible at this speed; shown is the one reached when the speed "
-        "is raised from below.",
-    )
+    reached = "shown is the one reached when the speed is raised from below"
+    return (f"{head}: another motion is possible at this speed; {reached}.",)
 
 
 def _against(row: LimitRow) -> str:
