@@ -9,7 +9,7 @@ from importlib import resources
 import pytest
 from rich.console import Console
 
-from flipflow.cli import main, simulate, startup
+from flipflow.cli import app, simulate, startup
 from flipflow.errors import IncompleteError
 from flipflow.periodic.options import HarmonicBalance
 from flipflow.report.terminal import say
@@ -18,7 +18,7 @@ from flipflow.studies.sensitivity import N_MOST
 from flipflow.transient.simulate import MOST_SAMPLES, SAMPLES_A_TURN
 from flipflow.transient.startup import MOST_SECONDS
 
-COMMANDS = [one.__name__ for one in main.COMMANDS]
+COMMANDS = [one.__name__ for one in app.COMMANDS]
 
 
 @pytest.mark.parametrize("name", COMMANDS)
