@@ -67,10 +67,6 @@ def test_report_has_the_section_with_both_runs_side_by_side(assessment):
     assert [panel.title for panel in both.panels] == ["Start", "Coast-down", "", "", "", ""]
     last = [panel.y.label for panel in both.panels[4:]]
     assert last == ["torque at the shaft", "foundation force"]
-    assert [panel.y.label for panel in both.panels[4:]] == [
-        "torque at the shaft",
-        "foundation force",
-    ]
 
 
 def test_words_of_the_worst_case(assessment):
@@ -119,9 +115,6 @@ def test_least_blow_and_lump_of_a_bistable_machine(rig):
     assert found["lump"] is None or found["lump"]["lump"] == risk.worst_lump.lump
     blows = [text for lead, text in words(rig).items() if lead.startswith("Blows")]
     assert "kg m/s on the " in " ".join(blows)
-    assert "kg m/s on the " in " ".join(
-        text for lead, text in words(rig).items() if lead.startswith("Blows")
-    )
 
 
 def test_without_a_working_speed_nothing_is_checked(project):

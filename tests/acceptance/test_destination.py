@@ -245,7 +245,7 @@ def test_ctrl_c_in_a_sweep_keeps_the_speeds_that_settled(command, monkeypatch, t
     ],
 )
 def test_what_ends_a_glide_leaves_the_sweeps(command, monkeypatch, tmp_path, ended, code, said):
-    def glide(*_words):
+    def glide(*_words, **_more):
         raise ended
 
     monkeypatch.setattr("flipflow.studies.ramp.ramp", glide)

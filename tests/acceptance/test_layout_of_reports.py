@@ -12,7 +12,8 @@ import pytest
 
 import flipflow as ff
 from flipflow.plotting.bars import energy_figure
-from flipflow.plotting.layout import WIDTH, arrange
+from flipflow.plotting.layout import arrange
+from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.plotly import described
 from flipflow.plotting.response import case_names, cases_figure
 from flipflow.report.blocks import FigureBlock, Heading, Note, Table, Text
@@ -90,7 +91,7 @@ def test_a_name_in_dollars_is_no_formula_in_print(odd, tmp_path):
 def test_a_long_name_leaves_the_energy_chart_its_room(odd):
     figure = energy_figure(odd)
     (rect,) = arrange(figure).rects
-    assert rect.width > 0.5 * WIDTH
+    assert rect.width > 0.5 * PAGE_WIDTH
     words = [word for _, word in figure.panels[0].y.ticks]
     assert words[2].startswith("vollbeladen mit nassem")
     assert max(len(line) for word in words for line in word.splitlines()) <= 36

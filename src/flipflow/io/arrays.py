@@ -59,27 +59,13 @@ class Variable:
 
 @dataclass(frozen=True)
 class Arrays:
-    """A result as arrays.
-
-    Parameters
-    ----------
-    title
-        What it is.
-    index
-        The dimension along which it is a table.
-    coordinates
-        Values that stand along a dimension.
-    variables
-        All other values.
-    attributes
-        What holds for all of it.
-    """
+    """A result as arrays: a table along the dimension ``index``, and what else it holds."""
 
     title: str
     index: str
-    coordinates: Mapping[str, Variable]
-    variables: Mapping[str, Variable]
-    attributes: Mapping[str, str | float]
+    coordinates: Mapping[str, Variable]  # values that stand along a dimension
+    variables: Mapping[str, Variable]  # all other values
+    attributes: Mapping[str, str | float]  # what holds for all of it
 
 
 def units_of(machine: Machine | MechanicalSystem) -> Mapping[str, str]:

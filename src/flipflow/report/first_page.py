@@ -197,24 +197,27 @@ def _cases_table(assessment: Assessment) -> Table:
 
 @section(Assessment, Part.FIRST_PAGE, 70)
 def surroundings(assessment: Assessment) -> Iterator[Block]:
-    """One line each on foundation, springs, exciter and bearings, if they fit."""
-    if assessment.omega is not None and not packed(assessment):
+    """What goes into the ground; a line each on springs, exciter and bearings, if they fit."""
+    if assessment.omega is None:
+        return
+    loads = assessment.foundation
+    yield Values((("Into the ground", "not known" if loads is None else loads.sentence),))
+    if not packed(assessment):
         yield _surroundings(assessment)
 
 
 @section(Assessment, Part.DETAILS, 6)
 def further_surroundings(assessment: Assessment) -> Iterator[Block]:
-    """The same where the first page has no room for it."""
+    """Springs, exciter and bearings where the first page has no room for them."""
     if assessment.omega is not None and packed(assessment):
         yield _surroundings(assessment)
 
 
 def _surroundings(assessment: Assessment) -> Values:
-    loads, screen = assessment.foundation, assessment.project.screen
+    screen = assessment.project.screen
     bearing = "bearing_force" if QUANTITIES["bearing_load"].missing(screen) else "bearing_load"
     return Values(
         (
-            ("Into the ground", "not known" if loads is None else loads.sentence),
             ("Springs", _springs(assessment)),
             ("Exciter, bearings", _line(assessment, "exciter_force", bearing)),
             ("Power, throw", _power_and_throw(assessment)),

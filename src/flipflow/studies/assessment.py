@@ -527,8 +527,6 @@ def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:
         "speed is raised from below."
     )
     return (sentence,)
-    reached = "shown is the one reached when the speed is raised from below"
-    return (f"{head}: another motion is possible at this speed; {reached}.",)
 
 
 def _against(row: LimitRow) -> str:

@@ -22,7 +22,7 @@ def held_angles(screen: FlipFlowScreen, drive: Drive) -> tuple[float, ...]:
     Friction T_f holds the shaft where gravity's torque m0 r g |cos(phi + alpha)| is no larger.
     Without gravity all angles are alike but for a shift of the frames' phase: 0 stands for them.
     """
-    weight = unbalance_weight(screen).torque
+    weight = abs(unbalance_weight(screen).torque)
     hanging = hanging_angle(screen)
     if weight == 0.0 or drive.friction == 0.0:
         return (hanging,)

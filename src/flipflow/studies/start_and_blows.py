@@ -154,8 +154,14 @@ def transients(
     for name, screen in screens.items():
         alike.setdefault(screen, []).append(name)
     # Kernels leave the interpreter free, so that cases run side by side.
-    with ThreadPoolExecutor(2) as pool:
-        runs = list(pool.map(lambda one: _runs(one, drive, omega), alike))
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            runs = list(pool.map(lambda one: _runs(one, drive, omega), alike))
+    except InputError as error:
+        if _known(project):
+            raise
+        reasons["start"] = _not_assumed(error)
+        drive, runs = None, [_Runs((), None) for _ in alike]
     jumps = [_jump(screen, omega) for screen in alike]
     starts = {
         name: (run, jump)
@@ -255,9 +261,13 @@ def _drive(
     try:
         return default_drive(screen, omega)
     except InputError as error:
-        # Nobody gave this drive, so the rest of the analysis need not end with it.
-        reasons["start"] = f"no drive is given, and none can be assumed ({error})"
+        reasons["start"] = _not_assumed(error)
         return None
+
+
+def _not_assumed(error: InputError) -> str:
+    """Nobody gave this drive, so the rest of the analysis need not end with it."""
+    return f"no drive is given, and none can be assumed ({error})"
 
 
 def _jump(screen: FlipFlowScreen, omega: float) -> JumpRisk | str:

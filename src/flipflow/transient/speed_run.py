@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -71,13 +72,17 @@ def unbalance_weight(machine: Machine) -> UnbalanceWeight:
     """Gravity on the unbalance of a screen; none where its ``deck_angle`` is not known."""
     if not isinstance(machine, FlipFlowScreen) or machine.deck_angle is None:
         return WEIGHTLESS
-    return UnbalanceWeight(machine.eccentric_moment * GRAVITY, machine.deck_angle)
+    # Turning the other way, the unbalance is lifted where it would fall: (cos phi, -sin phi).
+    sense = machine.normal_sense
+    return UnbalanceWeight(sense * machine.eccentric_moment * GRAVITY, sense * machine.deck_angle)
 
 
 def hanging_angle(machine: Machine) -> float:
     """Shaft angle in rad at which the unbalance hangs; 0 where no weight is considered."""
     weight = unbalance_weight(machine)
-    return -0.5 * np.pi - weight.incline if weight.torque > 0.0 else 0.0
+    if weight.torque == 0.0:
+        return 0.0
+    return -math.copysign(0.5 * math.pi, weight.torque) - weight.incline
 
 
 def movable(machine: Machine) -> MechanicalSystem:
