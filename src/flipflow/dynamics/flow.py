@@ -75,14 +75,14 @@ def new_flow(machine: MachineArrays) -> Flow:
         regime=np.zeros(m, np.int64),
         z=np.zeros(2 * n),
         segments=np.zeros(1, np.int64),
-        slot=np.empty(e, np.int64),
-        start=np.empty(e),
-        length=np.empty(e),
+        slot=np.zeros(e, np.int64),
+        start=np.zeros(e),
+        length=np.zeros(e),
         q=np.zeros((e, rates), np.complex128),
-        rest=np.empty((e, n)),
-        spring=np.empty(e, np.int64),
-        kick=np.empty(e),
-        regimes=np.empty((e, m), np.int64),
+        rest=np.zeros((e, n)),
+        spring=np.zeros(e, np.int64),
+        kick=np.zeros(e),
+        regimes=np.zeros((e, m), np.int64),
     )
 
 
