@@ -53,6 +53,26 @@ def test_order_of_the_predictor(bends: bool, order: float) -> None:
     assert slopes == pytest.approx([order, order], abs=0.1)
 
 
+def test_points_solved_for_elsewhere_stand_at_phase_zero() -> None:
+    """What is carried there along the last flown motion solves the equations there.
+
+    Newton's last step, 1e-6 of a step along the branch at most, leaves an error of its square; the
+    tangent is that of the iterate, an error of the step itself.
+    """
+    branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 230.0))
+    solver, traced = branch.formulation.solver(), branch.traced
+    elsewhere = np.flatnonzero(traced.record.phase != 0.0)
+    assert elsewhere.size > 100
+    for p in elsewhere:
+        u, omega = traced.u[p], float(traced.omega[p])
+        amplitude = np.hypot(u[:2], u[2:] / omega).max()
+        size = amplitude * np.array([1.0, 1.0, omega, omega])
+        r, J = solver.residual(u, omega)
+        assert np.abs(r / size).max() < 1e-11
+        turn = J * traced.tangent[p] / size[:, None]
+        assert np.abs(turn.sum(axis=1)).max() < 1e-4 * np.abs(turn).max()
+
+
 @pytest.mark.parametrize("method", [ff.PiecewiseExact(), ff.HarmonicBalance(3)], ids=repr)
 def test_two_newton_steps_are_enough_at_most_points(method) -> None:
     """Along the tangent alone it is two points in three or fewer."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from llvmlite.binding import Linkage
 from numba.core import config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
@@ -39,6 +40,14 @@ class EntryLibrary(JITCodeLibrary):
     """Code that runs by itself, ready once the shared kernels that it calls are in memory."""
 
     shared: list[tuple[Any, Any]]
+
+    def _optimize_final_module(self) -> None:
+        # What only this code calls need not keep numba's way of passing arguments: a structure of
+        # arrays is handed over as hundreds of numbers, most of which no callee reads.
+        for each in self._final_module.functions:
+            if not each.is_declaration and each.linkage == Linkage.linkonce_odr:
+                each.linkage = Linkage.internal
+        super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         named = [each.name for each in self._final_module.functions if each.is_declaration]

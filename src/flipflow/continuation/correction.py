@@ -18,6 +18,7 @@ from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.continuation.problem import (
     better_section,
     carried,
+    carried_home,
     residual,
     set_section,
     signature,
@@ -271,7 +272,7 @@ def bring_home(problem: Any, scratch: Any, work: Corrector) -> int:
     for k in range(work.w.shape[0]):
         work.home[k] = work.w[k]
         work.home_tangent[k] = work.tangent[k] * work.scale[k]
-    return carried(problem, scratch, work.home, work.home_tangent, 0.0)
+    return carried_home(problem, scratch, work.home, work.home_tangent)
 
 
 @kernel

@@ -80,6 +80,14 @@ class Record(NamedTuple):
 
 
 @kernel
+def clear(branch: Record, p: int) -> None:
+    """Count nothing on the way to point p yet, where the record has room for it."""
+    if p < branch.omega.shape[0]:
+        branch.rejected[p] = branch.iterations[p] = 0
+        branch.reason[p] = REASON_NONE
+
+
+@kernel
 def store(problem: Any, scratch: Any, work: Corrector, branch: Record, p: int) -> int:
     """Write point p of the branch from the corrector's scratch."""
     n = work.r.shape[0]
@@ -330,12 +338,14 @@ def trace(
     there.
     """
     n = work.r.shape[0]
+    clear(branch, 0)
     code, branch.iterations[0] = begin(problem, scratch, work, u, omega, course)
     if code == status.OK:
         code = advance(problem, scratch, work, branch, 0, course)
     if code != status.OK:
         return code, 0
     length, travelled, p = 0.1, 0.0, 1
+    clear(branch, p)
     while p < branch.omega.shape[0]:
         longest = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
         step, ends, iterations = attempt(problem, scratch, work, branch, p, longest, course)
@@ -354,6 +364,7 @@ def trace(
         closed = near and passes_start(problem, scratch, work, branch, p, course)
         ended = arrival(branch, course, p, ends, closed)
         p += 1
+        clear(branch, p)
         if ended != status.OK:
             return ended, p
         if iterations <= NEWTON_FEW:
@@ -363,21 +374,27 @@ def trace(
     return status.POINT_LIMIT, p
 
 
-def new_branch(unknowns: int, gaps: int, points: int, *, with_jacobian: bool = True) -> Record:
-    """Record of a branch of up to ``points`` points."""
-    n = unknowns
+def new_branch(
+    unknowns: int, gaps: int, points: int, *, with_jacobian: bool = True, to_follow: bool = False
+) -> Record:
+    """Record of a branch of up to ``points`` points.
+
+    One to follow is not zeroed: of many thousand points the loop reaches a few hundred, and clears
+    those.
+    """
+    n, made = unknowns, np.empty if to_follow else np.zeros
     return Record(
         u=np.empty((points, n)),
         omega=np.empty(points),
         tangent=np.empty((points, n + 1)),
-        phase=np.zeros(points),
+        phase=made(points),
         jacobian=np.empty((points, n, n) if with_jacobian else (points, 0, 0)),
         side=np.empty(points),
-        signature=np.zeros(points, np.int64),
+        signature=made(points, np.int64),
         depth=np.empty((points, gaps, 2)),
-        iterations=np.zeros(points, np.int64),
-        rejected=np.zeros(points, np.int64),
-        reason=np.zeros(points, np.int64),
+        iterations=made(points, np.int64),
+        rejected=made(points, np.int64),
+        reason=made(points, np.int64),
     )
 
 

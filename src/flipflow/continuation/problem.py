@@ -42,6 +42,7 @@ class Operations(NamedTuple):
     unknown_scale: Any
     better_section: Any
     carried: Any
+    carried_home: Any
     set_section: Any
     mirrored: Any
 
@@ -57,6 +58,11 @@ def _stays(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> in
 
 
 @kernel
+def _is_home(problem: Any, scratch: Any, w: Real, tangent: Real) -> int:
+    return status.OK
+
+
+@kernel
 def _no_section(problem: Any, scratch: Any, phase: float, anew: bool) -> None:
     """A series has none."""
 
@@ -66,16 +72,17 @@ def _itself(problem: Any) -> Any:
     return problem
 
 
-_WITHOUT_SECTION = _no_better, _stays, _no_section, _itself
+_WITHOUT_SECTION = _no_better, _stays, _is_home, _no_section, _itself
 OPERATIONS: dict[type, Operations] = {
     Shooting: Operations(
         shooting_residual, crossings, flow_depths, state_scale,
-        section.better_section, section.carried, section.set_section, mirrored_shooting,
+        section.better_section, section.carried, section.carried_home, section.set_section,
+        mirrored_shooting,
     ),
     Varied: Operations(
         varied.varied_residual, varied.varied_crossings, varied.varied_depths,
         varied.varied_scale, varied.varied_better, varied.varied_carried,
-        varied.varied_section, varied.varied_mirrored,
+        varied.varied_home, varied.varied_section, varied.varied_mirrored,
     ),
     Balance: Operations(
         balance_residual, contact_count, series_depths, series_scale, *_WITHOUT_SECTION
@@ -116,6 +123,11 @@ def carried(problem: Any, scratch: Any, w: Real, tangent: Real, end: float) -> i
     return int(OPERATIONS[type(problem)].carried(problem, scratch, w, tangent, end))
 
 
+def carried_home(problem: Any, scratch: Any, w: Real, tangent: Real) -> int:
+    """Carry unknowns that Newton's last step reached, and a tangent, to section 0; a status."""
+    return int(OPERATIONS[type(problem)].carried_home(problem, scratch, w, tangent))
+
+
 def set_section(problem: Any, scratch: Any, phase: float, anew: bool) -> None:
     """Let the unknowns stand at a phase of the force; ``anew`` forgets how good the last was."""
     OPERATIONS[type(problem)].set_section(problem, scratch, phase, anew)
@@ -143,6 +155,7 @@ def _choose(operation: Any) -> None:
 
 
 for _operation in (
-    residual, signature, depths, unknown_scale, better_section, carried, set_section, mirrored,
+    residual, signature, depths, unknown_scale, better_section, carried, carried_home, set_section,
+    mirrored,
 ):  # fmt: skip
     _choose(_operation)

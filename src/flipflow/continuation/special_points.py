@@ -291,16 +291,16 @@ def _arc(traced: Traced) -> Real:
 
 def _dips(values: Real) -> list[int]:
     """Interior points where |test| is least and, judged by its neighbours, may fall to zero."""
-    inner = np.abs(values[1:-1])
-    before, after = np.abs(values[:-2]), np.abs(values[2:])
-    same = (np.sign(values[:-2]) == np.sign(values[1:-1])) & (
-        np.sign(values[2:]) == np.sign(values[1:-1])
-    )
-    least = same & (inner <= before) & (inner < after)
+    size, sign = np.abs(values), np.sign(values)
+    before, inner, after = size[:-2], size[1:-1], size[2:]
+    same = sign[1:] == sign[:-1]
+    least = same[:-1] & same[1:] & (inner <= before) & (inner < after)
+    if not least.any():
+        return []
     curvature = before - 2.0 * inner + after
     with np.errstate(divide="ignore", invalid="ignore"):
         bottom = inner - (after - before) ** 2 / (8.0 * curvature)
-    low = LOW * float(np.abs(values).max(initial=0.0))
+    low = LOW * float(size.max(initial=0.0))
     sharp = inner < SHARP_DIP * np.minimum(before, after)
     deep = (bottom < DIP * inner) | (inner < low) | sharp
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]

@@ -307,6 +307,12 @@ def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, en
 
 
 @kernel
+def varied_home(problem: Varied, work: VariedWork, w: Real, tangent: Real) -> int:
+    """Carry unknowns w and a tangent dw to phase 0."""
+    return varied_carried(problem, work, w, tangent, 0.0)
+
+
+@kernel
 def arrive_beside(
     problem: Varied, work: VariedWork, w: Real, tangent: Real, step: float, end: float
 ) -> int:

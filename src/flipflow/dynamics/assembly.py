@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,18 +42,24 @@ def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineA
     D = np.array([spring.direction for spring in springs]).reshape(m, n)
     terms = [(one.order, *term) for one in system.excitations for term in one.terms]
     force = np.array([vector for _, _, vector in terms])
-    parts = np.concatenate([force.real, force.imag, [system.constant_force]]).T
-    right = np.concatenate([system.K, system.C, D.T, parts], axis=1)
+    forces = len(terms)
+    ends = 2 * n, 2 * n + m, 2 * n + m + forces, 2 * n + m + 2 * forces
+    gaps, real, imag = (slice(*pair) for pair in pairwise(ends))
+    # One solution with M for all of them: what is called here takes longer than what is worked out.
+    right = np.empty((n, 2 * n + m + 2 * forces + 1))
+    right[:, :n], right[:, n : 2 * n], right[:, gaps] = system.K, system.C, D.T
+    right[:, real], right[:, imag], right[:, -1] = force.real.T, force.imag.T, system.constant_force
     solved = np.asarray(np.linalg.solve(system.M, right), np.float64)
-    real, imag = np.split(solved[:, 2 * n + m : -1].T, 2)
+    push = np.empty((forces, n), np.complex128)
+    push.real, push.imag = solved[:, real].T, solved[:, imag].T
     orders = system.orders
     return MachineArrays(
         stiffness=solved[:, :n].copy(),
         damping=solved[:, n : 2 * n].copy(),
         direction=D,
-        reach=np.ascontiguousarray(solved[:, 2 * n : 2 * n + m].T),
+        reach=solved[:, gaps].T.copy(),
         static=solved[:, -1].copy(),
-        push=np.ascontiguousarray(real + 1j * imag),
+        push=push,
         power=np.array([power for _, power, _ in terms], np.int64),
         wave=np.array([orders.index(order) for order, _, _ in terms], np.int64),
         order=np.array(orders, np.int64),

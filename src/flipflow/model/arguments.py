@@ -12,7 +12,9 @@ import math
 import numbers
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
+from types import FunctionType, MethodType
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -196,11 +198,21 @@ def takes(function: object, count: int) -> bool:
     """Whether something is a function, not a class, that can be called with ``count`` arguments."""
     if isinstance(function, type) or not callable(function):
         return False
+    if isinstance(function, MethodType) and isinstance(function.__func__, FunctionType):
+        return _binds_in_class(function.__func__, count + 1)
+    return _binds(function, count)
+
+
+def _binds(function: Callable[..., object], count: int) -> bool:
     try:
-        inspect.signature(cast("Callable[..., object]", function)).bind(*range(count))
+        inspect.signature(function).bind(*range(count))
     except (TypeError, ValueError):
         return False
     return True
+
+
+# A machine's own ``system`` is looked at before every analysis, and a signature takes long to read.
+_binds_in_class = lru_cache(256)(_binds)
 
 
 def checked_word(name: str, value: object, words: Collection[str], remedy: str = "") -> str:

@@ -290,11 +290,12 @@ class FlipFlowScreen:
         m1, m2 = self.main_mass, self.floating_mass
         c1, c2 = self.isolation_damping, self.shear_damping
         k1, k2 = self.isolation_stiffness, self.shear_stiffness
+        stop = self.stop()
         return MechanicalSystem(
             M=[[m1, 0.0], [0.0, m2]],
             C=[[c1 + c2, -c2], [-c2, c2]],
             K=[[k1 + k2, -k2], [-k2, k2]],
-            springs=(self.stop(),) if self.has_stop else (),
+            springs=(stop,) if stop.acts else (),
             excitation=Unbalance([self.eccentric_moment, 0.0]),
             coordinates={"main": (1.0, 0.0), "floating": (0.0, 1.0), "relative": (1.0, -1.0)},
         )

@@ -57,8 +57,10 @@ def touches_nothing(system: MechanicalSystem, rest: Real, X: Complex) -> bool:
 
 def state_of(system: MechanicalSystem, rest: Real, X: Complex, omega: float) -> Real:
     """State (x, x') at t = 0 of a motion of mean (N,) and harmonics (W, N), (2 N,)."""
-    speed = 1j * omega * np.array(system.orders)
-    return np.concatenate([rest + X.sum(axis=0).real, (speed @ X).real])
+    orders = system.orders
+    z = (np.array([[1.0] * len(orders), [1j * omega * n for n in orders]]) @ X).real
+    z[0] += rest
+    return np.asarray(z.ravel())
 
 
 def _contact_states(system: MechanicalSystem) -> Iterator[tuple[int, ...]]:

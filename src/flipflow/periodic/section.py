@@ -126,6 +126,39 @@ def carried(problem: Shooting, work: ShootingWork, w: Real, tangent: Real, end: 
 
 
 @kernel
+def carried_home(problem: Shooting, work: ShootingWork, w: Real, tangent: Real) -> int:
+    """Carry the unknowns w of a motion next to the one last flown, and a tangent, to phase 0.
+
+    Newton's last step, from the motion that the flow holds to w, is carried along it as the tangent
+    is. What that neglects is of second order in the step, as is the error of Newton's method.
+    """
+    size, angle, flow = work.rate.shape[0], -work.section[0], work.flow
+    if angle == 0.0:
+        return status.OK
+    angle += problem.fraction * 2.0 * math.pi
+    U, omega, begin = work.ahead, float(work.flown[size]), work.section[0]
+    step, slope = w[size] - omega, float(tangent[size])
+    segment_state(problem.machine, flow, 0, omega, 0.0, work.start, work.first_rate)
+    # Columns are carried at fixed times; both ends of the flow move with omega as well.
+    for k in range(size):
+        U[k, 0], U[k, 1], U[k, 2] = w[k] - work.flown[k], tangent[k], 0.0
+        U[k, 2] = work.first_rate[k] * begin / omega**2
+    t, e = (begin + angle) / omega, 0
+    while e < flow.segments[0] - 1 and flow.start[e + 1] < t:
+        e += 1
+    segments, length, kick = flow.segments[0], flow.length[e], flow.kick[e]
+    flow.segments[0], flow.length[e], flow.kick[e] = e + 1, t - flow.start[e], 0.0
+    carry_tangent(problem.machine, flow, omega, U, 1.0, work.columns)
+    segment_state(problem.machine, flow, e, omega, float(flow.length[e]), work.start, work.rate)
+    flow.segments[0], flow.length[e], flow.kick[e] = segments, length, kick
+    for k in range(size):
+        in_omega = U[k, 2] - work.rate[k] * t / omega
+        w[k] = problem.sign * (work.start[k] + U[k, 0] + step * in_omega)
+        tangent[k] = problem.sign * (U[k, 1] + slope * in_omega)
+    return status.OK
+
+
+@kernel
 def set_section(problem: Shooting, work: ShootingWork, phase: float, anew: bool) -> None:  # noqa: ARG001
     """Let the unknown be the state at a phase of the force."""
     work.section[0] = phase

@@ -52,6 +52,8 @@ class ShootingWork(NamedTuple):
     start: Real  # (2 N,) state at its start
     first_rate: Real  # (2 N,) and its rate
     column: Real  # (2 N, 1) one tangent
+    flown: Real  # (2 N + 1,) state and omega of the motion that the flow holds since the residual
+    ahead: Real  # (2 N, 3) two tangents of it, and the derivative in omega
     section: Real  # (2,) phase in rad at which the unknown stands; its margin when it was chosen
 
 
@@ -75,6 +77,8 @@ def new_shooting_work(machine: MachineArrays) -> ShootingWork:
         start=np.zeros(size),
         first_rate=np.zeros(size),
         column=np.zeros((size, 1)),
+        flown=np.full(size + 1, np.nan),
+        ahead=np.zeros((size, 3)),
         section=np.array([0.0, math.inf]),
     )
 
@@ -121,6 +125,9 @@ def shooting_residual(
     code = shoot(problem, work, z, omega, U)
     if code != status.OK:
         return code
+    for k in range(size):
+        work.flown[k] = z[k]
+    work.flown[size] = omega
     # The last column is taken at fixed times; both ends of the flow move with omega as well.
     begin = work.section[0] / omega
     end = begin + problem.fraction * 2.0 * math.pi / omega

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -158,6 +158,8 @@ class Point(Frozen):
 
         NaN where the flow over a turn does not end.
         """
+        if self.known_map is not None:
+            return self.known_map
         try:
             return self.formulation.solver().return_map(self)
         except IncompleteError:
@@ -270,7 +272,7 @@ class Solver(ABC):
 
     def trace(self, u: Real, omega: float, course: correction.Course) -> Traced:
         """Follow the branch through (u, omega) until it leaves the bounds of ``course``."""
-        record = self.new_branch(POINTS_MOST)
+        record = self.new_branch(POINTS_MOST, to_follow=True)
         code, points, _ = self._follow(record, u, omega, course)
         return Traced.recorded(record, points, code, course)
 
@@ -282,17 +284,21 @@ class Solver(ABC):
         That is the upper one where its direction is up. None where the branch does not meet it
         within that many points.
         """
-        gaps = len(self.springs)
-        record = frequency_loop.new_branch(self.unknowns, gaps, points, with_jacobian=False)
+        record = frequency_loop.new_branch(
+            self.unknowns, len(self.springs), points, with_jacobian=False, to_follow=True
+        )
         code, points, _ = self._follow(record, u, omega, course)
         ahead = status.REACHED_UPPER if course.direction > 0.0 else status.REACHED_LOWER
         return record.u[points - 1].copy() if code == ahead else None
 
-    def new_branch(self, points: int) -> frequency_loop.Record:
+    def new_branch(self, points: int, *, to_follow: bool = False) -> frequency_loop.Record:
         """An empty record for up to ``points`` points."""
-        gaps = len(self.springs)
         return frequency_loop.new_branch(
-            self.unknowns, gaps, points, with_jacobian=self.reads_jacobian
+            self.unknowns,
+            len(self.springs),
+            points,
+            with_jacobian=self.reads_jacobian,
+            to_follow=to_follow,
         )
 
     @property
@@ -377,7 +383,18 @@ class Solver(ABC):
         if not self._corrected(record, u, omega, correction.SHARP):
             return None
         J = record.jacobian[0] if record.phase[0] == 0.0 else None
-        return self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
+        point = self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
+        if J is None and self.reads_jacobian:
+            # Nearly every caller asks for the map; found later, it needs a solver of its own.
+            return replace(point, known_map=self._map_of(point))
+        return point
+
+    def _map_of(self, point: Point) -> Real | None:
+        """The return map of a point; None where the flow over a turn does not end."""
+        try:
+            return self.return_map(point)
+        except IncompleteError:
+            return None
 
     def starts(self, u: Real, omega: float) -> bool:
         """Whether a branch can start from the guess u: Newton may end less sharp than that."""
