@@ -52,7 +52,10 @@ def test_a_block_is_short(question: str) -> None:
 
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_a_block_runs_alone(
-    question: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    question: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """It tells something, and writes the picture that the page shows."""
     code = QUESTIONS[question]
