@@ -37,6 +37,13 @@ def units_for(result: object, units: str | None) -> str:
     return "engineering" if of_screen else "dimensionless"
 
 
+def length_of(owner: object, metres: float, digits: int) -> str:
+    """A length as a legend says it: in mm for a screen, without a unit for any other machine."""
+    if units_for(owner, None) == "engineering":
+        return f"{metres * MM:.{digits}g} mm"
+    return f"{metres:.{digits}g}"
+
+
 def in_units(figure: Figure, units: str) -> Figure:
     """The figure, which is drawn in an engineer's units, in others."""
     if units == "engineering":
