@@ -215,7 +215,7 @@ def test_a_machine_of_its_user_has_no_units() -> None:
     assert written
     assert any(text.endswith(f" {fold.omega:.4g}") for text in written)
     large = max(followed.orbits_at(1.5), key=lambda orbit: orbit.amplitude(0))
-    (name,) = {trace.name for trace in ff.figure([large], coordinate=0).panels[0].traces if trace.name}
-    assert name == f"{large.amplitude(0):.4g}, {large.stability}"
+    (trace,) = ff.figure([large], coordinate=0).panels[0].traces
+    assert trace.name == f"{large.amplitude(0):.4g}, {large.stability}"
     in_si = [line.text for line in ff.figure(branch(), units="SI").panels[0].lines]
     assert any(text.endswith(f"{branch().folds[0].omega:.4g} rad/s") for text in in_si)
