@@ -202,6 +202,8 @@ def test_several_results_in_one_figure() -> None:
     assert "main" in both.panels[0].y.label
     orbits = branch().orbits_at(203.0)
     assert len(ff.figure(orbits).panels[0].traces) == 3
+    names = {trace.name for trace in ff.figure(made("ResponseFamily")).panels[0].traces}
+    assert {"e = 5 mm", "e = 6 mm"} <= names
     assert ff.figure(result=branch()).panels
 
 
