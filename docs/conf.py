@@ -54,13 +54,15 @@ html_theme = "pydata_sphinx_theme"
 html_title = "flipflow"
 html_static_path = ["_static"]
 html_sidebars = {
-    page: [] for page in ("index", "conventions", "why-exact", "coexistence", "tutorials/*")
+    page: []
+    for page in ("index", "conventions", "why-exact", "coexistence", "tutorials/*", "how-to/*")
 }
 html_css_files = ["flipflow.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": False,
+    "header_links_before_dropdown": 6,
     "navbar_end": ["theme-switcher"],
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],

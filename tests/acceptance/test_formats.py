@@ -186,7 +186,12 @@ def test_the_first_page_says_what_it_must(printed, assessed, kind, form):
     """Page 1 is one page: may it run and what binds, where, does it start, what the ground bears."""
     _, _, words = next(iter(pages(printed(kind, form))))
     text = " ".join(word.text for word in words)
-    for piece in (assessed(kind).verdict, "Allowed speed range:", "Does it start", "Into the ground"):
+    for piece in (
+        assessed(kind).verdict,
+        "Allowed speed range:",
+        "Does it start",
+        "Into the ground",
+    ):
         assert " ".join(piece.split()) in text
 
 

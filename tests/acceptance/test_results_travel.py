@@ -202,4 +202,22 @@ def test_several_results_in_one_figure() -> None:
     assert "main" in both.panels[0].y.label
     orbits = branch().orbits_at(203.0)
     assert len(ff.figure(orbits).panels[0].traces) == 3
+    names = {trace.name for trace in ff.figure(made("ResponseFamily")).panels[0].traces}
+    assert {"e = 5 mm", "e = 6 mm"} <= names
     assert ff.figure(result=branch()).panels
+
+
+def test_a_machine_of_its_user_has_no_units() -> None:
+    """Nor have its curves over a field, and the speeds written at its jumps."""
+    followed = ff.frequency_response(chain(), (0.5, 1.9))
+    fold = followed.folds[0]
+    curve = ff.figure(ff.continue_fold(fold, "springs[0].clearance", (0.35, 0.45)), coordinate=0)
+    assert [panel.y.title for panel in curve.panels] == ["amplitude", "angular frequency"]
+    written = [line.text for line in ff.figure(followed).panels[0].lines if line.text]
+    assert written
+    assert any(text.endswith(f" {fold.omega:.4g}") for text in written)
+    large = max(followed.orbits_at(1.5), key=lambda orbit: orbit.amplitude(0))
+    (trace,) = ff.figure([large], coordinate=0).panels[0].traces
+    assert trace.name == f"{large.amplitude(0):.4g}, {large.stability}"
+    in_si = [line.text for line in ff.figure(branch(), units="SI").panels[0].lines]
+    assert any(text.endswith(f"{branch().folds[0].omega:.4g} rad/s") for text in in_si)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any
 
@@ -17,6 +16,7 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
+from flipflow.io.labelled import Arrays, Variable
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -46,26 +46,6 @@ from flipflow.transient.sweep import Sweep
 
 SI = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
 PASSES: tuple[Direction, ...] = ("up", "down")
-
-
-@dataclass(frozen=True)
-class Variable:
-    """Values along named dimensions, with their unit; "" where they have none."""
-
-    dims: tuple[str, ...]
-    data: NDArray[Any]
-    units: str = ""
-
-
-@dataclass(frozen=True)
-class Arrays:
-    """A result as arrays: a table along the dimension ``index``, and what else it holds."""
-
-    title: str
-    index: str
-    coordinates: Mapping[str, Variable]  # values that stand along a dimension
-    variables: Mapping[str, Variable]  # all other values
-    attributes: Mapping[str, str | float]  # what holds for all of it
 
 
 def units_of(machine: Machine | MechanicalSystem) -> Mapping[str, str]:

@@ -13,9 +13,10 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import FlipflowError, InputError, StoreError
-from flipflow.io.arrays import Arrays, arrays_of
+from flipflow.io.arrays import arrays_of
 from flipflow.io.check import Check
 from flipflow.io.command_results import Startup, Sweeps
+from flipflow.io.labelled import Arrays
 from flipflow.io.read_off import read_off
 from flipflow.io.tables import csv_text, netcdf_bytes
 from flipflow.model.arguments import checked_path

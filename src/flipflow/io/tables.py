@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import MissingExtra
-from flipflow.io.arrays import Arrays, Variable
+from flipflow.io.labelled import Arrays, Variable
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,6 +14,7 @@ from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Cells, Panel, Trace
 from flipflow.plotting.response import label
 from flipflow.plotting.scales import MM, RPM
+from flipflow.plotting.units import length_of
 from flipflow.studies.basins import Basins, GridAxis
 
 Real = NDArray[np.float64]
@@ -115,4 +116,5 @@ def _at_starts(orbit: Orbit, axis: GridAxis) -> Real:
 def _size(orbit: Orbit) -> str:
     which = "relative" if "relative" in orbit.system.coordinates else orbit.system.named[0]
     turns = f", {orbit.periods} turns" if orbit.periods > 1 else ""
-    return f"{orbit.amplitude(which) * MM:.3g} mm {which}{turns}"
+    name = which if isinstance(which, str) else label(which)
+    return f"{length_of(orbit, orbit.amplitude(which), 3)} {name}{turns}"

@@ -167,4 +167,7 @@ def _panel(
 def _value(field: str, value: float) -> str:
     if field not in FIELD:
         return f"{field} = {value:.4g}"
-    return f"{FIELD[field].symbol} = {value:.4g} {FIELD[field].unit}"
+    known = FIELD[field]
+    if known.unit == "m":  # as the axes
+        return f"{known.symbol} = {value * MM:.4g} mm"
+    return f"{known.symbol} = {value:.4g} {known.unit}"

@@ -18,6 +18,7 @@ from flipflow.plotting.layout import within
 from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.response import case_look, case_names, coordinates, label
 from flipflow.plotting.scales import MM, RPM
+from flipflow.plotting.units import length_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
 
 Real = NDArray[np.float64]
@@ -77,7 +78,9 @@ def orbit_figure(orbit: Orbit, which: Coordinate | None = None) -> Figure:
 def orbits_in_time_figure(orbits: Sequence[Orbit], which: Coordinate | None = None) -> Figure:
     """Coexisting motions over their turns, and their phase portraits."""
     (chosen,) = (_across(orbits[0]),) if which is None else coordinates(orbits[0].system, which)
-    words = [f"{orbit.amplitude(chosen) * MM:.4g} mm, {orbit.stability}" for orbit in orbits]
+    words = [
+        f"{length_of(orbit, orbit.amplitude(chosen), 4)}, {orbit.stability}" for orbit in orbits
+    ]
     pairs = list(enumerate(zip(orbits, words, strict=True)))
     panels = (
         Panel(

@@ -6,9 +6,8 @@ import dataclasses
 from typing import Any, Literal, get_args
 
 from flipflow.model.arguments import checked_word
-from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.panels import Axis, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
 
 Units = Literal["engineering", "SI", "dimensionless"]
@@ -31,11 +30,18 @@ def units_for(result: object, units: str | None) -> str:
     if units is not None:
         return checked_word("units", units, get_args(Units))
     first = result[0] if isinstance(result, (list, tuple)) and result else result
-    if isinstance(getattr(first, "machine", None), FlipFlowScreen):
-        return "engineering"
+    machine = getattr(first, "machine", None)
     # A history knows only its system; that of a screen has a relative motion.
-    known = getattr(getattr(first, "system", None), "coordinates", {"relative": None})
-    return "engineering" if "relative" in known else "dimensionless"
+    system = getattr(first, "system", None) if machine is None else machine.system()
+    of_screen = system is None or "relative" in system.coordinates
+    return "engineering" if of_screen else "dimensionless"
+
+
+def length_of(owner: object, metres: float, digits: int) -> str:
+    """A length as a legend says it: in mm for a screen, without a unit for any other machine."""
+    if units_for(owner, None) == "engineering":
+        return f"{metres * MM:.{digits}g} mm"
+    return f"{metres:.{digits}g}"
 
 
 def in_units(figure: Figure, units: str) -> Figure:
@@ -61,6 +67,15 @@ def _rescaled(panel: Panel, units: str) -> Panel:
         known: Trace = moved(trace, x=across, y=upwards, lower=upwards)
         return dataclasses.replace(known, x_also=())
 
+    def line_in(line: Line) -> Line:
+        known: Line = moved(line, at=scale[line.axis])
+        words, _, unit = line.text.rpartition(" ")
+        if unit not in TO_SI:
+            return known
+        value, to = f"{known.at:.4g}", TO_SI[unit][1] if units == "SI" else ""
+        text = " ".join(filter(None, (words.rpartition(" ")[0], value, to)))
+        return dataclasses.replace(known, text=text)
+
     return dataclasses.replace(
         panel,
         x=x,
@@ -68,7 +83,7 @@ def _rescaled(panel: Panel, units: str) -> Panel:
         traces=tuple(map(trace_in, panel.traces)),
         bars=tuple(moved(b, low=across, high=across) for b in panel.bars),
         bands=tuple(moved(b, low=scale[b.axis], high=scale[b.axis]) for b in panel.bands),
-        lines=tuple(moved(line, at=scale[line.axis]) for line in panel.lines),
+        lines=tuple(map(line_in, panel.lines)),
         arrows=tuple(moved(a, x0=across, x1=across, y0=upwards, y1=upwards) for a in panel.arrows),
         notes=tuple(moved(note, x=across, y=upwards) for note in panel.notes),
         cells=tuple(moved(c, x=across, y=upwards) for c in panel.cells),
