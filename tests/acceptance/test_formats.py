@@ -183,7 +183,7 @@ def test_nothing_is_cut_or_overlaps_and_pages_are_filled(printed, kind, form):
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("kind", MACHINES)
 def test_the_first_page_says_what_it_must(printed, assessed, kind, form):
-    """Page 1 is one page: may it run and what binds, where, does it start, what the ground bears."""
+    """Page 1 is one page: may it run, what binds, does it start, what the ground bears."""
     _, _, words = next(iter(pages(printed(kind, form))))
     text = " ".join(word.text for word in words)
     for piece in (

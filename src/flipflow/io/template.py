@@ -22,8 +22,9 @@ format = {FORMAT}
 # Keys that say in other words what another key says already: shown, but commented out.
 _ALTERNATIVES = frozenset(
     {
-        "stops.clearance_minus", "stops.temperature_factor", "drive.torque_table", "drive.switch_over_speed",
-        "drive.switch_over_time", "drive.ramp", "drive.ramp_time", "drive.torque_limit",
+        "stops.clearance_minus", "stops.temperature_factor", "drive.torque_table",
+        "drive.switch_over_speed", "drive.switch_over_time", "drive.ramp", "drive.ramp_time",
+        "drive.torque_limit",
     }
 )  # fmt: skip
 
