@@ -290,3 +290,21 @@ def test_test_functions_of_maps_that_no_number_holds() -> None:
     assert neimark_sacker(far) < 0.0 < neimark_sacker(far * [1.0, 1.0, 1.2, 1.2])
     assert np.isfinite(determinant_plus(np.eye(4) * 1e100))
     assert determinant_plus(-2.0 * np.eye(3)) == pytest.approx(-1.0)
+
+
+def test_double_folds_of_identical_axes_are_special_points() -> None:
+    """Two equal axes turn back together, where the matrix of the branch loses two ranks."""
+    one = ff.MechanicalSystem(
+        [[1.0]], [[0.06]], [[1.0]], [ff.ClearanceSpring([1.0], 30.0, 1.0, 0.4)],
+        ff.HarmonicForce([0.5]),
+    )  # fmt: skip
+    axes = np.eye(2)
+    both = ff.MechanicalSystem(
+        axes, 0.06 * axes, axes, [ff.ClearanceSpring(d, 30.0, 1.0, 0.4) for d in axes],
+        ff.HarmonicForce([0.5, 0.5]),
+    )  # fmt: skip
+    single, double = (ff.frequency_response(machine, (0.3, 5.0)) for machine in (one, both))
+    assert len(single.folds) == 6
+    found, expected = ([fold.omega for fold in branch.folds] for branch in (double, single))
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert double.notes == ()

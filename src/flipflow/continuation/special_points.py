@@ -22,6 +22,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
+from flipflow.continuation.double_folds import double_fold
 from flipflow.continuation.exact_check import ExactBeside, unconfirmed_note
 from flipflow.continuation.refinement import FOLD as OF_FOLD
 from flipflow.continuation.refinement import JUMP, SHARE_TOLERANCE
@@ -105,12 +106,16 @@ def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Fou
     """Zeros of test functions in branch order, and a sentence for each that was not refined."""
     found: list[Found] = []
     notes: list[str] = []
+    missed: list[tuple[int, str]] = []
     for test in tests:
         for p, low, high in _brackets(solver, traced, test, notes):
             try:
                 found.append(_refine(solver, traced, test, p, low, high))
             except IncompleteError as error:
-                notes.append(f"{test.kind}: {error}")
+                missed.append((p, f"{test.kind}: {error}"))
+    # Where several multipliers pass 1 at once, tests of pairs of them vanish there as well.
+    known = {one.index for one in found if one.kind == FOLD}
+    notes += [sentence for p, sentence in missed if p not in known]
     kept = sorted(
         (one for one in found if _is_real(solver, one)), key=lambda one: (one.index, one.share)
     )
@@ -334,7 +339,7 @@ def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool)
 def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high: float) -> Found:
     """Root of the test on corrected points between two shares of step p."""
     if test.zero is not None:
-        share, point = test.zero(p, low, high)
+        share, point = _known_zero(solver, traced, test.kind, partial(test.zero, p, low, high), p)
     else:
         share, point = _zero_between(solver, traced, test, p, low, high)
     kind = test.kind
@@ -342,6 +347,18 @@ def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high:
         deeper = test.values[p + 1] > 0.0 if high == 1.0 else test.values[p] < 0.0
         kind = CONTACT_BEGIN if deeper == (point.omega_tangent > 0.0) else CONTACT_END
     return Found(kind, p, share, point, test.spring, test.side)
+
+
+def _known_zero(
+    solver: Follower, traced: Any, kind: str, zero: Callable[[], tuple[float, Point]], p: int
+) -> tuple[float, Point]:
+    """Root by the kernels; of a fold of several ranks, which they cannot pass, by least steps."""
+    try:
+        return zero()
+    except IncompleteError:
+        if kind != FOLD or type(solver) is not ExactSolver:
+            raise
+        return double_fold(solver, traced, p)
 
 
 def _zero_between(
