@@ -215,7 +215,7 @@ def test_command_writes_figures_page_and_json(monkeypatch, capsys, tmp_path):
 def test_command_takes_another_machine_file(monkeypatch, capsys, tmp_path):
     assert run(monkeypatch, "new", tmp_path / "own.toml") == 0
     text = (tmp_path / "own.toml").read_text(encoding="utf-8")
-    soft, changes = re.subn(r'(\[shear_springs\][^[]*?stiffness = )"[^"]*"', r'\1"60 kN/m"', text)
+    soft, changes = re.subn(r'(\[shear_springs\][^[]*?stiffness = )"[^"]*"', r'\1"250 kN/m"', text)
     assert changes == 1
     (tmp_path / "own.toml").write_text(soft, encoding="utf-8")
     capsys.readouterr()

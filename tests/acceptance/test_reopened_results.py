@@ -28,6 +28,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.compare import Comparison
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -104,6 +105,7 @@ MADE: dict[type, list[Callable[[], object]]] = {
         lambda: ff.start_up(screen(), DRIVE, duration=0.5),
         lambda: ff.coast_down(screen(), 80.0, ff.SpeedProfile((0.0, 0.4), (80.0, 60.0))),
     ],
+    Comparison: [lambda: ff.compare(["ffs0827-linear", "ffs0827-linear"])],
     FoundationLoads: [
         lambda: ff.foundation_loads(
             {"empty": response().orbits_at(203.0)[0]},

@@ -39,10 +39,10 @@ class Stroboscope:
         self.solver = ExactSolver(chain, half_turn=False)
 
     def run(self, z, omega) -> tuple[np.ndarray, tuple[int, float, float]]:
-        """Last state; period (0: none up to 6), least and greatest x1 over the last turns."""
+        """Last state; period (0: none up to 12), least and greatest x1 over the last turns."""
         states = self.solver.section(z, float(omega), TURNS)
         last = states[-WATCHED:]
-        gaps = [np.abs(last[:-n] - last[n:]).max() for n in range(1, 7)]
+        gaps = [np.abs(last[:-n] - last[n:]).max() for n in range(1, 13)]
         period = next((n for n, gap in enumerate(gaps, 1) if gap < REPEAT), 0)
         every = np.full(WATCHED, float(omega))
         low, high, _ = self.solver.extremes(last, every, np.array([[1.0, 0.0]]))

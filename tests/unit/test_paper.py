@@ -123,7 +123,7 @@ def test_first_peak_is_that_of_the_linear_machine(exact, screen):
 
 def test_figures_show_their_results_numbers(family, screen):
     drawn = ff.figure(family)
-    for member, name in zip(family.members, ("0.004", "0.006", "0.008"), strict=True):
+    for member, name in zip(family.members, ("4 mm", "6 mm", "8 mm"), strict=True):
         lines = [t for t in drawn.panels[2].traces if t.role == "stable" and name in t.name]
         peak = 1e3 * member.relative_peak.amplitude("relative")
         assert max(t.y.max() for t in lines) == pytest.approx(peak, rel=1e-3)

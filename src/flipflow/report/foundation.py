@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit
+from flipflow.model.load_case import case_words
 from flipflow.plotting.foundation import foundation_drawing
 from flipflow.report.blocks import (
     Block,
@@ -146,7 +147,7 @@ def _orders_table(loads: FoundationLoads, case: CaseLoads) -> Table:
         rows.append(cells(*row))
     caption = (
         "Amplitude, and phase to the unbalance force along the surface (negative: it lags), of the "
-        f"parts of the running load at multiples of the shaft's speed, case {case.name}."
+        f"parts of the running load at multiples of the shaft's speed, {case_words(case.name)}."
     )
     return Table(f"{_one(loads)}, orders", tuple(columns), tuple(rows), caption)
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from flipflow.model.fields import FIELD
+from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.report.blocks import Block, Cell, Column, Note, Table
 from flipflow.report.numbers import NOTHING, named, number
@@ -100,7 +101,7 @@ def _notes(assessment: Assessment, cases: list[CaseAssessment]) -> Iterator[str]
         if load is None or rubber is None:
             continue
         whose = "the air's" if load.temperature_of == "air" else "the rubber's"
-        text = f"Case {case.name}: {number(load.temperature or 0.0)} degC is {whose} temperature"
+        text = f"{case_words(case.name, capital=True)}: {number(load.temperature or 0.0)} degC is {whose} temperature"
         if load.temperature_of == "air" and rubber != load.temperature:
             text += f"; the rubber settles at {number(rubber)} degC"
         yield f"{text}."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from flipflow.model.load_case import case_words
 from flipflow.plotting.transient import run_ups_figure
 from flipflow.report.blocks import (
     Block,
@@ -136,7 +137,7 @@ def beyond_running(assessment: Assessment) -> Iterator[str]:
             continue
         worst, limit = (quantity(value, row.shown_unit, row.unit) for value in (row.worst, most))
         yield (
-            f"{row.label[:1].upper()}{row.label[1:]}: {worst} (case {row.case}) exceeds the "
+            f"{row.label[:1].upper()}{row.label[1:]}: {worst} ({case_words(row.case)}) exceeds the "
             f"running limit of {limit}; {row.reason}."
         )
 

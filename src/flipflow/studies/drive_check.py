@@ -15,6 +15,7 @@ from flipflow.dynamics.linear_response import linear_response
 from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
+from flipflow.model.load_case import case_words
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import Converter
 from flipflow.transient.speed_run import unbalance_weight
@@ -231,8 +232,8 @@ def _power(drive: Drive, demand: Demand) -> Finding | None:
     if asked <= drive.motor.power * (1.0 + 1e-9):
         return None
     told = (
-        f"the machine takes {power_words(asked)} at {_rpm(demand.speed)} (case {case}), more than "
-        f"the rated power of {_watts(drive.motor.power)}; it needs a motor of at least that"
+        f"the machine takes {power_words(asked)} at {_rpm(demand.speed)} ({case_words(case)}), more "
+        f"than the rated power of {_watts(drive.motor.power)}; it needs a motor of at least that"
     )
     return Finding("power", _state(drive, "power"), f"{told}.")
 

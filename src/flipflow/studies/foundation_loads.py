@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_kind, checked_mapping, checked_text
+from flipflow.model.arguments import checked_kind, checked_mapping, checked_text, checked_word
 from flipflow.model.constants import GRAVITY, RPM
+from flipflow.model.load_case import case_words
 from flipflow.model.numerals import digits
 from flipflow.model.screen import FlipFlowScreen, Rotation
 from flipflow.periodic.orbit import Orbit
@@ -194,8 +195,7 @@ class FoundationLoads(Result):
             For a support of another name.
         """
         checked_kind("case", case, CaseLoads, "give one of the load cases")
-        if support not in self.supports:
-            raise InputError("support", support, f"choose one of {', '.join(self.supports)}")
+        checked_word("support", support, self.supports)
         return _times(case.static, self.static_shares[self.supports.index(support)])
 
     @property
@@ -211,7 +211,7 @@ class FoundationLoads(Result):
             one = max(self.cases, key=lambda one: one.running.total or one.running.along or 0.0)
             parts.append(
                 f"running at {digits(one.omega * RPM, 4)} rpm {self._worst(one.running)} "
-                f"(case {one.name})"
+                f"({case_words(one.name)})"
             )
         if self.runs:
             run = max(self.runs, key=lambda one: one.peaks.total or one.peaks.along or 0.0)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from flipflow.continuation.frequency_response import frequency_response
+from flipflow.model.load_case import case_words
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method
 from flipflow.studies.feasible import working_motion
@@ -58,7 +59,7 @@ def warmed_load(
     at_rubber = dataclasses.replace(load, temperature_of="rubber")
     if omega is None or pieces is None or conductance is None:
         why = "the working speed" if omega is None else "shear_springs.conductance or pieces"
-        note = f"Case {load.name}: the rubber is taken to be as warm as the air, for want of {why}."
+        note = f"{case_words(load.name, capital=True)}: the rubber is taken to be as warm as the air, for want of {why}."
         return WarmedLoad(at_rubber, note)
     tables = [t for t in (screen.temperature_factor, screen.stop_temperature_factor) if t]
     low, high = max(t[0][0] for t in tables), min(t[-1][0] for t in tables)
@@ -73,10 +74,10 @@ def warmed_load(
 
     found = _settled(air, warmer)
     if found is None:
-        note = f"Case {load.name}: the temperature of the rubber was not found; it is the air's."
+        note = f"{case_words(load.name, capital=True)}: the temperature of the rubber was not found; it is the air's."
         return WarmedLoad(at_rubber, note)
     note = (
-        f"Case {load.name}: the rubber, {found:.3g} degC, is warmer than the springs' table knows; "
+        f"{case_words(load.name, capital=True)}: the rubber, {found:.3g} degC, is warmer than the springs' table knows; "
         f"its stiffness is that at {high:g} degC."
     )
     rubber = min(max(found, low), high)

@@ -10,6 +10,7 @@ from flipflow.errors import IncompleteError, InputError
 from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.limits import Passage
+from flipflow.model.load_case import case_words
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.studies.drive_check import (
@@ -288,6 +289,6 @@ def _resonance(
     powers = [power for power in known if power is not None]
     if not powers:
         return ()
-    held = f"{run.near.name} = {run.near.omega * RPM:.4g} rpm (case {found.case})"
+    held = f"{run.near.name} = {run.near.omega * RPM:.4g} rpm ({case_words(found.case)})"
     sentence = f"{power_words(max(powers))} of rated power pass {held} however slowly."
     return (Finding("resonance", "attention", sentence),)

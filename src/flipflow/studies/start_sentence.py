@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flipflow.model.constants import RPM
+from flipflow.model.load_case import case_words
 from flipflow.studies.drive_check import Finding
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 
@@ -34,7 +35,7 @@ def drive_words(found: Transients) -> str:
 def in_cases(names: Sequence[str], count: int) -> str:
     """In which load cases, in words; of many only their number."""
     if len(names) == count:
-        return "in every load case" if count > 1 else f"in case {names[0]}"
+        return "in every load case" if count > 1 else f"in {case_words(names[0])}"
     if len(names) > MOST_NAMED:
         return f"in {len(names)} of {count} load cases"
     return f"in {'case' if len(names) == 1 else 'cases'} {'; '.join(names)}"

@@ -248,13 +248,18 @@ class _Run:
         if not isinstance(self.machine, FlipFlowScreen):
             raise InputError("disturbances", blow, "only a screen has frames that can be loaded")
         if isinstance(blow, LoadStep):
-            self.machine = self.machine.loaded(blow.load)
+            self.machine = self._carrying(blow.load)
             return
         frame = 0 if blow.frame == "main" or n == 1 else 1
         mass, velocity = system.M[frame, frame], blow.velocity if n > 1 else 0.0
         self.z[n + frame] = (mass * self.z[n + frame] + blow.mass * velocity) / (mass + blow.mass)
         main = blow.mass if blow.frame == "main" else 0.0
-        self.machine = self.machine.loaded(Load(main_mass=main, floating_mass=blow.mass - main))
+        self.machine = self._carrying(Load(main_mass=main, floating_mass=blow.mass - main))
+
+    def _carrying(self, load: Load) -> FlipFlowScreen:
+        """The screen under a load that arrives on the way; its own weight is left out."""
+        screen = cast("FlipFlowScreen", self.machine)
+        return screen.loaded(load).replace(measured_shift=screen.measured_shift)
 
     def _tell(self, t: float) -> None:
         if self.monitor is not None:
