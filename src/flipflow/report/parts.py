@@ -101,7 +101,8 @@ def _notes(assessment: Assessment, cases: list[CaseAssessment]) -> Iterator[str]
         if load is None or rubber is None:
             continue
         whose = "the air's" if load.temperature_of == "air" else "the rubber's"
-        text = f"{case_words(case.name, capital=True)}: {number(load.temperature or 0.0)} degC is {whose} temperature"
+        name = case_words(case.name, capital=True)
+        text = f"{name}: {number(load.temperature or 0.0)} degC is {whose} temperature"
         if load.temperature_of == "air" and rubber != load.temperature:
             text += f"; the rubber settles at {number(rubber)} degC"
         yield f"{text}."

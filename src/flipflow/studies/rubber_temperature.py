@@ -57,9 +57,10 @@ def warmed_load(
         return WarmedLoad(load)
     pieces, conductance = screen.shear_pieces, screen.shear_conductance
     at_rubber = dataclasses.replace(load, temperature_of="rubber")
+    case = case_words(load.name, capital=True)
     if omega is None or pieces is None or conductance is None:
         why = "the working speed" if omega is None else "shear_springs.conductance or pieces"
-        note = f"{case_words(load.name, capital=True)}: the rubber is taken to be as warm as the air, for want of {why}."
+        note = f"{case}: the rubber is taken to be as warm as the air, for want of {why}."
         return WarmedLoad(at_rubber, note)
     tables = [t for t in (screen.temperature_factor, screen.stop_temperature_factor) if t]
     low, high = max(t[0][0] for t in tables), min(t[-1][0] for t in tables)
@@ -74,10 +75,10 @@ def warmed_load(
 
     found = _settled(air, warmer)
     if found is None:
-        note = f"{case_words(load.name, capital=True)}: the temperature of the rubber was not found; it is the air's."
+        note = f"{case}: the temperature of the rubber was not found; it is the air's."
         return WarmedLoad(at_rubber, note)
     note = (
-        f"{case_words(load.name, capital=True)}: the rubber, {found:.3g} degC, is warmer than the springs' table knows; "
+        f"{case}: the rubber, {found:.3g} degC, is warmer than the springs' table knows; "
         f"its stiffness is that at {high:g} degC."
     )
     rubber = min(max(found, low), high)
