@@ -233,7 +233,8 @@ def _power(drive: Drive, demand: Demand) -> Finding | None:
         return None
     told = (
         f"the machine takes {power_words(asked)} at {_rpm(demand.speed)} ({case_words(case)}), "
-        f"more than the rated power of {_watts(drive.motor.power)}; it needs a motor of at least that"
+        f"more than the rated power of {_watts(drive.motor.power)}; "
+        "it needs a motor of at least that"
     )
     return Finding("power", _state(drive, "power"), f"{told}.")
 
