@@ -340,3 +340,38 @@ def test_speed_profiles_carry_every_kind_of_force() -> None:
     stepper = Stepper(machine, profile, z, method=RungeKutta(tolerance=1e-11), fastest=3.0 * omega)
     last = [stretch for stretch in stepper.run(8.0 * np.pi / omega) if stretch.t.size][-1]
     close("end", last.states[-1, : machine.size], exact.x[-1], abs=1e-6)
+
+
+@pytest.mark.parametrize("k", [3.0, 1e6, 37.0])
+def test_two_free_masses_are_refused_whatever_the_rounding(k: float) -> None:
+    """Their centre of mass is held by nothing, and damped by nothing."""
+    links = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    loose = ff.MechanicalSystem(
+        np.diag([200.0, 100.0]), 777.0 * links, k * links, [ff.ClearanceSpring([1.0, -1.0], k)],
+        ff.HarmonicForce([1.0, 0.0]),
+    )  # fmt: skip
+    with pytest.raises(ff.InputError, match="nothing ever holds the machine"):
+        ff.frequency_response(loose, (50.0, 60.0))
+
+
+def test_energy_of_a_driven_shaft_under_a_constant_force() -> None:
+    """Input is dissipated or stored, the constant force's potential among it."""
+    machine = ff.MechanicalSystem(
+        [[100.0]], [[200.0]], [[1e5]], (), ff.Unbalance([1.0]), static_force=[5e4]
+    )
+    run = ff.coast_down(machine, 30.0, ff.Drive(inertia=1.0, friction=1.0), duration=0.5)
+    energy = run.history.energy
+    rest = energy["input"] - energy["dissipated"] - energy["stored"]
+    close("balance", rest, 0.0, abs=1e-3)
+
+
+def test_steps_follow_the_fastest_excitation() -> None:
+    """Forty steps to a turn of the highest order, not of the shaft."""
+    from flipflow.transient.time_stepping import RungeKutta, Stepper  # noqa: PLC0415
+
+    machine = ff.MechanicalSystem([[1.0]], [[0.2]], [[1.0]], (), ff.HarmonicForce([1.0], order=20))
+    profile = ff.SpeedProfile((0.0, 4.0), (3.0, 3.0))
+    stepper = Stepper(machine, profile, np.zeros(2), method=RungeKutta("rk4"), fastest=3.0)
+    last = [stretch for stretch in stepper.run(4.0) if stretch.t.size][-1]
+    exact = ff.simulate(machine, omega=3.0, periods=2, initial=[0.0, 0.0], t=[4.0])
+    close("end", last.states[-1, 0], exact.x[-1, 0], abs=1e-6)

@@ -23,7 +23,8 @@ def cloud(solver: ExactSolver, omega: float, rng: np.random.Generator) -> Real:
     n = solver.system.size
     rest, X = contact_free_motion(solver.system, omega)
     gaps = [abs(g) for spring in solver.springs for g in spring.gaps if math.isfinite(g)]
-    size = np.maximum(2.0 * np.abs(X).sum(axis=0) + np.abs(rest), 3.0 * max(gaps, default=0.0))
+    linear = np.nan_to_num(2.0 * np.abs(X).sum(axis=0) + np.abs(rest))
+    size = np.maximum(linear, 3.0 * max(gaps, default=0.0))
     box = np.concatenate([size, omega * size])
     spread = _spread(STARTS if solver.springs else 0, 2 * n, rng)
     return np.asarray((2.0 * spread - 1.0) * box)

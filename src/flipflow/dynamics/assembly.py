@@ -16,6 +16,7 @@ from flipflow.model.elements import ClearanceSpring
 from flipflow.model.system import MechanicalSystem
 
 EPSILON = float(np.finfo(float).eps)
+HELD = 1e-12  # share of the stiffness, or of the damping, below which nothing holds a motion
 
 
 def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineArrays:
@@ -72,23 +73,23 @@ def _require_hold(system: MechanicalSystem) -> None:
     sizes = np.linalg.svd(system.K, compute_uv=False).tolist()
     if sizes[-1] > system.size * EPSILON * sizes[0]:
         return
-    free = _null_space(system.K)
+    free = _null_space(system.K, float(np.linalg.norm(system.K)))
     springs = [spring for spring in system.springs if spring.stiffness > 0.0]
     D = np.array([spring.direction for spring in springs]).reshape(len(springs), system.size)
-    if _null_space(D @ free).shape[1]:
+    if _null_space(D @ free, float(np.linalg.norm(D))).shape[1]:
         remedy = "nothing ever holds the machine; give every free motion a spring or a stop"
         raise InputError("K", "singular", remedy)
-    if _null_space(system.C @ free).shape[1]:
+    if _null_space(system.C @ free, float(np.linalg.norm(system.C))).shape[1]:
         remedy = "a motion that no spring holds between the stops needs damping there; give it some"
         raise InputError("C", "singular", remedy)
 
 
-def _null_space(matrix: Real) -> Real:
-    """Columns that a matrix (n, k) takes to zero, (k, .), to rounding."""
+def _null_space(matrix: Real, size: float) -> Real:
+    """Columns that a matrix (n, k) takes to zero, (k, .), to rounding of numbers of a size."""
     if matrix.shape[0] == 0:
         return np.eye(matrix.shape[1])
     _, sizes, rows = np.linalg.svd(matrix)
-    rank = np.count_nonzero(sizes > max(matrix.shape) * EPSILON * sizes.max(initial=0.0))
+    rank = np.count_nonzero(sizes > HELD * size)
     return np.asarray(rows[rank:].T)
 
 

@@ -71,9 +71,11 @@ def span(orders: Sequence[int], amplitudes: Complex) -> tuple[float, float]:
     # With z = exp(i theta) the slope is zero where sum_n i n (a_n z^n - conj(a_n) z^-n) is.
     if not np.isfinite(amplitudes).all():
         return math.nan, math.nan
+    # What is rounding beside the rest would lead the polynomial, and spoil its roots.
+    known = np.where(np.abs(amplitudes) > 1e-17 * np.abs(amplitudes).max(), amplitudes, 0.0)
     highest = max(orders)
     slope = np.zeros(2 * highest + 1, np.complex128)
-    for order, amplitude in zip(orders, amplitudes, strict=True):
+    for order, amplitude in zip(orders, known, strict=True):
         slope[highest - order] = order * amplitude
         slope[highest + order] = -order * np.conj(amplitude)
     theta = np.append(np.angle(np.roots(slope)), 0.0)

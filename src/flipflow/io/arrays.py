@@ -18,7 +18,7 @@ from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
 from flipflow.io.labelled import Arrays, Variable
 from flipflow.model.quantities import QUANTITIES
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.screen import is_screen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.assessment import Assessment
@@ -50,7 +50,7 @@ PASSES: tuple[Direction, ...] = ("up", "down")
 
 def units_of(machine: Machine | MechanicalSystem) -> Mapping[str, str]:
     """SI for a screen; a machine of its user has units of its own, which nobody told."""
-    return SI if isinstance(machine, FlipFlowScreen) else dict.fromkeys(SI, "")
+    return SI if is_screen(machine) else dict.fromkeys(SI, "")
 
 
 @singledispatch
@@ -250,7 +250,7 @@ def _(risk: JumpRisk) -> Arrays:
 
 @arrays_of.register
 def _(history: History) -> Arrays:
-    system = history.system
+    system, units = history.system, units_of(history.system)
     known = {"torque": (history.torque, "N m"), "normal": (history.normal, "m")}
     more = {
         name: Variable(("time", "derivative")[: values.ndim], values, unit)
@@ -262,10 +262,10 @@ def _(history: History) -> Arrays:
         "time",
         {"time": _column("time", history.t, "s"), "coordinate": _labels(system.named)},
         {
-            "displacement": _each("time", system, history.displacement, "m"),
-            "velocity": _each("time", system, history.velocity, "m/s"),
-            "acceleration": _each("time", system, history.acceleration, "m/s^2"),
-            "stop_force": Variable(("time", "stop"), history.force, "N"),
+            "displacement": _each("time", system, history.displacement, units["length"]),
+            "velocity": _each("time", system, history.velocity, units["velocity"]),
+            "acceleration": _each("time", system, history.acceleration, units["acceleration"]),
+            "stop_force": Variable(("time", "stop"), history.force, units["force"]),
             "omega": _column("time", history.omega, "rad/s"),
             "angle": _column("time", history.angle, "rad"),
             **more,
@@ -315,7 +315,7 @@ def _(sweep: Sweep) -> Arrays:
 
 @arrays_of.register
 def _(section: Section) -> Arrays:
-    system = section.system
+    system, units = section.system, units_of(section.system)
     return Arrays(
         "Poincare section",
         "turn",
@@ -324,8 +324,8 @@ def _(section: Section) -> Arrays:
             "coordinate": _labels(system.named),
         },
         {
-            "displacement": _each("turn", system, section.displacement, "m"),
-            "velocity": _each("turn", system, section.velocity, "m/s"),
+            "displacement": _each("turn", system, section.displacement, units["length"]),
+            "velocity": _each("turn", system, section.velocity, units["velocity"]),
         },
         _attributes(section, omega=section.omega, word=section.word, periods=section.periods),
     )

@@ -105,6 +105,8 @@ def netcdf_bytes(arrays: Arrays) -> bytes:
         coordinates = " ".join(name for name in arrays.coordinates if name in parts)
         for name, one in parts.items():
             values, dims = _classic(name, one)
+            if 0 in values.shape[1:]:
+                continue  # the format knows no dimension without entries, but the first
             for dim, size in zip(dims, values.shape, strict=True):
                 if dim not in file.dimensions:
                     file.createDimension(dim, size)

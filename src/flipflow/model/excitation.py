@@ -100,7 +100,9 @@ class MovingBase:
         remedy = "give finite numbers, one per degree of freedom"
         k = frozen_array(checked_numbers("stiffness", stiffness, remedy))
         c = np.zeros(k.shape) if damping is None else checked_numbers("damping", damping, remedy)
-        if k.ndim != 1 or c.shape != k.shape:
+        if k.ndim != 1:
+            raise InputError("stiffness", stiffness, remedy)
+        if c.shape != k.shape:
             raise InputError("damping", damping, remedy)
         moved = _force_vector([displacement], "displacement", "give a finite number in m")
         object.__setattr__(self, "displacement", complex(moved[0]))

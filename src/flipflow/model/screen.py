@@ -313,6 +313,13 @@ def _factor_at(table: tuple[tuple[float, float], ...], temperature: float, whose
     return float(np.interp(temperature, degrees, factors))
 
 
+def is_screen(machine: object) -> bool:
+    """Whether a machine is a screen, or the system of one, whose units are SI."""
+    if isinstance(machine, MechanicalSystem):
+        return {"main", "floating", "relative"} <= set(machine.coordinates)
+    return isinstance(machine, FlipFlowScreen)
+
+
 def _checked_table(name: str, rows: object) -> tuple[tuple[float, float], ...]:
     """Pairs (degrees Celsius, factor), rising in temperature; none is a table, too."""
     remedy = "give pairs (degrees Celsius, factor above 0)"

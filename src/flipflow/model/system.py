@@ -178,7 +178,7 @@ class MechanicalSystem:
 
         K x + sum_j d_j H_j(d_j^T x) = f_0, with the stops at rest. It counts from the unstressed
         springs, and is zero without static force and preloaded stops. Where the machine can rest
-        in several places, it is one with the fewest stops engaged.
+        in several places, it is one of them.
 
         Raises
         ------

@@ -30,7 +30,7 @@ def one_state_motions(system: MechanicalSystem, omega: float) -> list[Real]:
     found = []
     for regimes in islice(_contact_states(linear), MOST_STATES):
         motion = _linear_motion(linear, regimes, omega)
-        if motion is None:
+        if motion is None or not np.isfinite(motion[1]).all():
             continue
         rest, X = motion
         if _holds(linear, regimes, rest, X, omega):
@@ -41,13 +41,13 @@ def one_state_motions(system: MechanicalSystem, omega: float) -> list[Real]:
 def contact_free_motion(system: MechanicalSystem, omega: float) -> tuple[Real, Complex]:
     """Mean (N,) and harmonics (W, N) of the motion with all springs open, touching or not.
 
-    What nothing holds against a constant force stands at zero; NaN where an undamped mode
-    resonates.
+    NaN where an undamped mode resonates, and where nothing holds it against a constant force.
     """
     motion = _linear_motion(system, (OPEN,) * len(system.springs), omega)
     if motion is not None:
         return motion
-    return np.zeros(system.size), np.zeros((len(system.orders), system.size), np.complex128)
+    shape = len(system.orders), system.size
+    return np.zeros(system.size), np.full(shape, np.nan, np.complex128)
 
 
 def touches_nothing(system: MechanicalSystem, rest: Real, X: Complex) -> bool:

@@ -31,8 +31,9 @@ def draw_on(
         raise MissingExtra("Plots need matplotlib: pip install 'flipflow[report]'.") from error
     if ax is not None and not isinstance(ax, Kind):
         raise InputError("ax", type(ax).__name__, "give matplotlib Axes, or None for new ones")
+    panel = figure(result, coordinate=coordinate, units=units).panels[0]
     axes = plt.subplots()[1] if ax is None else ax
-    _draw(axes, figure(result, coordinate=coordinate, units=units).panels[0])
+    _draw(axes, panel)
     return axes
 
 

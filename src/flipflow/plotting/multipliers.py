@@ -27,7 +27,9 @@ def multipliers_figure(branch: Branch | FieldBranch) -> Figure:
     else:
         axis, scale = field_axis(branch.field, branch.values)
         x = branch.values * scale
-    tracked = tracked_multipliers(branch.multipliers)[:, :MOST_SHOWN]
+    tracked = tracked_multipliers(branch.multipliers)
+    largest = np.nanmax(np.abs(tracked), axis=0, initial=0.0)
+    tracked = tracked[:, np.sort(np.argsort(-largest, kind="stable")[:MOST_SHOWN])]
     sizes, ways = [], [Trace("unit circle", CIRCLE.real, CIRCLE.imag, colour="gap")]
     for k, mu in enumerate(tracked.T):
         name, colour = f"multiplier {k + 1}", case_colour(k)
@@ -42,6 +44,7 @@ def multipliers_figure(branch: Branch | FieldBranch) -> Figure:
     caption = (
         "Factors by which small disturbances grow over a period; each line is one multiplier, "
         "followed along the branch. Below 1 the motion returns."
+        + (f" The {MOST_SHOWN} that grow largest." if largest.size > MOST_SHOWN else "")
     )
     return Figure("Multipliers", caption, (left, right), 2, 320, (0.6, 0.4))
 

@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any, Literal, get_args
 
 from flipflow.model.arguments import checked_word
+from flipflow.model.screen import is_screen
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
@@ -30,11 +31,8 @@ def units_for(result: object, units: str | None) -> str:
     if units is not None:
         return checked_word("units", units, get_args(Units))
     first = result[0] if isinstance(result, (list, tuple)) and result else result
-    machine = getattr(first, "machine", None)
-    # A history knows only its system; that of a screen has a relative motion.
-    system = getattr(first, "system", None) if machine is None else machine.system()
-    of_screen = system is None or "relative" in system.coordinates
-    return "engineering" if of_screen else "dimensionless"
+    machine = getattr(first, "machine", getattr(first, "system", None))
+    return "engineering" if machine is None or is_screen(machine) else "dimensionless"
 
 
 def length_of(owner: object, metres: float, digits: int) -> str:

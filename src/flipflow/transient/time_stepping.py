@@ -229,6 +229,8 @@ class Stepper:
             held = stored_energy(spring.law, spring.stiffness, spring.gaps, np.asarray(regime), y)
             energy += float(held)
         if self.drive is not None:
+            # Beside a given speed the constant force's work counts as put in.
+            energy -= float(self.static @ x)
             turns = np.exp(1j * self.order * angle) / self.order
             lever = (turns @ self.vector).imag
             energy += 0.5 * self.drive.inertia * speed**2 - speed * float(lever @ v)
@@ -256,7 +258,7 @@ class Stepper:
         a = np.zeros((stages, stages))
         for i, row in enumerate(tableau.a):
             a[i, : len(row)] = [float(value) for value in row]
-        longest = _longest_step(self.M, self.K, fastest)
+        longest = _longest_step(self.M, self.K, fastest * int(self.order.max()))
         adaptive = method.formula == "dopri5" and method.step is None
         rows = CHUNK + 2
         return Walk(
