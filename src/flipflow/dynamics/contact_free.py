@@ -53,16 +53,6 @@ def complex_amplitudes(system: MechanicalSystem, omega: Real, order: int = 1) ->
     return contact_free(system.M, system.C, system.K, force, order * omega)
 
 
-def complex_amplitude(system: MechanicalSystem, omega: float, order: int = 1) -> Complex:
-    """X at one frequency, (N,), in a third of the time; NaN where an undamped mode resonates."""
-    force, w = system.force(omega, order), order * omega
-    Z = system.K - w**2 * system.M + 1j * w * system.C
-    try:
-        return np.asarray(np.linalg.solve(Z, force))
-    except np.linalg.LinAlgError:
-        return np.full(force.shape, np.nan, np.complex128)
-
-
 def span(orders: Sequence[int], amplitudes: Complex) -> tuple[float, float]:
     """Least and greatest value of Re sum_n a_n exp(i n theta) over a turn, n of ``orders``."""
     if len(orders) == 1:

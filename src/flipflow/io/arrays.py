@@ -37,6 +37,7 @@ from flipflow.studies.loading import LoadedMachine, Loading
 from flipflow.studies.lyapunov import LyapunovExponents
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.poincare import Section, Spectrum
+from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
@@ -239,9 +240,7 @@ def _(risk: JumpRisk) -> Arrays:
             "threshold": Variable(("frame", "way", "phase"), thresholds, "kg m/s"),
             "throw_frame": _column("throw", np.array([str(one.frame) for one in throws], str)),
             "throw_impulse": _column("throw", [one.impulse for one in throws], "kg m/s"),
-            "throw_lump": _column(
-                "throw", [math.nan if one.lump is None else one.lump for one in throws], "kg"
-            ),
+            "throw_lump": _column("throw", [number_or_nan(one.lump) for one in throws], "kg"),
             "throw_phase": _column("throw", [one.phase for one in throws], "rad"),
         },
         _attributes(risk, omega=risk.omega),
@@ -404,7 +403,7 @@ def _(response: LinearResponse) -> Arrays:
 def _(region: OperatingRegion) -> Arrays:
     words = ("omega_ea", "omega_ar", "omega_cs", "omega_lb", "omega_ub", "lower", "upper")
     marks = {word: getattr(region, word) for word in words}
-    known = {word: math.nan if mark is None else float(mark) for word, mark in marks.items()}
+    known = {word: number_or_nan(mark) for word, mark in marks.items()}
     feasible = np.reshape(np.asarray(region.feasible, float), (-1, 2))
     return Arrays(
         "Operating region",
@@ -503,7 +502,7 @@ def _(assessment: Assessment) -> Arrays:
     values = {
         word: _column(
             "case",
-            [_number(case.values.get(word)) for case in assessment.cases],
+            [number_or_nan(case.values.get(word)) for case in assessment.cases],
             QUANTITIES[word].unit,
         )
         for word in words
@@ -520,18 +519,20 @@ def _(assessment: Assessment) -> Arrays:
             **values,
             "limit_least": _column("limit", [row.limit[0] for row in rows]),
             "limit_most": _column("limit", [row.limit[1] for row in rows]),
-            "limit_worst": _column("limit", [_number(row.worst) for row in rows]),
-            "limit_margin": _column("limit", [_number(row.margin) for row in rows]),
+            "limit_worst": _column("limit", [number_or_nan(row.worst) for row in rows]),
+            "limit_margin": _column("limit", [number_or_nan(row.margin) for row in rows]),
             "limit_state": _column("limit", np.array([row.state for row in rows], str)),
         },
-        _attributes(assessment, verdict=assessment.verdict, omega=_number(assessment.omega)),
+        _attributes(assessment, verdict=assessment.verdict, omega=number_or_nan(assessment.omega)),
     )
 
 
 @arrays_of.register
 def _(found: Comparison) -> Arrays:
     rows = found.results
-    values = np.reshape([[_number(one) for one in row.values] for row in rows], (len(rows), -1))
+    values = np.reshape(
+        [[number_or_nan(one) for one in row.values] for row in rows], (len(rows), -1)
+    )
     return Arrays(
         "Machines compared",
         "result",
@@ -555,7 +556,7 @@ def _(loads: FoundationLoads) -> Arrays:
     static = [one.static if isinstance(one, CaseLoads) else Components() for one in every]
 
     def ways(parts: Sequence[Components]) -> Variable:
-        forces = [[_number(getattr(part, way)) for way in DIRECTIONS] for part in parts]
+        forces = [[number_or_nan(getattr(part, way)) for way in DIRECTIONS] for part in parts]
         return Variable(("load", "direction"), np.reshape(forces, (len(parts), -1)), "N")
 
     return Arrays(
@@ -572,7 +573,3 @@ def _(loads: FoundationLoads) -> Arrays:
         },
         _attributes(loads, position=loads.position, supports=float(len(loads.supports))),
     )
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, Any
 from flipflow.errors import InputError, MissingExtra
 from flipflow.model.system import Coordinate
 from flipflow.plotting.dispatch import figure
+from flipflow.plotting.palette import MARKERS
 from flipflow.plotting.panels import Panel, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DASHES = {"unstable": "--", "undetermined": ":"}
-MARKS = {
-    "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
-    "triangle-open": "v", "diamond": "D", "diamond-open": "D", "cross": "x", "star": "*",
-}  # fmt: skip
 FEW = 200  # points of a cloud up to which they are drawn as large marks
 
 
@@ -68,7 +65,7 @@ def _draw_trace(axes: Axes, trace: Trace, colours: dict[str, Any]) -> None:
     style: dict[str, Any] = {"label": name}
     if trace.role == "point":
         hollow = (trace.symbol or "").endswith("-open")
-        mark = MARKS.get(trace.symbol or "circle", "o") if trace.x.size <= FEW else ","
+        mark = MARKERS.get(trace.symbol or "circle", "o") if trace.x.size <= FEW else ","
         style |= {"ls": "none", "marker": mark} | ({"mfc": "none"} if hollow else {})
     else:
         style["ls"] = DASHES.get(trace.role, "-")

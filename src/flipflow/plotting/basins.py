@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import InputError
+from flipflow.model.quantities import leading_coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
@@ -114,7 +115,7 @@ def _at_starts(orbit: Orbit, axis: GridAxis) -> Real:
 
 
 def _size(orbit: Orbit) -> str:
-    which = "relative" if "relative" in orbit.system.coordinates else orbit.system.named[0]
+    which = leading_coordinate(orbit.system)
     turns = f", {orbit.periods} turns" if orbit.periods > 1 else ""
     name = which if isinstance(which, str) else label(which)
     return f"{length_of(orbit, orbit.amplitude(which), 3)} {name}{turns}"

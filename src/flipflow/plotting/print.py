@@ -17,7 +17,7 @@ from flipflow.plotting.layout import (
     legend_columns,
     legend_names,
 )
-from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, TINTS
+from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, MARKERS, TINTS
 from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ POINT = 72.0 / PIXELS_AN_INCH
 RESOLUTION = 200
 DATE = {"pdf": "CreationDate", "svg": "Date"}
 STYLES = {"dash": (0, (5, 2.5)), "dot": (0, (1, 2)), "dashdot": (0, (5, 2, 1, 2)), "solid": "-"}
-MARKS = {
-    "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
-    "diamond": "D", "diamond-open": "D", "cross": "x", "triangle-open": "v", "star": "*",
-}  # fmt: skip
 MARKS_SHOWN = 9
 VEIL = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0}
 FAMILIES = ("Arial", "Liberation Sans", "DejaVu Sans")
@@ -181,7 +177,7 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
         style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
                   "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
                   "markevery": max(trace.x.size // MARKS_SHOWN, 1)}  # fmt: skip
-    (handle,) = axes.plot(trace.x, trace.y, marker=MARKS.get(trace.symbol or "", ""), **style)
+    (handle,) = axes.plot(trace.x, trace.y, marker=MARKERS.get(trace.symbol or "", ""), **style)
     handles.setdefault(trace.name, handle)
 
 

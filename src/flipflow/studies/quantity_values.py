@@ -210,7 +210,7 @@ class Working(Frozen):
         return None if self.screen is None else normal_motion(self.screen, self.omega)
 
     def field(self, name: str) -> float:
-        return _number(None if self.screen is None else getattr(self.screen, name))
+        return number_or_nan(None if self.screen is None else getattr(self.screen, name))
 
     def amplitude(self, which: Coordinate) -> float:
         return self.orbit.amplitude(which)
@@ -403,8 +403,9 @@ class ContactFree(Frozen):
         return np.full(self.force.shape, math.inf)
 
 
-def _number(value: float | None) -> float:
-    return math.nan if value is None else value
+def number_or_nan(value: float | None) -> float:
+    """A value, or NaN in place of none."""
+    return math.nan if value is None else float(value)
 
 
 def _symmetric(first: Real, off: Real | float, last: Real) -> Real:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response
-from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working
+from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working, number_or_nan
 
 Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
@@ -122,7 +121,7 @@ def _each(work: Callable[[int], None], items: range, threads: int) -> Iterator[f
 def _sample(question: Question, names: tuple[str, ...], row: tuple[object, ...]) -> Real:
     try:
         machine = with_values(question.machine, dict(zip(names, row, strict=True)))
-        return np.array([_number(value) for value in values_of(question, machine)])
+        return np.array([number_or_nan(value) for value in values_of(question, machine)])
     except (InputError, IncompleteError):
         return np.full(question.omega.size, np.nan)
 
@@ -188,10 +187,6 @@ def _allowed(name: str, column: Real) -> NDArray[np.bool_]:
     low = column > field.lower if field.lower_open else column >= field.lower
     whole = column == np.rint(column) if field.whole else np.full(column.shape, True)
     return np.asarray(low & (column <= field.upper) & np.isfinite(column) & whole)
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def _plain(value: Any) -> object:
