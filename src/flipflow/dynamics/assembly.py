@@ -68,6 +68,23 @@ def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineA
     )
 
 
+def system_parts(system: MechanicalSystem) -> dict[str, Real]:
+    """Arrays of a system, by the names that :class:`~flipflow.dynamics.machine_series.MachineSeries` has."""
+    springs = system.springs
+    force = np.array([vector for one in system.excitations for _, vector in one.terms])
+    m, n = len(springs), system.size
+    return {
+        "inertia": system.M,
+        "damping": system.C,
+        "stiffness": system.K,
+        "direction": np.array([spring.direction for spring in springs]).reshape(m, n),
+        "force": np.concatenate([force.real, force.imag]),
+        "static": system.constant_force[None],
+        "stop": np.array([[s.stiffness for s in springs], [s.damping for s in springs]], float),
+        "gap": np.array([spring.gaps for spring in springs], float).reshape(m, 2),
+    }
+
+
 def _require_hold(system: MechanicalSystem) -> None:
     """Refuse a machine with a free motion that no stop ever ends, or that nothing damps."""
     sizes = np.linalg.svd(system.K, compute_uv=False).tolist()

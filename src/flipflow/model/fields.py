@@ -12,6 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import EllipsisType
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flipflow.errors import InputError
 from flipflow.model.arguments import LARGEST, TOO_LARGE, real
 
@@ -63,6 +66,12 @@ class Field:
     count: str | None = None
     whole: bool = False
     infinite: bool = False
+
+    def allows(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Where physics allows finite values of the field, in their shape."""
+        low = values > self.lower if self.lower_open else values >= self.lower
+        whole = values == np.rint(values) if self.whole else np.full(values.shape, True)
+        return np.asarray(low & (values <= self.upper) & np.isfinite(values) & whole)
 
     @property
     def required(self) -> bool:

@@ -77,7 +77,7 @@ def closed_form_values(question: Question, columns: Columns, omega: Real) -> Rea
         own = {name: np.asarray(column[part], float)[:, None] for name, column in columns.items()}
         values[part] = evaluate(ContactFree(nominal | own, omega))
     for name, column in columns.items():
-        values[~_allowed(name, np.asarray(column, dtype=float))] = np.nan
+        values[~FIELD[name].allows(np.asarray(column, dtype=float))] = np.nan
     return values
 
 
@@ -179,14 +179,6 @@ def _outermost(
     which = leading_coordinate(branch.system)
     orbit = pick(found, key=lambda one: one.amplitude(which))
     return Working(machine, orbit, tuple(fold.omega for fold in branch.folds))
-
-
-def _allowed(name: str, column: Real) -> NDArray[np.bool_]:
-    """Where physics allows the values of a field."""
-    field = FIELD[name]
-    low = column > field.lower if field.lower_open else column >= field.lower
-    whole = column == np.rint(column) if field.whole else np.full(column.shape, True)
-    return np.asarray(low & (column <= field.upper) & np.isfinite(column) & whole)
 
 
 def _plain(value: Any) -> object:

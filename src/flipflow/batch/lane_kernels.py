@@ -1,0 +1,236 @@
+"""Many machines at many frequencies, one lane after the other, without Python between them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flipflow.batch.lane_path import (
+    FAR,
+    FAR_FROM_GUESS,
+    FORBIDDEN,
+    FOUND,
+    MARGIN,
+    NO_MOTION,
+    PUSH,
+    SAME,
+    UNSTABLE,
+    LaneWork,
+    contact_free_state,
+    follow,
+    forget,
+    is_even,
+    largest_multiplier,
+    newton,
+    restart,
+    settle,
+)
+from flipflow.batch.lane_readings import Asked, Readings, ReadingWork, read_lane
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_free_range import contact_free_up_to
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.law import Stops
+from flipflow.periodic.shooting import Shooting
+
+
+class Found(NamedTuple):
+    """The motions of L lanes at F frequencies; NaN until they are found."""
+
+    state: Real  # (L, F, 2 N) at phase 0
+    multiplier: Complex  # (L, F, 2 N) of a whole turn
+    error: Real  # (L, F) m
+    leaning: Int  # (L, F) 1 where an even machine moves without symmetry
+    jumps: Int  # (L, F) of the path up to here
+    reason: Int  # (L, F) one of FOUND, UNSTABLE, ...
+
+
+def new_found(lanes: int, speeds: int, degrees: int, reason: int) -> Found:
+    """Room for what is found."""
+    shape = lanes, speeds
+    states = lanes, speeds, 2 * degrees
+    return Found(
+        state=np.full(states, np.nan),
+        multiplier=np.full(states, complex(np.nan, np.nan)),
+        error=np.full(shape, np.nan),
+        leaning=np.zeros(shape, np.int64),
+        jumps=np.zeros(shape, np.int64),
+        reason=np.full(shape, reason, np.int64),
+    )
+
+
+@kernel(inline=True)
+def machine_of(batch: MachineArrays, lane: int) -> MachineArrays:
+    """One machine of many: their arrays with a leading axis, but for laws and excitations' kinds."""
+    stops = batch.stops
+    return MachineArrays(
+        batch.stiffness[lane], batch.damping[lane], batch.direction[lane], batch.reach[lane],
+        batch.static[lane], batch.push[lane], batch.power, batch.wave, batch.order,
+        Stops(stops.law, stops.stiffness[lane], stops.damping[lane], stops.gap[lane]),
+    )  # fmt: skip
+
+
+@kernel
+def problem_of(machine: MachineArrays, half: bool, length: float) -> Shooting:
+    """Shooting over half a turn, with sign, or over a whole one."""
+    return Shooting(machine, 0.5 if half else 1.0, -1.0 if half else 1.0, length)
+
+
+@kernel(entry=True)
+def run_lanes(
+    batch: MachineArrays, first: int, last: int, omega: Real, length: float, guess: Real,
+    guess_even: Int, work: LaneWork, reading: ReadingWork, asked: Asked, found: Found,
+    readings: Readings,
+) -> None:  # fmt: skip
+    """Lanes ``first`` to ``last`` - 1 at frequencies (F,) in the order given.
+
+    Rising frequencies are reached from below, falling ones from above. ``guess`` (F, 2 N) are
+    motions of a machine nearby, NaN where there is none; ``guess_even`` (F,) tells which of them
+    are even.
+    """
+    for lane in range(first, last):
+        if found.reason[lane, 0] == FORBIDDEN:
+            continue
+        forget(work)
+        machine = machine_of(batch, lane)
+        run_lane(
+            machine, lane, omega, length, guess, guess_even, work, reading, asked, found, readings
+        )
+
+
+@kernel
+def run_lane(
+    machine: MachineArrays, lane: int, omega: Real, length: float, guess: Real, guess_even: Int,
+    work: LaneWork, reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
+) -> None:  # fmt: skip
+    """One lane: its motion is followed from speed to speed, and flown where it jumps."""
+    even = is_even(machine)
+    half, lost, jumps = even, False, 0
+    for f in range(omega.shape[0]):
+        begun = not math.isnan(work.omega[0])
+        if not begun:
+            rising = f + 1 == omega.shape[0] or omega[f + 1] > omega[f]
+            half = even and guess_even[f] != 0
+            begun = start_from_guess(problem_of(machine, half, length), work, omega[f], guess[f])
+            if not begun:
+                half = even
+                problem = problem_of(machine, half, length)
+                begun = start_without_contact(problem, work, omega[f], rising)
+        reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
+        if not reached:
+            jumps += 1 if begun and not lost else 0
+            reached, half = settled(machine, work, omega[f], length, even)
+            lost = not reached
+        found.jumps[lane, f] = jumps
+        if reached:
+            half, stable = stability(machine, work, omega[f], length, even, half)
+            note(machine, work, lane, f, omega[f], even, half, found)
+            found.reason[lane, f] = FOUND if stable else UNSTABLE
+            turn = (1.0 if half else 2.0) * math.pi / omega[f]
+            flow = work.shooting.flow
+            read_lane(machine, flow, reading, asked, omega[f], turn, half, readings, lane, f)
+        else:
+            found.reason[lane, f] = NO_MOTION
+
+
+@kernel
+def start_from_guess(problem: Shooting, work: LaneWork, omega: float, guess: Real) -> bool:
+    """Begin the path with the stable motion that Newton reaches from a guess close by."""
+    for k in range(guess.shape[0]):
+        if math.isnan(guess[k]):
+            return False
+        work.guess[k] = guess[k]
+    return begun(problem, work, omega, FAR_FROM_GUESS)
+
+
+@kernel
+def start_without_contact(
+    problem: Shooting, work: LaneWork, omega: float, rising: bool
+) -> bool:
+    """Begin the path with a motion without contact: below a frequency that rises, or at it."""
+    machine, modes = problem.machine, work.shooting.flow.modes
+    at = contact_free_up_to(machine, modes, omega) if rising else omega
+    if not at > 0.0 or not contact_free_state(machine, work, at):
+        return False
+    return begun(problem, work, at, FAR)
+
+
+@kernel
+def begun(problem: Shooting, work: LaneWork, omega: float, far: float) -> bool:
+    """Begin the path with what Newton reaches from work.guess, if it is stable and not far."""
+    if newton(problem, work, omega) != status.OK or not work.step[0] < far:
+        return False
+    largest, _ = largest_multiplier(work)
+    if largest < 1.0:
+        restart(work, omega)
+    return largest < 1.0
+
+
+@kernel
+def settled(
+    machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool
+) -> tuple[bool, bool]:
+    """Fly to a motion from the last one of the path, or from rest: whether found, whether even."""
+    if even:
+        set_out(work, 0.0)
+        if settle(problem_of(machine, True, length), work, omega):
+            return True, True
+    set_out(work, PUSH if even else 0.0)
+    return settle(problem_of(machine, False, length), work, omega), False
+
+
+@kernel
+def set_out(work: LaneWork, push: float) -> None:
+    """work.z is the last motion of the path, pushed by a share of itself; rest without a path."""
+    for k in range(work.z.shape[0]):
+        work.z[k] = 0.0 if math.isnan(work.omega[0]) else work.here[k] * (1.0 + push)
+
+
+@kernel
+def stability(
+    machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool, half: bool
+) -> tuple[bool, bool]:
+    """Whether the motion of the path is even, and whether it is stable.
+
+    One that lost its symmetry gives way to one that leans, and one that has it again is even.
+    """
+    if even and not half:
+        take_again(work)
+        half = newton(problem_of(machine, True, length), work, omega) == status.OK
+        half = half and work.step[0] < SAME
+        if not half:
+            take_again(work)
+            newton(problem_of(machine, False, length), work, omega)
+    largest, _ = largest_multiplier(work)
+    if half and largest > 1.0 - MARGIN:
+        set_out(work, PUSH)
+        if settle(problem_of(machine, False, length), work, omega):
+            return False, True
+        take_again(work)
+        newton(problem_of(machine, True, length), work, omega)
+        largest_multiplier(work)
+    return half, largest < 1.0 - MARGIN
+
+
+@kernel
+def take_again(work: LaneWork) -> None:
+    """The last motion of the path as guess."""
+    for k in range(work.guess.shape[0]):
+        work.guess[k] = work.here[k]
+
+
+@kernel
+def note(
+    machine: MachineArrays, work: LaneWork, lane: int, f: int, omega: float, even: bool,
+    half: bool, found: Found,
+) -> None:  # fmt: skip
+    """Write down the motion of the path, with the multipliers of a whole turn."""
+    for k in range(work.z.shape[0]):
+        found.state[lane, f, k] = work.here[k]
+        mu = work.mu[k]
+        found.multiplier[lane, f, k] = mu * mu if half else mu
+    found.error[lane, f] = work.step[2]
+    found.leaning[lane, f] = 1 if even and not half else 0

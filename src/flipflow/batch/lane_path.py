@@ -1,0 +1,280 @@
+r"""One lane: the motion that a machine is brought to as its speed rises or falls slowly.
+
+Newton's method follows the motion from frequency to frequency, each guess the cubic through the
+last two motions and their tangents. A step is taken back and halved where Newton leads far away or
+where an eigenvalue of the return map has passed +1: the motion behind a fold is another one. Where
+no step is short enough the machine jumps: the exact flow runs turn after turn from the last motion,
+at the frequency ahead, until Newton finds the motion that it settles on.
+
+A machine with equal gaps, odd multiples of the frequency and no constant force is flown over half a
+turn, with sign. Where that motion loses its symmetry, the lane is flown to one that leans.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import lu_factor, lu_solve
+from flipflow.compiled.eigen import Schur, new_schur, real_schur
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.flow import prepare_drive
+from flipflow.dynamics.modes import prepare
+from flipflow.periodic.shooting import (
+    Shooting,
+    ShootingWork,
+    new_shooting_work,
+    shooting_residual,
+)
+from flipflow.periodic.turn_by_turn import next_turn
+
+NEWTON_MOST = 8
+CONVERGED = 1e-9  # last Newton step, as a share of the motion; the error left is about its square
+FAR = 0.1  # first Newton step along a path, as a share of the motion: farther lies another motion
+FAR_FROM_GUESS = 0.3  # the same from the motion of another machine
+LONGEST = 0.05  # step in frequency, as a share of it
+SHORTEST = 2e-5  # step in frequency, as a share of it, below which the motion has ended
+MARGIN = 1e-7  # distance of the largest multiplier from 1 within which stability is not told
+TURNS_BETWEEN = 64  # turns flown before Newton is tried again
+TURNS_MOST = 64 * 64
+PUSH = 1e-2  # share of the state by which an even motion is pushed out of symmetry
+SAME = 1e-6  # first Newton step, as a share of the motion, within which two motions are one
+
+FOUND, UNSTABLE, NO_MOTION, FAILED, FORBIDDEN, NOT_RUN = 0, 1, 2, 3, 4, 5
+
+
+class LaneWork(NamedTuple):
+    """Scratch of one thread for machines of N degrees of freedom; one lane after the other."""
+
+    shooting: ShootingWork
+    schur: Schur
+    z: Real  # (2 N,) the state at phase 0
+    slope: Real  # (2 N,) dz / d omega
+    guess: Real  # (2 N,)
+    here: Real  # (2 N,) the last motion of the path
+    here_slope: Real  # (2 N,)
+    behind: Real  # (2 N,) the one before
+    behind_slope: Real  # (2 N,)
+    flown: Real  # (2 N,) state after some turns
+    omega: Real  # (3,) of the last motion, of the one before (NaN: none), next step
+    r: Real  # (2 N,)
+    J: Real  # (2 N, 2 N + 1)
+    A: Real  # (2 N, 2 N)
+    pivot: Int  # (2 N,)
+    step: Real  # (3,) first and last Newton step, as shares of the motion; the last in m
+    mu: Complex  # (2 N,) eigenvalues of the return map, with the problem's sign
+
+
+def new_lane_work(machine: MachineArrays) -> LaneWork:
+    """Scratch for lanes of machines that differ from a given one in numbers alone."""
+    n = 2 * machine.direction.shape[1]
+    vectors = (np.zeros(n) for _ in range(8))
+    return LaneWork(
+        new_shooting_work(machine), new_schur(n), *vectors, omega=np.zeros(3), r=np.zeros(n),
+        J=np.zeros((n, n + 1)), A=np.zeros((n, n)), pivot=np.zeros(n, np.int64), step=np.zeros(3),
+        mu=np.zeros(n, np.complex128),
+    )  # fmt: skip
+
+
+@kernel
+def forget(work: LaneWork) -> None:
+    """Make the scratch that of another machine."""
+    flow = work.shooting.flow
+    for s in range(flow.driven_at.shape[0]):
+        flow.modes.ready[s] = 0
+        flow.driven_at[s] = math.nan
+    work.omega[0], work.omega[1] = math.nan, math.nan
+
+
+@kernel
+def is_even(machine: MachineArrays) -> bool:
+    """Whether a motion of the machine can be its own mirror image after half a turn."""
+    for j in range(machine.stops.gap.shape[0]):
+        if machine.stops.gap[j, 0] != machine.stops.gap[j, 1]:
+            return False
+    for k in range(machine.static.shape[0]):
+        if machine.static[k] != 0.0:
+            return False
+    for w in range(machine.order.shape[0]):
+        if machine.order[w] % 2 == 0:
+            return False
+    return True
+
+
+@kernel
+def newton(problem: Shooting, work: LaneWork, omega: float) -> int:
+    """The motion at omega from work.guess: work.z, its flow recorded, J, slope, Newton steps."""
+    size = work.z.shape[0]
+    n = size // 2
+    for k in range(size):
+        work.z[k] = work.guess[k]
+    for iteration in range(NEWTON_MOST):
+        code = shooting_residual(problem, work.shooting, work.z, omega, work.r, work.J)
+        if code != status.OK:
+            return code
+        large = problem.length
+        for k in range(n):
+            large = max(large, abs(work.z[k]), abs(work.z[n + k]) / omega)
+        for i in range(size):
+            for j in range(size):
+                work.A[i, j] = work.J[i, j]
+        if not lu_factor(work.A, work.pivot):
+            return status.SINGULAR
+        lu_solve(work.A, work.pivot, work.r)
+        step = 0.0
+        for k in range(n):
+            step = max(step, abs(work.r[k]), abs(work.r[n + k]) / omega)
+        work.step[2] = step
+        step /= large
+        if iteration == 0:
+            work.step[0] = step
+        work.step[1] = step
+        if step < CONVERGED:
+            for k in range(size):
+                work.slope[k] = -work.J[k, size]
+            lu_solve(work.A, work.pivot, work.slope)
+            return status.OK
+        if not step < 1e3:
+            return status.NO_CONVERGENCE
+        for k in range(size):
+            work.z[k] -= work.r[k]
+    return status.NO_CONVERGENCE
+
+
+@kernel
+def largest_multiplier(work: LaneWork) -> tuple[float, bool]:
+    """Eigenvalues of the return map into work.mu: their largest modulus, whether one is beyond +1.
+
+    Infinite where they were not found.
+    """
+    size = work.z.shape[0]
+    for i in range(size):
+        for j in range(size):
+            work.schur.T[i, j] = work.J[i, j]
+        work.schur.T[i, i] += 1.0
+    if not real_schur(work.schur, False):
+        return math.inf, False
+    largest, beyond = 0.0, 0
+    for k in range(size):
+        mu = work.schur.value[k]
+        work.mu[k] = mu
+        largest = max(largest, math.hypot(mu.real, mu.imag))
+        if mu.imag == 0.0 and mu.real > 1.0:
+            beyond += 1
+    return largest, beyond % 2 == 1
+
+
+@kernel
+def accept(work: LaneWork, omega: float) -> None:
+    """Take work.z as the next motion of the path."""
+    work.omega[1] = work.omega[0]
+    work.omega[0] = omega
+    for k in range(work.z.shape[0]):
+        work.behind[k], work.behind_slope[k] = work.here[k], work.here_slope[k]
+        work.here[k], work.here_slope[k] = work.z[k], work.slope[k]
+
+
+@kernel
+def restart(work: LaneWork, omega: float) -> None:
+    """Take work.z as the first motion of a path."""
+    work.omega[0] = math.nan
+    accept(work, omega)
+    work.omega[2] = LONGEST
+
+
+@kernel
+def predict(work: LaneWork, omega: float) -> None:
+    """work.guess at omega by Hermite's cubic through the last two motions, or by the tangent."""
+    h = omega - work.omega[0]
+    back = work.omega[0] - work.omega[1]
+    for k in range(work.z.shape[0]):
+        work.guess[k] = work.here[k] + h * work.here_slope[k]
+        if not math.isnan(back):
+            chord = (work.here[k] - work.behind[k]) / back
+            x = h / back
+            second = 2.0 * work.here_slope[k] - 3.0 * chord + work.behind_slope[k]
+            third = work.here_slope[k] - 2.0 * chord + work.behind_slope[k]
+            work.guess[k] += h * x * (second + x * third)
+
+
+@kernel
+def follow(problem: Shooting, work: LaneWork, target: float) -> bool:
+    """Follow the motion of the path to a frequency; False where it ends before, or turns back."""
+    while work.omega[0] != target:
+        omega = work.omega[0]
+        most = work.omega[2] * omega
+        ahead = target - omega
+        whole = abs(ahead) <= most
+        end = target if whole else omega + math.copysign(most, ahead)
+        predict(work, end)
+        code = newton(problem, work, end)
+        if code == status.OK and work.step[0] < FAR:
+            _, beyond = largest_multiplier(work)
+            if not beyond:
+                accept(work, end)
+                work.omega[2] = min(LONGEST, 2.0 * work.omega[2])
+                continue
+        # Two motions on both sides of a short stretch of speed tell nothing of its slope.
+        if code == status.OK and work.step[0] >= FAR:
+            work.omega[1] = math.nan
+        work.omega[2] = 0.5 * min(work.omega[2], abs(ahead) / omega)
+        if work.omega[2] < SHORTEST:
+            return False
+    return True
+
+
+@kernel
+def settle(problem: Shooting, work: LaneWork, omega: float) -> bool:
+    """Fly from work.z at omega until Newton finds the motion settled on, which restarts the path.
+
+    False where the flow settles on none that repeats after a turn of the problem.
+    """
+    size = work.z.shape[0]
+    flow = work.shooting.flow
+    flown = 0
+    while flown < TURNS_MOST:
+        for k in range(size):
+            flow.z[k] = work.z[k]
+        for _ in range(TURNS_BETWEEN):
+            if next_turn(problem, work.shooting, omega) != status.OK:
+                return False
+        flown += TURNS_BETWEEN
+        for k in range(size):
+            work.z[k] = flow.z[k]
+            work.guess[k] = flow.z[k]
+            work.flown[k] = flow.z[k]
+        if newton(problem, work, omega) == status.OK and work.step[0] < FAR:
+            largest, _ = largest_multiplier(work)
+            if largest < 1.0:
+                restart(work, omega)
+                return True
+        for k in range(size):
+            work.z[k] = work.flown[k]
+    return False
+
+
+@kernel
+def contact_free_state(machine: MachineArrays, work: LaneWork, omega: float) -> bool:
+    """The state at phase 0 of the motion with all stops open into work.guess; False without modes.
+
+    Whether it touches a stop is not asked.
+    """
+    flow = work.shooting.flow
+    n = machine.direction.shape[1]
+    if flow.modes.ready[0] == 0:
+        prepare(machine, flow.modes, 0)
+    if flow.modes.ready[0] < 0:
+        return False
+    prepare_drive(machine, flow, 0, omega)
+    for k in range(n):
+        work.guess[k] = flow.modes.static[0, k]
+        work.guess[n + k] = flow.modes.drift[0, k]
+    for w in range(machine.order.shape[0]):
+        for k in range(2 * n):
+            work.guess[k] += flow.drive[0, w, k].real
+    return True

@@ -1,0 +1,302 @@
+r"""What is read off a lane's motion: extremes, harmonics, forces, peaks of vectors, mean squares.
+
+A peak is the greatest length over the turn of the vector
+
+.. math:: (c_0 x + c_1 \dot x + c_2 \ddot x + \mathrm{Re}\, A e^{i \omega t},\;
+    \mathrm{Re}\, B e^{i \omega t}),
+
+the second part of which stands for a direction in which the machine is linear.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_search import (
+    GapMotion,
+    exponential,
+    exponentials,
+    extremes,
+    first_harmonic,
+    gap_state,
+    modulus,
+    new_gap_motion,
+    prepare_search,
+)
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.flow import Flow, segment_motion
+from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
+
+PER_RADIAN = 4.0  # samples of a vector's length per radian of its mean frequency
+REFINEMENTS = 40  # steps towards a summit; six are usual
+CLOSE = 1e-6  # share of the distance of two samples; the length itself is then right to its square
+
+
+class Asked(NamedTuple):
+    """What is read off every lane, besides what every motion has; L is 1 where all lanes agree."""
+
+    coordinate: Real  # (G, N) whose extremes and first harmonics are read
+    squared: Real  # (S, N) whose mean square rates are read
+    linear: Real  # (L, Q, 3, N) c_0, c_1, c_2 of vectors whose peaks are read
+    along: Complex  # (L, F, Q) A
+    across: Complex  # (L, F, Q) B
+
+
+class Readings(NamedTuple):
+    """What was read, lanes and frequencies first."""
+
+    low: Real  # (L, F, G) m
+    high: Real  # (L, F, G) m
+    first: Complex  # (L, F, G) m
+    force: Real  # (L, F, m) greatest force of each stop in N
+    share: Real  # (L, F, m) share of the turn in which it has a force
+    approach: Real  # (L, F) greatest speed at a gap with which a contact begins, m/s
+    square: Real  # (L, F, S) mean square of the rates, m^2/s^2
+    peak: Real  # (L, F, Q)
+
+
+class ReadingWork(NamedTuple):
+    """Scratch: sums of exponentials."""
+
+    coordinate: GapMotion  # G of them
+    stop: GapMotion  # m
+    squared: GapMotion  # S
+    vector: GapMotion  # its two parts
+
+
+def new_reading_work(flow: Flow, machine: MachineArrays, asked: Asked) -> ReadingWork:
+    """Scratch for what is asked of machines like a given one."""
+    rates = np.zeros(flow.modes.rate.shape[1] + machine.order.shape[0] + 1, np.complex128)
+    sizes = asked.coordinate.shape[0], machine.direction.shape[0], asked.squared.shape[0], 2
+    return ReadingWork(*(new_gap_motion(size, rates) for size in sizes))
+
+
+def new_readings(lanes: int, speeds: int, machine: MachineArrays, asked: Asked) -> Readings:
+    """Room for what is asked, NaN until it is read."""
+    shape = lanes, speeds
+    coordinates, stops = (*shape, asked.coordinate.shape[0]), (*shape, machine.direction.shape[0])
+    return Readings(
+        low=np.full(coordinates, np.nan),
+        high=np.full(coordinates, np.nan),
+        first=np.full(coordinates, np.nan, np.complex128),
+        force=np.full(stops, np.nan),
+        share=np.full(stops, np.nan),
+        approach=np.full(shape, np.nan),
+        square=np.full((*shape, asked.squared.shape[0]), np.nan),
+        peak=np.full((*shape, asked.linear.shape[1]), np.nan),
+    )
+
+
+@kernel
+def read_lane(
+    machine: MachineArrays, flow: Flow, work: ReadingWork, asked: Asked, omega: float, turn: float,
+    half: bool, out: Readings, lane: int, f: int,
+) -> None:  # fmt: skip
+    """All readings of the motion recorded over ``turn`` seconds, half a turn of an even one."""
+    read_coordinates(machine, flow, work.coordinate, asked.coordinate, omega, turn, half, out, lane, f)
+    read_stops(machine, flow, work.stop, omega, turn, out, lane, f)
+    if asked.squared.shape[0] > 0:
+        read_squares(machine, flow, work.squared, asked.squared, omega, turn, out, lane, f)
+    which = lane if asked.linear.shape[0] > 1 else 0
+    for q in range(asked.linear.shape[1]):
+        largest = 0.0
+        for e in range(flow.segments[0]):
+            along, across = asked.along[which, f, q], asked.across[which, f, q]
+            linear = asked.linear[which, q]
+            count = set_vector(machine, flow, work.vector, e, omega, linear, along, across)
+            largest = max(largest, longest(work.vector, count, flow.length[e]))
+        out.peak[lane, f, q] = largest
+
+
+@kernel
+def read_coordinates(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, coordinate: Real, omega: float,
+    turn: float, half: bool, out: Readings, lane: int, f: int,
+) -> None:  # fmt: skip
+    """Extremes and first harmonics."""
+    for g in range(coordinate.shape[0]):
+        out.low[lane, f, g], out.high[lane, f, g] = math.inf, -math.inf
+        out.first[lane, f, g] = 0.0
+    for e in range(flow.segments[0]):
+        count = segment_motion(machine, flow, e, omega, coordinate, motion)
+        prepare_search(motion, count)
+        for g in range(coordinate.shape[0]):
+            low, high = extremes(motion, count, g, flow.length[e])
+            out.low[lane, f, g] = min(out.low[lane, f, g], low)
+            out.high[lane, f, g] = max(out.high[lane, f, g], high)
+            part = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega)
+            out.first[lane, f, g] += 2.0 * part / turn
+    for g in range(coordinate.shape[0] if half else 0):
+        out.high[lane, f, g] = max(out.high[lane, f, g], -out.low[lane, f, g])
+        out.low[lane, f, g] = -out.high[lane, f, g]
+
+
+@kernel
+def read_stops(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, omega: float, turn: float,
+    out: Readings, lane: int, f: int,
+) -> None:  # fmt: skip
+    """Greatest force and time of contact of each stop, and the speed at which one is met."""
+    for j in range(machine.direction.shape[0]):
+        out.force[lane, f, j], out.share[lane, f, j] = 0.0, 0.0
+    out.approach[lane, f] = 0.0
+    for e in range(flow.segments[0]):
+        spring = flow.spring[e]
+        if spring >= 0 and flow.regimes[e, spring] == 0:
+            count = segment_motion(machine, flow, e, omega, machine.direction, motion)
+            exponentials(motion, count, flow.length[e])
+            _, v = gap_state(motion, count, spring)
+            out.approach[lane, f] = max(out.approach[lane, f], abs(v))
+        count = 0
+        for j in range(machine.direction.shape[0]):
+            if kind(machine.stops, j, flow.regimes[e, j]) != 0:
+                if count == 0:
+                    count = segment_motion(machine, flow, e, omega, machine.direction, motion)
+                out.share[lane, f, j] += flow.length[e] / turn
+                peak = force_peak(machine, flow, motion, count, e, j)
+                out.force[lane, f, j] = max(out.force[lane, f, j], peak)
+
+
+@kernel
+def force_peak(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, count: int, e: int, j: int
+) -> float:
+    """Greatest force of stop j during segment e; its row becomes the force."""
+    stops, regime = machine.stops, flow.regimes[e, j]
+    k = stiffness_share(stops, j, regime) * stops.stiffness[j]
+    c = damping_share(stops, j, regime) * stops.damping[j]
+    rest = motion.offset[j] - signed_gap(stops, j, regime)
+    motion.offset[j] = k * rest + c * motion.drift[j]
+    motion.drift[j] *= k
+    for i in range(count):
+        motion.amplitude[j, i] *= k + c * motion.rate[i]
+    prepare_search(motion, count)
+    low, high = extremes(motion, count, j, flow.length[e])
+    return max(-low, high)
+
+
+@kernel
+def read_squares(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, coordinate: Real, omega: float,
+    turn: float, out: Readings, lane: int, f: int,
+) -> None:  # fmt: skip
+    """Mean squares of rates, as integrals of products of exponentials."""
+    for g in range(coordinate.shape[0]):
+        out.square[lane, f, g] = 0.0
+    for e in range(flow.segments[0]):
+        count = segment_motion(machine, flow, e, omega, coordinate, motion)
+        for g in range(coordinate.shape[0]):
+            total = motion.drift[g] * motion.drift[g] * flow.length[e]
+            for i in range(count):
+                a, p = motion.amplitude[g, i] * motion.rate[i], motion.rate[i]
+                total += 2.0 * motion.drift[g] * (a * integral(p, flow.length[e])).real
+                for j in range(count):
+                    b, q = motion.amplitude[g, j] * motion.rate[j], motion.rate[j]
+                    total += 0.5 * (a * b * integral(p + q, flow.length[e])).real
+                    b, q = b.conjugate(), q.conjugate()
+                    total += 0.5 * (a * b * integral(p + q, flow.length[e])).real
+            out.square[lane, f, g] += total / turn
+
+
+@kernel(inline=True)
+def integral(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt."""
+    x = rate * length
+    if modulus(x) < 1e-3:
+        return length * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x / 120.0))))
+    return (exponential(x) - 1.0) / rate
+
+
+@kernel
+def set_vector(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, e: int, omega: float, linear: Real,
+    along: complex, across: complex,
+) -> int:  # fmt: skip
+    """Both parts of a vector during segment e as sums of exponentials; the number of terms."""
+    modes, slot, n = flow.modes, flow.slot[e], machine.direction.shape[1]
+    motion.offset[0], motion.drift[0], motion.offset[1], motion.drift[1] = 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        rest, drift = flow.rest[e, k], modes.drift[slot, k]
+        motion.offset[0] += linear[0, k] * rest + linear[1, k] * drift
+        motion.drift[0] += linear[0, k] * drift
+    count = modes.mode_count[slot]
+    for i in range(count):
+        rate, total = modes.rate[slot, i], 0j
+        for k in range(n):
+            total += (linear[0, k] + rate * (linear[1, k] + rate * linear[2, k])) * modes.right[
+                slot, k, i
+            ]
+        motion.rate[i], motion.amplitude[1, i] = rate, 0.0
+        motion.amplitude[0, i] = modes.weight[slot, i] * flow.q[e, i] * total
+    for w in range(machine.order.shape[0]):
+        rate, total = 1j * (machine.order[w] * omega), 0j
+        for k in range(n):
+            factor = linear[0, k] + rate * (linear[1, k] + rate * linear[2, k])
+            total += factor * flow.drive[slot, w, k]
+        motion.rate[count], motion.amplitude[1, count] = rate, 0.0
+        motion.amplitude[0, count] = total * exponential(rate * flow.start[e])
+        count += 1
+    turn = exponential(1j * (omega * flow.start[e]))
+    motion.rate[count] = 1j * omega
+    motion.amplitude[0, count], motion.amplitude[1, count] = along * turn, across * turn
+    return count + 1
+
+
+@kernel
+def length_at(motion: GapMotion, count: int, t: float) -> tuple[float, float]:
+    """Half the square of the vector's length at a time, and its rate."""
+    exponentials(motion, count, t)
+    along, along_rate = gap_state(motion, count, 0)
+    across, across_rate = gap_state(motion, count, 1)
+    half_square = 0.5 * (along * along + across * across)
+    return half_square, along * along_rate + across * across_rate
+
+
+@kernel
+def longest(motion: GapMotion, count: int, duration: float) -> float:
+    """Greatest length of the vector over [0, duration], of all samples and the summit beside."""
+    weight, second = 0.0, 0.0
+    for i in range(count):
+        size = modulus(motion.amplitude[0, i]) + modulus(motion.amplitude[1, i])
+        weight += size
+        second += size * (motion.rate[i].real ** 2 + motion.rate[i].imag ** 2)
+    samples = 4
+    if weight > 0.0:
+        samples += int(PER_RADIAN * math.sqrt(second / weight) * duration)
+    best, rate, place = -1.0, 0.0, 0
+    for k in range(samples + 1):
+        value, slope = length_at(motion, count, duration * k / samples)
+        if value > best:
+            best, rate, place = value, slope, k
+    other = place + 1 if rate > 0.0 else place - 1
+    if 0 <= other <= samples:
+        here, there = duration * place / samples, duration * other / samples
+        best = max(best, summit(motion, count, here, there, rate))
+    return math.sqrt(2.0 * best)
+
+
+@kernel
+def summit(motion: GapMotion, count: int, a: float, b: float, rate_a: float) -> float:
+    """The half square where its rate is zero between two times, by false position (Illinois)."""
+    value, rate_b = length_at(motion, count, b)
+    if not rate_a * rate_b < 0.0:
+        return value
+    width = abs(b - a)
+    for _ in range(REFINEMENTS):
+        t = (a * rate_b - b * rate_a) / (rate_b - rate_a)
+        value, rate = length_at(motion, count, t)
+        if rate == 0.0 or abs(b - a) < CLOSE * width:
+            break
+        if rate * rate_b < 0.0:
+            a, rate_a = b, rate_b
+        else:
+            rate_a *= 0.5
+        if abs(t - b) < CLOSE * width:
+            break
+        b, rate_b = t, rate
+    return value

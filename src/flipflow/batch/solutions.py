@@ -1,0 +1,134 @@
+"""Periodic motions of many machines at many frequencies, on threads.
+
+Every lane is solved by itself: what it finds depends on its machine, on the frequencies, and on a
+motion of a machine nearby that all lanes share, and neither on other lanes nor on the threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+
+import numpy as np
+
+from flipflow.batch.lane_kernels import Found, new_found, run_lanes
+from flipflow.batch.lane_path import FOUND, NOT_RUN, new_lane_work
+from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
+from flipflow.batch.variants import Batch, stacked
+from flipflow.compiled.arrays import Int, Real
+from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.model.system import MechanicalSystem
+from flipflow.periodic.solver import characteristic_length
+
+CHUNK = 64  # lanes that one task of a thread runs
+
+
+@dataclass(frozen=True, eq=False)
+class Nearby:
+    """Motions (F, 2 N) of a machine nearby, NaN where there is none, and which are even, (F,)."""
+
+    state: Real
+    even: Int
+
+    @classmethod
+    def nothing(cls, speeds: int, degrees: int) -> Nearby:
+        """No motion at any of the frequencies."""
+        return cls(np.full((speeds, 2 * degrees), np.nan), np.zeros(speeds, np.int64))
+
+    @classmethod
+    def of(cls, system: MechanicalSystem, omega: Real) -> Nearby:
+        """Motions of a machine up to its first jump along the frequencies, (F,) in their order."""
+        machine = stacked([machine_arrays(system)])
+        asked = nothing_asked(system.size, omega.size)
+        none = cls.nothing(omega.size, system.size)
+        found, _ = solve_lanes(Batch(np.zeros(1, np.int64), system, machine), omega, asked, none)
+        good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
+        even = np.where(system.symmetric & (found.leaning[0] == 0), 1, 0)
+        return cls(np.where(good[:, None], found.state[0], np.nan), even)
+
+
+def nothing_asked(degrees: int, speeds: int) -> Asked:
+    """Nothing but what every motion has."""
+    return Asked(
+        coordinate=np.zeros((0, degrees)),
+        squared=np.zeros((0, degrees)),
+        linear=np.zeros((1, 0, 3, degrees)),
+        along=np.zeros((1, speeds, 0), np.complex128),
+        across=np.zeros((1, speeds, 0), np.complex128),
+    )
+
+
+def solve_lanes(
+    batch: Batch,
+    omega: Real,
+    asked: Asked,
+    nearby: Nearby,
+    threads: int = 1,
+    tell: Callable[[float], None] | None = None,
+) -> tuple[Found, Readings]:
+    """The motions of a batch of machines at frequencies in the order given, in rad/s.
+
+    Rising frequencies are reached from below and falling ones from above, as a machine reaches them
+    that is brought up or down slowly; where it jumps, so does the lane.
+
+    Parameters
+    ----------
+    batch
+        L machines.
+    omega
+        Frequencies, (F,), rising or falling.
+    asked
+        What is read off.
+    nearby
+        Motions of a machine like these, as first guesses.
+    threads
+        Threads among which chunks of lanes are shared.
+    tell
+        Called with the share of lanes done; what it raises ends the work.
+    """
+    lanes, speeds = batch.rows.size, omega.size
+    nominal = _machine(batch.arrays, 0)
+    found = new_found(lanes, speeds, batch.system.size, NOT_RUN)
+    readings = new_readings(lanes, speeds, nominal, asked)
+    length = characteristic_length(batch.system, nominal)
+    omega, guess, even = (np.array(one) for one in (omega, nearby.state, nearby.even))
+
+    def chunk(begin: int) -> int:
+        work = new_lane_work(nominal)
+        reading = new_reading_work(work.shooting.flow, nominal, asked)
+        end = min(begin + CHUNK, lanes)
+        run_lanes(
+            batch.arrays, begin, end, omega, length, guess, even, work, reading, asked, found,
+            readings,
+        )  # fmt: skip
+        return end - begin
+
+    done = 0
+    for lanes_done in _each(chunk, range(0, lanes, CHUNK), threads):
+        done += lanes_done
+        if tell is not None:
+            tell(done / lanes)
+    return found, readings
+
+
+def _each(work: Callable[[int], int], items: Sequence[int], threads: int):  # noqa: ANN202
+    if threads == 1 or len(items) == 1:
+        yield from map(work, items)
+        return
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for future in as_completed([pool.submit(work, item) for item in items]):
+            yield future.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _machine(arrays: MachineArrays, lane: int) -> MachineArrays:
+    """One machine of many, with arrays of its own."""
+    shared = {"power", "wave", "order", "stops"}
+    own = {name: getattr(arrays, name)[lane].copy() for name in arrays._fields if name not in shared}
+    stops = arrays.stops
+    gaps = {name: getattr(stops, name)[lane].copy() for name in ("stiffness", "damping", "gap")}
+    return arrays._replace(**own, stops=stops._replace(**gaps))
