@@ -64,7 +64,7 @@ def new_found(lanes: int, speeds: int, degrees: int, reason: int) -> Found:
 
 @kernel(inline=True)
 def machine_of(batch: MachineArrays, lane: int) -> MachineArrays:
-    """One machine of many: their arrays with a leading axis, but for laws and excitations' kinds."""
+    """One machine of many: a slice of each array, but for the kinds of laws and excitations."""
     stops = batch.stops
     return MachineArrays(
         batch.stiffness[lane], batch.damping[lane], batch.direction[lane], batch.reach[lane],
@@ -127,7 +127,7 @@ def run_lane(
         found.jumps[lane, f] = jumps
         if reached:
             half, stable = stability(machine, work, omega[f], length, even, half)
-            note(machine, work, lane, f, omega[f], even, half, found)
+            note(work, lane, f, even and not half, half, found)
             found.reason[lane, f] = FOUND if stable else UNSTABLE
             turn = (1.0 if half else 2.0) * math.pi / omega[f]
             flow = work.shooting.flow
@@ -147,9 +147,7 @@ def start_from_guess(problem: Shooting, work: LaneWork, omega: float, guess: Rea
 
 
 @kernel
-def start_without_contact(
-    problem: Shooting, work: LaneWork, omega: float, rising: bool
-) -> bool:
+def start_without_contact(problem: Shooting, work: LaneWork, omega: float, rising: bool) -> bool:
     """Begin the path with a motion without contact: below a frequency that rises, or at it."""
     machine, modes = problem.machine, work.shooting.flow.modes
     at = contact_free_up_to(machine, modes, omega) if rising else omega
@@ -223,14 +221,11 @@ def take_again(work: LaneWork) -> None:
 
 
 @kernel
-def note(
-    machine: MachineArrays, work: LaneWork, lane: int, f: int, omega: float, even: bool,
-    half: bool, found: Found,
-) -> None:  # fmt: skip
+def note(work: LaneWork, lane: int, f: int, leaning: bool, half: bool, found: Found) -> None:
     """Write down the motion of the path, with the multipliers of a whole turn."""
     for k in range(work.z.shape[0]):
         found.state[lane, f, k] = work.here[k]
         mu = work.mu[k]
         found.multiplier[lane, f, k] = mu * mu if half else mu
     found.error[lane, f] = work.step[2]
-    found.leaning[lane, f] = 1 if even and not half else 0
+    found.leaning[lane, f] = 1 if leaning else 0

@@ -35,6 +35,7 @@ from flipflow.periodic.turn_by_turn import next_turn
 
 NEWTON_MOST = 8
 CONVERGED = 1e-9  # last Newton step, as a share of the motion; the error left is about its square
+DIVERGED = 1e3  # Newton step, as a share of the motion, from which none follows
 FAR = 0.1  # first Newton step along a path, as a share of the motion: farther lies another motion
 FAR_FROM_GUESS = 0.3  # the same from the motion of another machine
 LONGEST = 0.05  # step in frequency, as a share of it
@@ -73,12 +74,18 @@ class LaneWork(NamedTuple):
 def new_lane_work(machine: MachineArrays) -> LaneWork:
     """Scratch for lanes of machines that differ from a given one in numbers alone."""
     n = 2 * machine.direction.shape[1]
-    vectors = (np.zeros(n) for _ in range(8))
+    vectors = ("z", "slope", "guess", "here", "here_slope", "behind", "behind_slope", "flown", "r")
     return LaneWork(
-        new_shooting_work(machine), new_schur(n), *vectors, omega=np.zeros(3), r=np.zeros(n),
-        J=np.zeros((n, n + 1)), A=np.zeros((n, n)), pivot=np.zeros(n, np.int64), step=np.zeros(3),
+        shooting=new_shooting_work(machine),
+        schur=new_schur(n),
+        omega=np.zeros(3),
+        J=np.zeros((n, n + 1)),
+        A=np.zeros((n, n)),
+        pivot=np.zeros(n, np.int64),
+        step=np.zeros(3),
         mu=np.zeros(n, np.complex128),
-    )  # fmt: skip
+        **{name: np.zeros(n) for name in vectors},
+    )
 
 
 @kernel
@@ -101,7 +108,8 @@ def is_even(machine: MachineArrays) -> bool:
         if machine.static[k] != 0.0:
             return False
     for w in range(machine.order.shape[0]):
-        if machine.order[w] % 2 == 0:
+        even = machine.order[w] % 2 == 0
+        if even:
             return False
     return True
 
@@ -110,40 +118,46 @@ def is_even(machine: MachineArrays) -> bool:
 def newton(problem: Shooting, work: LaneWork, omega: float) -> int:
     """The motion at omega from work.guess: work.z, its flow recorded, J, slope, Newton steps."""
     size = work.z.shape[0]
-    n = size // 2
     for k in range(size):
         work.z[k] = work.guess[k]
     for iteration in range(NEWTON_MOST):
-        code = shooting_residual(problem, work.shooting, work.z, omega, work.r, work.J)
+        code = newton_step(problem, work, omega)
         if code != status.OK:
             return code
-        large = problem.length
-        for k in range(n):
-            large = max(large, abs(work.z[k]), abs(work.z[n + k]) / omega)
-        for i in range(size):
-            for j in range(size):
-                work.A[i, j] = work.J[i, j]
-        if not lu_factor(work.A, work.pivot):
-            return status.SINGULAR
-        lu_solve(work.A, work.pivot, work.r)
-        step = 0.0
-        for k in range(n):
-            step = max(step, abs(work.r[k]), abs(work.r[n + k]) / omega)
-        work.step[2] = step
-        step /= large
         if iteration == 0:
-            work.step[0] = step
-        work.step[1] = step
-        if step < CONVERGED:
+            work.step[0] = work.step[1]
+        if work.step[1] < CONVERGED:
             for k in range(size):
                 work.slope[k] = -work.J[k, size]
             lu_solve(work.A, work.pivot, work.slope)
             return status.OK
-        if not step < 1e3:
+        if not work.step[1] < DIVERGED:
             return status.NO_CONVERGENCE
         for k in range(size):
             work.z[k] -= work.r[k]
     return status.NO_CONVERGENCE
+
+
+@kernel
+def newton_step(problem: Shooting, work: LaneWork, omega: float) -> int:
+    """The step that Newton takes back from work.z, into work.r; its length."""
+    size = work.z.shape[0]
+    n = size // 2
+    code = shooting_residual(problem, work.shooting, work.z, omega, work.r, work.J)
+    if code != status.OK:
+        return code
+    for i in range(size):
+        for j in range(size):
+            work.A[i, j] = work.J[i, j]
+    if not lu_factor(work.A, work.pivot):
+        return status.SINGULAR
+    lu_solve(work.A, work.pivot, work.r)
+    large, step = problem.length, 0.0
+    for k in range(n):
+        large = max(large, abs(work.z[k]), abs(work.z[n + k]) / omega)
+        step = max(step, abs(work.r[k]), abs(work.r[n + k]) / omega)
+    work.step[1], work.step[2] = step / large, step
+    return code
 
 
 @kernel
@@ -219,9 +233,8 @@ def follow(problem: Shooting, work: LaneWork, target: float) -> bool:
                 accept(work, end)
                 work.omega[2] = min(LONGEST, 2.0 * work.omega[2])
                 continue
-        # Two motions on both sides of a short stretch of speed tell nothing of its slope.
-        if code == status.OK and work.step[0] >= FAR:
-            work.omega[1] = math.nan
+        # Beyond a kink, as where contact begins, the cubic leads farther away than the tangent.
+        work.omega[1] = math.nan
         work.omega[2] = 0.5 * min(work.omega[2], abs(ahead) / omega)
         if work.omega[2] < SHORTEST:
             return False

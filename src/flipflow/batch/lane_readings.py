@@ -34,6 +34,7 @@ from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_sha
 
 PER_RADIAN = 4.0  # samples of a vector's length per radian of its mean frequency
 REFINEMENTS = 40  # steps towards a summit; six are usual
+NEAR = 0.9  # share of the greatest half square below which a sample has no higher summit beside it
 CLOSE = 1e-6  # share of the distance of two samples; the length itself is then right to its square
 
 
@@ -98,7 +99,9 @@ def read_lane(
     half: bool, out: Readings, lane: int, f: int,
 ) -> None:  # fmt: skip
     """All readings of the motion recorded over ``turn`` seconds, half a turn of an even one."""
-    read_coordinates(machine, flow, work.coordinate, asked.coordinate, omega, turn, half, out, lane, f)
+    read_coordinates(
+        machine, flow, work.coordinate, asked.coordinate, omega, turn, half, out, lane, f
+    )
     read_stops(machine, flow, work.stop, omega, turn, out, lane, f)
     if asked.squared.shape[0] > 0:
         read_squares(machine, flow, work.squared, asked.squared, omega, turn, out, lane, f)
@@ -244,7 +247,7 @@ def set_vector(
     turn = exponential(1j * (omega * flow.start[e]))
     motion.rate[count] = 1j * omega
     motion.amplitude[0, count], motion.amplitude[1, count] = along * turn, across * turn
-    return count + 1
+    return int(count) + 1
 
 
 @kernel
@@ -268,25 +271,24 @@ def longest(motion: GapMotion, count: int, duration: float) -> float:
     samples = 4
     if weight > 0.0:
         samples += int(PER_RADIAN * math.sqrt(second / weight) * duration)
-    best, rate, place = -1.0, 0.0, 0
+    best, before, rate_before = 0.0, 0.0, 0.0
     for k in range(samples + 1):
-        value, slope = length_at(motion, count, duration * k / samples)
-        if value > best:
-            best, rate, place = value, slope, k
-    other = place + 1 if rate > 0.0 else place - 1
-    if 0 <= other <= samples:
-        here, there = duration * place / samples, duration * other / samples
-        best = max(best, summit(motion, count, here, there, rate))
+        t = duration * k / samples
+        value, rate = length_at(motion, count, t)
+        if rate_before > 0.0 and rate < 0.0 and max(value, before) > NEAR * best:
+            top = summit(motion, count, t - duration / samples, t, rate_before, rate)
+            best = max(best, top)
+        best = max(best, value)
+        before, rate_before = value, rate
     return math.sqrt(2.0 * best)
 
 
 @kernel
-def summit(motion: GapMotion, count: int, a: float, b: float, rate_a: float) -> float:
+def summit(
+    motion: GapMotion, count: int, a: float, b: float, rate_a: float, rate_b: float
+) -> float:
     """The half square where its rate is zero between two times, by false position (Illinois)."""
-    value, rate_b = length_at(motion, count, b)
-    if not rate_a * rate_b < 0.0:
-        return value
-    width = abs(b - a)
+    value, width = 0.0, b - a
     for _ in range(REFINEMENTS):
         t = (a * rate_b - b * rate_a) / (rate_b - rate_a)
         value, rate = length_at(motion, count, t)

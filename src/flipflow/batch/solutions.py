@@ -6,7 +6,7 @@ motion of a machine nearby that all lanes share, and neither on other lanes nor 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 
@@ -32,21 +32,20 @@ class Nearby:
     state: Real
     even: Int
 
-    @classmethod
-    def nothing(cls, speeds: int, degrees: int) -> Nearby:
-        """No motion at any of the frequencies."""
-        return cls(np.full((speeds, 2 * degrees), np.nan), np.zeros(speeds, np.int64))
 
-    @classmethod
-    def of(cls, system: MechanicalSystem, omega: Real) -> Nearby:
-        """Motions of a machine up to its first jump along the frequencies, (F,) in their order."""
-        machine = stacked([machine_arrays(system)])
-        asked = nothing_asked(system.size, omega.size)
-        none = cls.nothing(omega.size, system.size)
-        found, _ = solve_lanes(Batch(np.zeros(1, np.int64), system, machine), omega, asked, none)
-        good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
-        even = np.where(system.symmetric & (found.leaning[0] == 0), 1, 0)
-        return cls(np.where(good[:, None], found.state[0], np.nan), even)
+def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Real) -> Nearby:
+    """Motions of a machine up to its first jump along the frequencies, (F,) in their order.
+
+    None where its coordinates and stops are other ones than those of ``like``.
+    """
+    nothing = Nearby(np.full((omega.size, 2 * like.size), np.nan), np.zeros(omega.size, np.int64))
+    if (nominal.size, len(nominal.springs)) != (like.size, len(like.springs)):
+        return nothing
+    alone = Batch(np.zeros(1, np.int64), nominal, stacked([machine_arrays(nominal)]))
+    found, _ = solve_lanes(alone, omega, nothing_asked(nominal.size, omega.size), nothing)
+    good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
+    even = np.where(nominal.symmetric & (found.leaning[0] == 0), 1, 0)
+    return Nearby(np.where(good[:, None], found.state[0], np.nan), even)
 
 
 def nothing_asked(degrees: int, speeds: int) -> Asked:
@@ -93,15 +92,16 @@ def solve_lanes(
     found = new_found(lanes, speeds, batch.system.size, NOT_RUN)
     readings = new_readings(lanes, speeds, nominal, asked)
     length = characteristic_length(batch.system, nominal)
-    omega, guess, even = (np.array(one) for one in (omega, nearby.state, nearby.even))
+    # A read-only array is another type to the compiler, and would be compiled for anew.
+    speeds_in_order, guess, even = np.array(omega), np.array(nearby.state), np.array(nearby.even)
 
     def chunk(begin: int) -> int:
         work = new_lane_work(nominal)
         reading = new_reading_work(work.shooting.flow, nominal, asked)
         end = min(begin + CHUNK, lanes)
         run_lanes(
-            batch.arrays, begin, end, omega, length, guess, even, work, reading, asked, found,
-            readings,
+            batch.arrays, begin, end, speeds_in_order, length, guess, even, work, reading, asked,
+            found, readings,
         )  # fmt: skip
         return end - begin
 
@@ -113,7 +113,8 @@ def solve_lanes(
     return found, readings
 
 
-def _each(work: Callable[[int], int], items: Sequence[int], threads: int):  # noqa: ANN202
+def _each(work: Callable[[int], int], items: Sequence[int], threads: int) -> Iterator[int]:
+    """What the work on each item returns, as each ends."""
     if threads == 1 or len(items) == 1:
         yield from map(work, items)
         return
@@ -128,7 +129,9 @@ def _each(work: Callable[[int], int], items: Sequence[int], threads: int):  # no
 def _machine(arrays: MachineArrays, lane: int) -> MachineArrays:
     """One machine of many, with arrays of its own."""
     shared = {"power", "wave", "order", "stops"}
-    own = {name: getattr(arrays, name)[lane].copy() for name in arrays._fields if name not in shared}
+    own = {
+        name: getattr(arrays, name)[lane].copy() for name in arrays._fields if name not in shared
+    }
     stops = arrays.stops
     gaps = {name: getattr(stops, name)[lane].copy() for name in ("stiffness", "damping", "gap")}
     return arrays._replace(**own, stops=stops._replace(**gaps))

@@ -67,9 +67,11 @@ def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
     for name, column in columns.items():
         if column.dtype.kind == "f" and name in FIELD and isinstance(machine, FlipFlowScreen):
             allowed &= FIELD[name].allows(column)
-    at_once = _sums(machine, columns, allowed)
-    if at_once is not None:
-        return [at_once], allowed
+    # What a user's own class refuses only its ``system()`` tells.
+    if isinstance(machine, (FlipFlowScreen, MechanicalSystem)):
+        at_once = _sums(machine, columns, allowed)
+        if at_once is not None:
+            return [at_once], allowed
     return _one_by_one(machine, columns, allowed), allowed
 
 
@@ -115,12 +117,9 @@ def _sums(machine: Machine, columns: Columns, allowed: Bool) -> Batch | None:
     rows = np.flatnonzero(allowed)
     own = {name: value_of(machine, name) for name in columns}
     numbers = [isinstance(value, float) and math.isfinite(value) for value in own.values()]
-    if not all(numbers) or any(column.dtype.kind != "f" for column in columns.values()):
-        return None
-    if rows.size <= TRIED + len(columns):
-        return None
+    words = any(column.dtype.kind != "f" for column in columns.values())
     middle = _flat(machine)
-    if middle is None:
+    if words or not all(numbers) or rows.size <= TRIED + len(columns) or middle is None:
         return None
     values, shapes, system = middle
     total = np.repeat(values[None], rows.size, axis=0)
@@ -141,7 +140,9 @@ def _sums(machine: Machine, columns: Columns, allowed: Bool) -> Batch | None:
 def _row(machine: Machine, columns: Columns, row: int) -> Machine:
     """The variant of one row."""
     given = {name: column[row] for name, column in columns.items()}
-    plain = {name: one.item() if isinstance(one, np.generic) else one for name, one in given.items()}
+    plain = {
+        name: one.item() if isinstance(one, np.generic) else one for name, one in given.items()
+    }
     return with_values(machine, plain)
 
 
@@ -175,8 +176,10 @@ def _same(one: Real, other: Real, shapes: Shapes) -> bool:
         return False
     for a, b in zip(_split(one, shapes), _split(other, shapes), strict=True):
         finite = np.isfinite(b)
-        size = np.abs(b[finite]).max(initial=0.0)
-        if (a[~finite] != b[~finite]).any() or (np.abs(a - b)[finite] > EXACT * size).any():
+        off = np.abs(a[finite] - b[finite])
+        if (a[~finite] != b[~finite]).any() or (
+            off > EXACT * np.abs(b[finite]).max(initial=0.0)
+        ).any():
             return False
     return True
 

@@ -69,7 +69,7 @@ def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineA
 
 
 def system_parts(system: MechanicalSystem) -> dict[str, Real]:
-    """Arrays of a system, by the names that :class:`~flipflow.dynamics.machine_series.MachineSeries` has."""
+    """Arrays of a system, by the names that a machine's series has."""
     springs = system.springs
     force = np.array([vector for one in system.excitations for _, vector in one.terms])
     m, n = len(springs), system.size

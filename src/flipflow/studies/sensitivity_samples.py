@@ -23,6 +23,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response
+from flipflow.studies.lane_values import lane_values, on_lanes
 from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working, number_or_nan
 
 Real = NDArray[np.float64]
@@ -88,6 +89,13 @@ def motion_values(
 
     Chunks of samples go to ``threads`` threads; what ``tell`` raises ends the work.
     """
+    if on_lanes(question.machine, question.quantity):
+        asked = (question.quantity,)
+        found, _ = lane_values(
+            question.machine, columns, asked, question.omega, question.span, question.branch,
+            threads, tell,
+        )  # fmt: skip
+        return found[question.quantity.name]
     names = tuple(columns)
     rows = [tuple(map(_plain, row)) for row in zip(*columns.values(), strict=True)]
     values = np.full((len(rows), question.omega.size), np.nan)

@@ -1,0 +1,92 @@
+"""Many machines in one call: solutions a second, with what bounds them.
+
+    python benchmarks/lanes.py [--machines 2000] [--speeds 100] [--threads 2] [--seed N]
+
+Counted are lanes with contact only; each has its multipliers and its last Newton step, amplitude,
+stop force and share of contact. Beside them in the same run: a loop of the package's own single
+solutions, and scipy's event-located integration with Newton around it.
+"""
+
+import argparse
+import statistics
+import time
+
+import numpy as np
+from scipy_flow import carried
+
+import flipflow as ff
+from flipflow.batch.lane_path import FOUND
+from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
+from flipflow.batch.variants import batches
+
+FIELDS = (
+    "main_mass", "floating_mass", "shear_stiffness", "shear_damping", "stop_stiffness",
+    "stop_damping", "clearance", "eccentric_moment", "isolation_stiffness", "isolation_damping",
+)  # fmt: skip
+ROUNDS = 5
+TRIED, TURNS = 3, 60  # machines that scipy settles, and for how long
+
+
+def drawn(machine, rows, seed):
+    """Ten fields of a machine, each within 10 %."""
+    rng = np.random.default_rng(seed)
+    return {name: getattr(machine, name) * rng.uniform(0.9, 1.1, rows) for name in FIELDS}
+
+
+def rate(batch, machine, omega, threads):
+    """Solutions with contact a second of processor and of wall, medians of some rounds."""
+    asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
+    nearby = nearby_motions(machine.system(), machine.system(), omega)
+    walls, processors = [], []
+    for _ in range(ROUNDS):
+        wall, processor = time.perf_counter(), time.process_time()
+        found, read = solve_lanes(batch, omega, asked, nearby, threads)
+        walls.append(time.perf_counter() - wall)
+        processors.append(time.process_time() - processor)
+    touching = int(((found.reason == FOUND) & (read.share[..., 0] > 0.0)).sum())
+    failed = int((found.reason != FOUND).sum())
+    return touching / statistics.median(processors), touching / statistics.median(walls), failed
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--machines", type=int, default=2000)
+    parser.add_argument("--speeds", type=int, default=100)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=int(time.time()))
+    given = parser.parse_args()
+    machine = ff.load("ffs0827")
+    columns = drawn(machine, given.machines, given.seed)
+    print(f"seed {given.seed}, {given.machines} machines within 10 %")
+    clock = time.process_time()
+    (batch,), _ = batches(machine, columns)
+    spent = time.process_time() - clock
+    print(f"assembly {1e6 * spent / given.machines:.1f} us a machine")
+    along, single = np.linspace(90.0, 200.0, given.speeds), np.array([120.0])
+    print(f"{'':34s}{'a second of':>14s}{'a second,':>14s}{'not found':>12s}")
+    print(f"{'':34s}{'processor':>14s}{given.threads:>6d} threads{'':>12s}")
+    for name, omega in (("along speed", along), ("unrelated, one speed", single)):
+        for threads in (1, given.threads):
+            of_processor, of_wall, failed = rate(batch, machine, omega, threads)
+            label = f"{name}, {threads} thread{'s' if threads > 1 else ''}"
+            print(f"{label:34s}{of_processor:14,.0f}{of_wall:14,.0f}{failed:12d}")
+    few = 20
+    clock = time.process_time()
+    for row in range(few):
+        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
+        ff.periodic_orbits(alone, omega=120.0)
+    print(f"periodic_orbits, one by one {few / (time.process_time() - clock):20,.1f}")
+    clock = time.process_time()
+    for row in range(few):
+        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
+        ff.frequency_response(alone, omega=(5.0, 250.0))
+    print(f"whole responses, one by one {few / (time.process_time() - clock):20,.1f}")
+    clock = time.process_time()
+    for row in range(TRIED):
+        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
+        carried(alone.system(), np.zeros(4), 120.0, TURNS, 1e-9, 1e-12)
+    print(f"scipy, {TURNS} turns from rest {TRIED / (time.process_time() - clock):24,.2f}")
+
+
+if __name__ == "__main__":
+    main()

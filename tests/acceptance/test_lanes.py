@@ -1,0 +1,174 @@
+"""Many machines in one compiled call: each lane is the motion that its machine alone reaches."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.batch.lane_path import FORBIDDEN, FOUND, UNSTABLE
+from flipflow.model.quantities import quantity_named
+from flipflow.studies.lane_values import lane_values
+from flipflow.studies.quantity_values import MOTION_VALUES, Working
+
+pytestmark = pytest.mark.numerical
+FIELDS = (
+    "main_mass", "floating_mass", "shear_stiffness", "shear_damping", "stop_stiffness",
+    "stop_damping", "clearance", "eccentric_moment", "isolation_stiffness", "isolation_damping",
+)  # fmt: skip
+SPEEDS = np.array([70.0, 100.0, 130.0, 160.0, 190.0, 210.0])
+SPAN = (5.0, 260.0)
+
+
+def drawn(machine, names, rows, width, seed):
+    """Values of fields about a machine's own, up to a factor exp(width), (rows,) each."""
+    rng = np.random.default_rng(seed)
+    return {
+        name: float(getattr(machine, name)) * np.exp(width * rng.uniform(-1.0, 1.0, rows))
+        for name in names
+    }
+
+
+def values(machine, columns, name, omega=SPEEDS, branch="from-below", threads=1):
+    asked = (quantity_named(name, machine),)
+    found, why = lane_values(machine, columns, asked, omega, SPAN, branch, threads)
+    return found[name], why
+
+
+def variant(machine, columns, row):
+    return machine.replace(**{name: float(column[row]) for name, column in columns.items()})
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
+def test_a_lane_ends_on_what_a_machine_settles_on_that_is_brought_up_slowly(screen, law):
+    machine = screen.replace(stop_law=law)
+    columns = drawn(machine, FIELDS, 12, 0.6, seed=3)
+    found, why = values(machine, columns, "relative_amplitude", np.array([100.0, 160.0, 200.0]))
+    assert (why == FOUND).mean() > 0.9
+    for row in range(12):
+        alone = variant(machine, columns, row)
+        up = ff.sweep(alone, omega=np.linspace(30.0, 200.0, 171)).amplitude("relative")
+        for k, at in enumerate((70, 130, 170)):
+            if why[row, k] == FOUND:
+                assert found[row, k] == pytest.approx(up[at], rel=1e-6)
+
+
+def test_unequal_gaps_and_a_stop_on_one_side(screen):
+    for minus in (4e-3, np.inf):
+        machine = screen.replace(clearance_minus=minus)
+        columns = drawn(machine, FIELDS, 10, 0.3, seed=5)
+        found, why = values(machine, columns, "relative_amplitude", np.array([90.0, 150.0]))
+        assert (why == FOUND).mean() > 0.9
+        for row in range(10):
+            branch = ff.frequency_response(variant(machine, columns, row), omega=SPAN)
+            for k, omega in enumerate((90.0, 150.0)):
+                orbit = branch.orbit_from_below(omega)
+                assert orbit.stable == (why[row, k] == FOUND)
+                if orbit.stable:
+                    assert found[row, k] == pytest.approx(orbit.amplitude("relative"), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name for name in MOTION_VALUES if name != "jump_margin"],
+)
+def test_every_quantity_is_that_of_the_motion_alone(screen, name):
+    columns = drawn(screen, FIELDS, 6, 0.1, seed=1)
+    omega = np.array([80.0, 150.0])
+    found, why = values(screen, columns, name, omega)
+    assert (why == FOUND).all()
+    for row in range(6):
+        alone = variant(screen, columns, row)
+        branch = ff.frequency_response(alone, omega=SPAN)
+        for k, speed in enumerate(omega):
+            own = Working(alone, branch.orbit_from_below(speed)).value(name)
+            assert found[row, k] == pytest.approx(own, rel=1e-8)
+
+
+def test_upper_and_lower_motions_are_kept_apart(screen):
+    columns = drawn(screen, FIELDS, 20, 0.05, seed=9)
+    omega = np.array([195.0, 203.0])
+    upper, _ = values(screen, columns, "relative_amplitude", omega, "upper")
+    lower, _ = values(screen, columns, "relative_amplitude", omega, "lower")
+    several = 0
+    for row in range(20):
+        branch = ff.frequency_response(variant(screen, columns, row), omega=SPAN)
+        for k, speed in enumerate(omega):
+            sizes = [o.amplitude("relative") for o in branch.orbits_at(speed) if o.stable]
+            several += len(sizes) > 1
+            assert upper[row, k] == pytest.approx(max(sizes), rel=1e-8)
+            assert lower[row, k] == pytest.approx(min(sizes), rel=1e-8)
+    assert several > 5
+
+
+def test_a_lane_that_fails_poisons_no_neighbour(screen):
+    columns = drawn(screen, ("clearance", "shear_stiffness"), 30, 0.2, seed=2)
+    clean, _ = values(screen, columns, "relative_amplitude")
+    columns["shear_stiffness"][7] = -1.0
+    columns["clearance"][19] = np.nan
+    found, why = values(screen, columns, "relative_amplitude")
+    struck = np.isin(np.arange(30), (7, 19))
+    assert (why[struck] == FORBIDDEN).all()
+    assert np.isnan(found[struck]).all()
+    np.testing.assert_array_equal(found[~struck], clean[~struck])
+
+
+def test_neighbours_and_threads_change_no_bit(screen):
+    columns = drawn(screen, FIELDS, 150, 0.3, seed=4)
+    together, why = values(screen, columns, "relative_amplitude")
+    on_two, _ = values(screen, columns, "relative_amplitude", threads=2)
+    np.testing.assert_array_equal(together, on_two)
+    part = {name: column[100:110] for name, column in columns.items()}
+    some, why_some = values(screen, part, "relative_amplitude")
+    np.testing.assert_array_equal(why[100:110], why_some)
+    np.testing.assert_allclose(together[100:110], some, rtol=1e-9)
+
+
+def test_where_symmetry_is_lost_the_lane_leans_and_where_the_period_doubles_it_says_so(screen):
+    columns = drawn(screen, FIELDS, 100, 1.0, seed=11)
+    found, why = values(screen, columns, "relative_amplitude")
+    assert set(np.unique(why)) == {FOUND, UNSTABLE}
+    assert np.isnan(found[why != FOUND]).all()
+    leaning = 0
+    for row in range(100):
+        alone = variant(screen, columns, row)
+        branch = ff.frequency_response(alone, omega=SPAN)
+        for k in range(SPEEDS.size):
+            if branch.orbit_from_below(SPEEDS[k]).stable or why[row, k] != FOUND:
+                continue
+            stable = [o for o in ff.periodic_orbits(alone, omega=SPEEDS[k]) if o.stable]
+            sizes = np.array([orbit.amplitude("relative") for orbit in stable])
+            assert np.abs(sizes / found[row, k] - 1.0).min() < 1e-8
+            leaning += 1
+    assert leaning > 3
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Three masses, two stops, one of them against the ground."""
+
+    gap: float = 1.0
+    stiffness: float = 6.0
+
+    def system(self):  # noqa: D102
+        K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+        stops = (
+            ff.ClearanceSpring([1.0, -1.0, 0.0], self.stiffness, 0.2, self.gap),
+            ff.ClearanceSpring([0.0, 0.0, 1.0], self.stiffness, 0.1, 2.0 * self.gap, np.inf),
+        )
+        return ff.MechanicalSystem(
+            np.eye(3), 0.1 * K + 0.05 * np.eye(3), K, stops, ff.HarmonicForce([1.0, 0.0, 0.5])
+        )
+
+
+def test_any_machine_with_a_system_of_its_own():
+    columns = {"gap": np.linspace(0.8, 1.2, 9), "stiffness": np.linspace(4.0, 8.0, 9)}
+    omega = np.array([0.4, 1.5])
+    found, why = values(Chain(), columns, "amplitude[0]", omega)
+    assert (why == FOUND).mean() > 0.5
+    for row in range(9):
+        alone = Chain(float(columns["gap"][row]), float(columns["stiffness"][row]))
+        up = ff.sweep(alone, omega=np.linspace(0.1, 1.5, 141)).amplitude(0)
+        for k, at in enumerate((30, 140)):
+            if why[row, k] == FOUND:
+                assert found[row, k] == pytest.approx(up[at], rel=1e-6)
