@@ -183,7 +183,8 @@ class Branch(Frozen, Result):
     @cached_property
     def error(self) -> Real:
         """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
-        return self.formulation.solver().errors(self.traced.u, self.traced.omega)
+        with self.formulation.lent() as solver:
+            return solver.errors(self.traced.u, self.traced.omega)
 
     @property
     def shortened_steps(self) -> tuple[ShortenedStep, ...]:
@@ -323,7 +324,8 @@ class Branch(Frozen, Result):
         span = self.omega[after] - self.omega[before]
         share = min((omega - self.omega[before]) / span, 1.0) if span else 0.0
         guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
-        point = self.formulation.solver().solve(guess, omega)
+        with self.formulation.lent() as solver:
+            point = solver.solve(guess, omega)
         if point is None:
             return None
         return self._solved(point, rises=True)
@@ -393,8 +395,10 @@ class Branch(Frozen, Result):
     def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
-            solver = self.formulation.solver()
-            low, high, first = solver.extremes(self.traced.u, self.traced.omega, np.array([key]))
+            with self.formulation.lent() as solver:
+                low, high, first = solver.extremes(
+                    self.traced.u, self.traced.omega, np.array([key])
+                )
             self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
         return self._seen[key]
 

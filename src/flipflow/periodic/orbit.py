@@ -90,7 +90,8 @@ class Orbit(Frozen, Result):
     @cached_property
     def motion(self) -> Motion:
         """The motion as a function of time, with its record of contacts."""
-        return self.point.formulation.solver().motion(self.unknowns, self.omega)
+        with self.point.formulation.lent() as solver:
+            return solver.motion(self.unknowns, self.omega)
 
     @cached_property
     def t(self) -> Real:
@@ -101,7 +102,8 @@ class Orbit(Frozen, Result):
     def state(self) -> Real:
         """State (x, x') at t = 0, shape (2 N,)."""
         at = self.unknowns[None], np.array([self.omega])
-        return np.array(self.point.formulation.solver().states(*at)[0])
+        with self.point.formulation.lent() as solver:
+            return np.array(solver.states(*at)[0])
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -129,9 +131,8 @@ class Orbit(Frozen, Result):
     @cached_property
     def error(self) -> float:
         """Estimated distance in m from the exact motion; infinite where there is no estimate."""
-        return float(
-            self.point.formulation.solver().errors(self.unknowns[None], np.array([self.omega]))[0]
-        )
+        with self.point.formulation.lent() as solver:
+            return float(solver.errors(self.unknowns[None], np.array([self.omega]))[0])
 
     def displacement(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
         """Displacement of a coordinate in m at times t (default: :attr:`t`)."""
