@@ -24,6 +24,7 @@ from flipflow.model.arguments import (
     checked_speed,
     checked_text,
 )
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
@@ -62,7 +63,7 @@ class SpecialPoint:
     side: int = 0
 
     def __repr__(self) -> str:
-        return f"SpecialPoint({self.kind}, {self.omega:.9g} rad/s)"
+        return f"SpecialPoint({self.kind}, {self.omega:.9g}{unit_in(self.orbit.machine, 'rad/s')})"
 
     @property
     def omega(self) -> float:
@@ -137,7 +138,7 @@ class Branch(Frozen, Result):
 
     def __repr__(self) -> str:
         span = f"{self.omega.min():.6g} to {self.omega.max():.6g}" if self.omega.size else ""
-        ends = f"{span} rad/s, " if span else ""
+        ends = f"{span}{unit_in(self.machine, 'rad/s')}, " if span else ""
         counts = Counter(point.kind for point in self.special_points)
         kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
         return f"Branch({self.omega.size} points, {ends}{kinds}, {self.status.name})"

@@ -327,6 +327,11 @@ def is_screen(machine: object) -> bool:
     return isinstance(machine, FlipFlowScreen)
 
 
+def unit_in(machine: object, unit: str) -> str:
+    """A unit as it is written behind a number of a machine, whose user's own are not told."""
+    return f" {unit}" if is_screen(machine) else ""
+
+
 def _checked_table(name: str, rows: object) -> tuple[tuple[float, float], ...]:
     """Pairs (degrees Celsius, factor), rising in temperature; none is a table, too."""
     remedy = "give pairs (degrees Celsius, factor above 0)"

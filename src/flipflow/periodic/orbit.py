@@ -22,6 +22,7 @@ from flipflow.model.arguments import (
 )
 from flipflow.model.contact_law import OPEN, WHOLE, force_in, shares
 from flipflow.model.elements import ClearanceSpring
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
@@ -55,7 +56,7 @@ class Orbit(Frozen, Result):
     word: str | None = None
 
     def __repr__(self) -> str:
-        return f"Orbit({self.omega:.6g} rad/s, {self.stability})"
+        return f"Orbit({self.omega:.6g}{unit_in(self.machine, 'rad/s')}, {self.stability})"
 
     @property
     def unknowns(self) -> Real:
