@@ -164,26 +164,8 @@ FORMS = [
 ]
 
 
-# What is open: a figure that does not fit goes to the next page and leaves a hole behind.
-HOLES = {("thirty cases", "a4"), ("thirty cases", "letter"), ("long german names", "page")}
-NO_HOLES = "no page but the last is under a third full"
-
-
-def _with_holes(kind, form):
-    """The machines and forms whose pages are not all filled, as tests that are to fail."""
-    holes = (kind, form.values[0]) in HOLES
-    marks = [*form.marks, *([pytest.mark.xfail(strict=True, reason=NO_HOLES)] if holes else [])]
-    return pytest.param(kind, form.values[0], marks=marks)
-
-
-@pytest.mark.parametrize(
-    ("kind", "form"),
-    [
-        _with_holes(kind, form)
-        for kind in MACHINES
-        for form in (FORMS[:1] if kind == "thirty cases" else FORMS)
-    ],
-)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("kind", MACHINES)
 def test_nothing_is_cut_or_overlaps_and_pages_are_filled(printed, kind, form):
     ends = []
     for number, (width, height, words) in enumerate(pages(printed(kind, form)), 1):

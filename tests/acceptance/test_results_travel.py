@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 from collections.abc import Callable
 from functools import cache
 
@@ -221,3 +222,53 @@ def test_a_machine_of_its_user_has_no_units() -> None:
     assert trace.name == f"{large.amplitude(0):.4g}, {large.stability}"
     in_si = [line.text for line in ff.figure(branch(), units="SI").panels[0].lines]
     assert any(text.endswith(f"{branch().folds[0].omega:.4g} rad/s") for text in in_si)
+
+
+def results_of(machine: ff.FlipFlowScreen | ff.MechanicalSystem, omega: float) -> list[object]:
+    """Results that hang on the units of a machine, one of each kind."""
+    which = 0 if isinstance(machine, ff.MechanicalSystem) else "relative"
+    followed = ff.frequency_response(machine, (0.7 * omega, 1.3 * omega))
+    orbits = ff.periodic_orbits(machine, omega)
+    rate = 0.01 * omega**2
+    return [
+        followed,
+        orbits[0],
+        ff.linear_response(machine, [omega, 1.1 * omega]),
+        ff.sweep(machine, [omega, 1.01 * omega]),
+        ff.simulate(machine, omega=omega, periods=3),
+        ff.poincare_section(machine, omega, 5, skip=5),
+        ff.spectrum(orbits[0], which),
+        ff.lyapunov_exponents(machine, omega, periods=64, skip=16),
+        ff.basins(machine, omega=omega, displacement={which: [0.0, 0.1]}, velocity={which: [0.0]}),
+        ff.jump_risk(machine, orbits[0]),
+        ff.ramp(machine, (omega, 1.1 * omega), rate),
+        ff.continue_orbit(orbits[0], "springs[0].clearance", (0.35, 0.45))
+        if isinstance(machine, ff.MechanicalSystem)
+        else ff.continue_orbit(orbits[0], "clearance", (5e-3, 7e-3)),
+    ]
+
+
+def test_no_unit_is_written_of_a_machine_that_has_none() -> None:
+    """Neither in words nor in tables; those of a screen are SI. An angle is in rad for both."""
+    for machine, omega, known in ((chain(), 1.2, False), (screen(), 89.0, True)):
+        for result in results_of(machine, omega):
+            units = {v.attrs.get("units") for v in result.to_xarray().variables.values()}
+            units -= {None, "", "rad"}
+            assert bool(units) == known, (result, units)
+            written = re.search(r"\b(rad/s|1/s|kg|m/s|mm)\b", repr(result) + result._repr_html_())
+            assert known or written is None, (result, written)
+            points = getattr(result, "special_points", ())
+            assert all(repr(point).endswith(" rad/s)") == known for point in points)
+
+
+def test_decades_of_a_spectrum_stay_decades_in_other_units() -> None:
+    """0.006 m are as far above 1e-3 m as 6 mm are above 1 mm."""
+    lines = ff.spectrum(large(), "relative")
+    (mm,), (m,) = (ff.figure(lines, units=units).panels for units in ("engineering", "SI"))
+    close("decades", m.traces[0].y + 3.0, mm.traces[0].y, abs=1e-12)
+    first = float(m.traces[0].y.max())
+    close("first harmonic", 10.0**first, float(lines.amplitudes.max()), rel=1e-12)
+    assert (m.y.title, m.x.title) == ("relative (x2) amplitude, m", "angular frequency, rad/s")
+    assert all(word == f"1e{at:g}" for at, word in m.y.ticks)
+    of_chain = ff.figure(ff.spectrum(ff.periodic_orbits(chain(), 1.2)[0], 0)).panels[0]
+    assert (of_chain.x.title, of_chain.y.title) == ("angular frequency", "x[0] amplitude")

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import html as markup
 import itertools
 import json
 import math
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -319,7 +321,7 @@ def test_many_labels_at_one_place_are_printed_apart(middle):
     axes = (Axis("speed", "rpm", (0.0, 1000.0)), Axis("y", "mm", (0.0, 1.0)))
     figure = Figure("a", "b.", (Panel(*axes, lines=lines, title="Title"),) * 2, 2, 300)
     sheet = Sheet(figsize=(PAGE_WIDTH / 96, 3.0), dpi=96)
-    _draw(sheet, figure, arrange(figure))
+    _draw(sheet, figure, arrange(figure), figure.height)
     renderer = FigureCanvasAgg(sheet).get_renderer()
     boxes = [
         text.get_window_extent(renderer)
@@ -348,6 +350,23 @@ def test_every_format_is_written(assessment, tmp_path, ending, start):
     for k, figure in enumerate(figures(assessment)[-2:]):
         path = figure.write(tmp_path / f"{k}{ending}")
         assert path.read_bytes().startswith(start)
+
+
+def test_a_printed_figure_says_below_it_what_it_belongs_to(orbit, tmp_path):
+    bare = ff.figure(orbit)
+    words = "FFS0827, case $full$ <b>, revision A, 2026-03-01"
+    heights = []
+    for subject in ("", words, " ".join([words] * 4)):
+        figure = dataclasses.replace(bare, subject=subject)
+        sheet = figure.write(tmp_path / "one.svg").read_text(encoding="utf-8")
+        told = " ".join(markup.unescape(one) for one in re.findall(r"<!-- (.*?) -->", sheet))
+        assert (words in told) == bool(subject)
+        assert "\n" not in subject
+        heights.append(float(ET.fromstring(sheet).attrib["viewBox"].split()[3]))  # noqa: S314
+    assert heights[0] == pytest.approx(bare.height * 0.75)
+    assert heights[0] < heights[1] < heights[2]
+    dataclasses.replace(bare, subject=words).write(tmp_path / "one.pdf")
+    dataclasses.replace(bare, subject=words).write(tmp_path / "one.png")
 
 
 def test_the_same_figure_makes_the_same_file(orbit, tmp_path):

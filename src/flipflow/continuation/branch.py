@@ -24,6 +24,7 @@ from flipflow.model.arguments import (
     checked_speed,
     checked_text,
 )
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
@@ -62,7 +63,7 @@ class SpecialPoint:
     side: int = 0
 
     def __repr__(self) -> str:
-        return f"SpecialPoint({self.kind}, {self.omega:.9g} rad/s)"
+        return f"SpecialPoint({self.kind}, {self.omega:.9g}{unit_in(self.orbit.machine, 'rad/s')})"
 
     @property
     def omega(self) -> float:
@@ -137,7 +138,7 @@ class Branch(Frozen, Result):
 
     def __repr__(self) -> str:
         span = f"{self.omega.min():.6g} to {self.omega.max():.6g}" if self.omega.size else ""
-        ends = f"{span} rad/s, " if span else ""
+        ends = f"{span}{unit_in(self.machine, 'rad/s')}, " if span else ""
         counts = Counter(point.kind for point in self.special_points)
         kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
         return f"Branch({self.omega.size} points, {ends}{kinds}, {self.status.name})"
@@ -183,7 +184,8 @@ class Branch(Frozen, Result):
     @cached_property
     def error(self) -> Real:
         """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
-        return self.formulation.solver().errors(self.traced.u, self.traced.omega)
+        with self.formulation.lent() as solver:
+            return solver.errors(self.traced.u, self.traced.omega)
 
     @property
     def shortened_steps(self) -> tuple[ShortenedStep, ...]:
@@ -323,7 +325,8 @@ class Branch(Frozen, Result):
         span = self.omega[after] - self.omega[before]
         share = min((omega - self.omega[before]) / span, 1.0) if span else 0.0
         guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
-        point = self.formulation.solver().solve(guess, omega)
+        with self.formulation.lent() as solver:
+            point = solver.solve(guess, omega)
         if point is None:
             return None
         return self._solved(point, rises=True)
@@ -393,8 +396,10 @@ class Branch(Frozen, Result):
     def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
-            solver = self.formulation.solver()
-            low, high, first = solver.extremes(self.traced.u, self.traced.omega, np.array([key]))
+            with self.formulation.lent() as solver:
+                low, high, first = solver.extremes(
+                    self.traced.u, self.traced.omega, np.array([key])
+                )
             self._seen[key] = (low[:, 0], high[:, 0], first[:, 0])
         return self._seen[key]
 

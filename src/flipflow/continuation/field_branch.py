@@ -13,6 +13,7 @@ from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.special_points import FOLD
 from flipflow.model.arguments import checked_index, checked_text
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
@@ -32,7 +33,8 @@ class FieldSpecialPoint(SpecialPoint):
     value: float = np.nan
 
     def __repr__(self) -> str:
-        return f"FieldSpecialPoint({self.kind}, {self.value:.9g} at {self.omega:.9g} rad/s)"
+        omega = f"{self.omega:.9g}{unit_in(self.orbit.machine, 'rad/s')}"
+        return f"FieldSpecialPoint({self.kind}, {self.value:.9g} at {omega})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.dynamics.contact_free import complex_amplitudes, span
 from flipflow.model.arguments import checked_speeds
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.screen import FlipFlowScreen, unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
@@ -39,7 +39,8 @@ class LinearResponse(Frozen, Result):
     omega: Real
 
     def __repr__(self) -> str:
-        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        unit = unit_in(self.machine, "rad/s")
+        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g}{unit}"
         return f"LinearResponse({self.omega.size} frequencies, {ends})"
 
     @cached_property

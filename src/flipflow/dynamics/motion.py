@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,18 +98,7 @@ class Motion:
         """x, x' or x'' at times t taken from the given pieces, (K, N)."""
         t, piece = self._checked_pieces(t, piece)
         order = checked_count("order", order, 2, least=0)
-        turning = 1j * self.omega * self.order
-        wave = np.exp(turning * t[:, None]) * turning**order
-        x = np.einsum("knh,kh->kn", self.harmonic[piece], wave).real
-        if order == 0:
-            x = x + self.offset[piece] + self.drift[piece] * (t - self.start[piece])[:, None]
-        if order == 1:
-            x = x + self.drift[piece]
-        if self.rate.shape[1]:
-            rate = self.rate[piece]
-            term = np.exp(rate * (t - self.start[piece])[:, None]) * rate**order
-            x = x + np.einsum("knr,kr->kn", self.amplitude[piece], term).real
-        return np.asarray(x, dtype=float)
+        return next(_derivatives(self, t, piece, (order,)))
 
     def samples(self, least: int = 256) -> tuple[Real, NDArray[np.intp]]:
         """Times and pieces of a grid that holds both ends of every piece, (K,) each.
@@ -161,6 +151,33 @@ class Motion:
             side = engaged_side(spring.law, self.regime[:, j])
             found += _joined(j, side, self.start, ends, self.period)
         return tuple(sorted(found, key=lambda interval: interval.start))
+
+
+def states_on(motion: Motion, t: Real, piece: NDArray[np.intp]) -> tuple[Real, Real, Real]:
+    """x, x' and x'' at times t (K,) taken from the given pieces, (K, N) each.
+
+    What :meth:`Motion.piece_derivative` gives, at a third of its cost.
+    """
+    x, v, a = _derivatives(motion, t, piece, (0, 1, 2))
+    return x, v, a
+
+
+def _derivatives(
+    motion: Motion, t: Real, piece: NDArray[np.intp], orders: tuple[int, ...]
+) -> Iterator[Real]:
+    turning, rate = 1j * motion.omega * motion.order, motion.rate[piece]
+    wave, since = np.exp(turning * t[:, None]), (t - motion.start[piece])[:, None]
+    term = np.exp(rate * since)
+    harmonic, amplitude = motion.harmonic[piece], motion.amplitude[piece]
+    for order in orders:
+        x = np.einsum("knh,kh->kn", harmonic, wave * turning**order).real
+        if order == 0:
+            x = x + motion.offset[piece] + motion.drift[piece] * since
+        if order == 1:
+            x = x + motion.drift[piece]
+        if rate.shape[1]:
+            x = x + np.einsum("knr,kr->kn", amplitude, term * rate**order).real
+        yield np.asarray(x, dtype=float)
 
 
 def motion_of_flow(system: MechanicalSystem, flow: Flow, omega: float, period: float) -> Motion:

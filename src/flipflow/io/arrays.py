@@ -45,13 +45,16 @@ from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
 
-SI = {"length": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
+SI = {
+    "length": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N", "torque": "N m",
+    "time": "s", "frequency": "rad/s", "rate": "1/s", "impulse": "kg m/s", "mass": "kg",
+}  # fmt: skip
 PASSES: tuple[Direction, ...] = ("up", "down")
 
 
-def units_of(machine: Machine | MechanicalSystem) -> Mapping[str, str]:
+def units_of(machine: Machine | None) -> Mapping[str, str]:
     """SI for a screen; a machine of its user has units of its own, which nobody told."""
-    return SI if is_screen(machine) else dict.fromkeys(SI, "")
+    return SI if machine is None or is_screen(machine) else dict.fromkeys(SI, "")
 
 
 @singledispatch
@@ -83,17 +86,20 @@ def _column(dim: str, values: ArrayLike, unit: str = "") -> Variable:
     return Variable((dim,), np.asarray(values), unit)
 
 
-def _specials(points: Sequence[Any], system: MechanicalSystem, unit: str) -> dict[str, Variable]:
+def _specials(
+    points: Sequence[Any], system: MechanicalSystem, units: Mapping[str, str]
+) -> dict[str, Variable]:
     """Special points: kind, place and amplitudes."""
+    omega = np.array([point.omega for point in points], float)
     amplitudes = [[point.amplitude(name) for name in system.named] for point in points]
     return {
         "special_kind": _column("special", np.array([point.kind for point in points], str)),
-        "special_omega": _column("special", np.array([p.omega for p in points], float), "rad/s"),
+        "special_omega": _column("special", omega, units["frequency"]),
         "special_position": _column("special", np.array([p.position for p in points], float)),
         "special_amplitude": Variable(
             ("special", "coordinate"),
             np.reshape(amplitudes, (len(points), len(system.named))),
-            unit,
+            units["length"],
         ),
     }
 
@@ -105,19 +111,22 @@ def _attributes(result: Any, **more: str | float) -> dict[str, str | float]:
 
 @arrays_of.register
 def _(branch: Branch) -> Arrays:
-    unit, system = units_of(branch.machine)["length"], branch.system
+    units, system = units_of(branch.machine), branch.system
     return Arrays(
         "Periodic motions over frequency",
         "point",
-        {"omega": _column("point", branch.omega, "rad/s"), "coordinate": _labels(system.named)},
         {
-            "amplitude": _each("point", system, branch.amplitude, unit),
+            "omega": _column("point", branch.omega, units["frequency"]),
+            "coordinate": _labels(system.named),
+        },
+        {
+            "amplitude": _each("point", system, branch.amplitude, units["length"]),
             "phase": _each("point", system, branch.phase, "rad"),
             "stability": _column("point", np.asarray(branch.stability, str)),
             "stable": _column("point", branch.stable),
-            "error": _column("point", branch.error, unit),
+            "error": _column("point", branch.error, units["length"]),
             "multipliers": Variable(("point", "multiplier"), branch.multipliers),
-            **_specials(branch.special_points, system, unit),
+            **_specials(branch.special_points, system, units),
         },
         _attributes(branch, method=repr(branch.method), status=branch.status.value),
     )
@@ -125,16 +134,16 @@ def _(branch: Branch) -> Arrays:
 
 @arrays_of.register
 def _(branch: FieldBranch) -> Arrays:
-    unit, system = units_of(branch.machine)["length"], branch.machine.system()
-    specials = _specials(branch.special_points, system, unit)
+    units, system = units_of(branch.machine), branch.machine.system()
+    specials = _specials(branch.special_points, system, units)
     values = np.array([point.value for point in branch.special_points], float)
     return Arrays(
         f"Periodic motions over {branch.field}",
         "point",
         {"value": _column("point", branch.values), "coordinate": _labels(system.named)},
         {
-            "omega": _column("point", branch.omega, "rad/s"),
-            "amplitude": _each("point", system, branch.amplitude, unit),
+            "omega": _column("point", branch.omega, units["frequency"]),
+            "amplitude": _each("point", system, branch.amplitude, units["length"]),
             "phase": _each("point", system, branch.phase, "rad"),
             "stability": _column("point", np.asarray(branch.stability, str)),
             "stable": _column("point", branch.stable),
@@ -154,7 +163,7 @@ def _(orbit: Orbit) -> Arrays:
     return Arrays(
         "Periodic motion",
         "time",
-        {"time": _column("time", orbit.t, "s"), "coordinate": _labels(system.named)},
+        {"time": _column("time", orbit.t, units["time"]), "coordinate": _labels(system.named)},
         {
             "displacement": _each("time", system, orbit.displacement, units["length"]),
             "velocity": _each("time", system, orbit.velocity, units["velocity"]),
@@ -173,15 +182,15 @@ def _(orbits: tuple) -> Arrays:  # type: ignore[type-arg]
     if not orbits or not all(isinstance(orbit, Orbit) for orbit in orbits):
         raise InputError("result", orbits, "give the motions of periodic_orbits")
     first: Orbit = orbits[0]
-    unit, system = units_of(first.machine)["length"], first.system
+    units, system = units_of(first.machine), first.system
     return Arrays(
         "Coexisting motions",
         "motion",
         {"coordinate": _labels(system.named)},
         {
-            "omega": _column("motion", [orbit.omega for orbit in orbits], "rad/s"),
-            "amplitude": _each("motion", system, _of_all(orbits, Orbit.amplitude), unit),
-            "mean": _each("motion", system, _of_all(orbits, Orbit.mean), unit),
+            "omega": _column("motion", [orbit.omega for orbit in orbits], units["frequency"]),
+            "amplitude": _each("motion", system, _of_all(orbits, Orbit.amplitude), units["length"]),
+            "mean": _each("motion", system, _of_all(orbits, Orbit.mean), units["length"]),
             "periods": _column("motion", [orbit.periods for orbit in orbits]),
             "stability": _column("motion", np.array([orbit.stability for orbit in orbits], str)),
             "multipliers": Variable(
@@ -200,11 +209,11 @@ def _of_all(
 
 @arrays_of.register
 def _(basins: Basins) -> Arrays:
-    unit, system = units_of(basins.machine)["length"], basins.machine.system()
+    units, system = units_of(basins.machine), basins.machine.system()
     dims = tuple(f"{axis.kind}_{axis.which}" for axis in basins.axes)
-    units = {"displacement": "length", "velocity": "velocity"}
+    kinds = {"displacement": "length", "velocity": "velocity"}
     axes = {
-        dim: Variable((dim,), axis.values, units_of(basins.machine)[units[axis.kind]])
+        dim: Variable((dim,), axis.values, units[kinds[axis.kind]])
         for dim, axis in zip(dims, basins.axes, strict=True)
     }
     amplitude = [[orbit.amplitude(name) for name in system.named] for orbit in basins.orbits]
@@ -217,7 +226,9 @@ def _(basins: Basins) -> Arrays:
             "label": Variable(dims, basins.labels),
             "turns": Variable(dims, basins.turns),
             "share": _column("motion", basins.shares),
-            "amplitude": Variable(("motion", "coordinate"), np.reshape(amplitude, shape), unit),
+            "amplitude": Variable(
+                ("motion", "coordinate"), np.reshape(amplitude, shape), units["length"]
+            ),
         },
         _attributes(basins, omega=basins.omega, unsettled=basins.unsettled),
     )
@@ -225,7 +236,7 @@ def _(basins: Basins) -> Arrays:
 
 @arrays_of.register
 def _(risk: JumpRisk) -> Arrays:
-    frames = [str(name) for name in risk.thresholds]
+    units, frames = units_of(risk.machine), [str(name) for name in risk.thresholds]
     thresholds = np.reshape(list(risk.thresholds.values()), (len(frames), 2, risk.phases.size))
     throws = (*risk.impulses, *risk.lumps)
     return Arrays(
@@ -237,10 +248,12 @@ def _(risk: JumpRisk) -> Arrays:
             "phase": _column("phase", risk.phases, "rad"),
         },
         {
-            "threshold": Variable(("frame", "way", "phase"), thresholds, "kg m/s"),
+            "threshold": Variable(("frame", "way", "phase"), thresholds, units["impulse"]),
             "throw_frame": _column("throw", np.array([str(one.frame) for one in throws], str)),
-            "throw_impulse": _column("throw", [one.impulse for one in throws], "kg m/s"),
-            "throw_lump": _column("throw", [number_or_nan(one.lump) for one in throws], "kg"),
+            "throw_impulse": _column("throw", [one.impulse for one in throws], units["impulse"]),
+            "throw_lump": _column(
+                "throw", [number_or_nan(one.lump) for one in throws], units["mass"]
+            ),
             "throw_phase": _column("throw", [one.phase for one in throws], "rad"),
         },
         _attributes(risk, omega=risk.omega),
@@ -250,22 +263,22 @@ def _(risk: JumpRisk) -> Arrays:
 @arrays_of.register
 def _(history: History) -> Arrays:
     system, units = history.system, units_of(history.system)
-    known = {"torque": (history.torque, "N m"), "normal": (history.normal, "m")}
+    known = {"torque": (history.torque, "torque"), "normal": (history.normal, "length")}
     more = {
-        name: Variable(("time", "derivative")[: values.ndim], values, unit)
+        name: Variable(("time", "derivative")[: values.ndim], values, units[unit])
         for name, (values, unit) in known.items()
         if values is not None
     }
     return Arrays(
         "Motion over time",
         "time",
-        {"time": _column("time", history.t, "s"), "coordinate": _labels(system.named)},
+        {"time": _column("time", history.t, units["time"]), "coordinate": _labels(system.named)},
         {
             "displacement": _each("time", system, history.displacement, units["length"]),
             "velocity": _each("time", system, history.velocity, units["velocity"]),
             "acceleration": _each("time", system, history.acceleration, units["acceleration"]),
             "stop_force": Variable(("time", "stop"), history.force, units["force"]),
-            "omega": _column("time", history.omega, "rad/s"),
+            "omega": _column("time", history.omega, units["frequency"]),
             "angle": _column("time", history.angle, "rad"),
             **more,
         },
@@ -294,19 +307,24 @@ def _(ramp: Ramp) -> Arrays:
 
 @arrays_of.register
 def _(sweep: Sweep) -> Arrays:
-    unit, system = units_of(sweep.machine)["length"], sweep.system
+    units, system = units_of(sweep.machine), sweep.system
     return Arrays(
         "Settled motions over speed",
         "step",
-        {"omega": _column("step", sweep.omega, "rad/s"), "coordinate": _labels(system.named)},
         {
-            "amplitude": _each("step", system, sweep.amplitude, unit),
-            "least": _each("step", system, lambda which: sweep.extremes(which)[0], unit),
-            "greatest": _each("step", system, lambda which: sweep.extremes(which)[1], unit),
+            "omega": _column("step", sweep.omega, units["frequency"]),
+            "coordinate": _labels(system.named),
+        },
+        {
+            "amplitude": _each("step", system, sweep.amplitude, units["length"]),
+            "least": _each("step", system, lambda which: sweep.extremes(which)[0], units["length"]),
+            "greatest": _each(
+                "step", system, lambda which: sweep.extremes(which)[1], units["length"]
+            ),
             "periods": _column("step", sweep.periods),
             "word": _column("step", np.array(sweep.words, str)),
             "turns": _column("step", sweep.turns),
-            "distance": _column("step", sweep.distance, unit),
+            "distance": _column("step", sweep.distance, units["length"]),
         },
         _attributes(sweep),
     )
@@ -332,25 +350,27 @@ def _(section: Section) -> Arrays:
 
 @arrays_of.register
 def _(spectrum: Spectrum) -> Arrays:
+    units = units_of(spectrum.system)
     return Arrays(
         "Spectrum",
         "frequency",
-        {"frequency": _column("frequency", spectrum.frequencies, "rad/s")},
-        {"amplitude": _column("frequency", spectrum.amplitudes, "m")},
+        {"frequency": _column("frequency", spectrum.frequencies, units["frequency"])},
+        {"amplitude": _column("frequency", spectrum.amplitudes, units["length"])},
         _attributes(spectrum, omega=spectrum.omega, which=str(spectrum.which)),
     )
 
 
 @arrays_of.register
 def _(found: LyapunovExponents) -> Arrays:
+    rate = units_of(found.machine)["rate"]
     return Arrays(
         "Lyapunov exponents",
         "exponent",
         {},
         {
-            "exponents": _column("exponent", found.exponents, "1/s"),
-            "standard_error": _column("exponent", found.standard_error, "1/s"),
-            "batches": Variable(("batch", "exponent"), found.batches, "1/s"),
+            "exponents": _column("exponent", found.exponents, rate),
+            "standard_error": _column("exponent", found.standard_error, rate),
+            "batches": Variable(("batch", "exponent"), found.batches, rate),
             "contact_share": _column("stop", found.contact_share),
         },
         _attributes(found, omega=found.omega, word=found.word, periods=found.periods),
@@ -384,16 +404,21 @@ def _(diagram: BifurcationDiagram) -> Arrays:
 
 @arrays_of.register
 def _(response: LinearResponse) -> Arrays:
-    unit, system = units_of(response.machine)["length"], response.system
+    units, system = units_of(response.machine), response.system
     return Arrays(
         "Response without contact",
         "point",
-        {"omega": _column("point", response.omega, "rad/s"), "coordinate": _labels(system.named)},
         {
-            "amplitude": _each("point", system, response.amplitude, unit),
+            "omega": _column("point", response.omega, units["frequency"]),
+            "coordinate": _labels(system.named),
+        },
+        {
+            "amplitude": _each("point", system, response.amplitude, units["length"]),
             "phase": _each("point", system, response.phase, "rad"),
-            "complex_amplitude": Variable(("point", "freedom"), response.complex_amplitudes, unit),
-            "natural_frequency": _column("mode", response.natural_frequencies, "rad/s"),
+            "complex_amplitude": Variable(
+                ("point", "freedom"), response.complex_amplitudes, units["length"]
+            ),
+            "natural_frequency": _column("mode", response.natural_frequencies, units["frequency"]),
         },
         _attributes(response),
     )
@@ -442,7 +467,7 @@ def _(loading: Loading) -> Arrays:
 
 @arrays_of.register
 def _(family: ResponseFamily) -> Arrays:
-    unit, system = units_of(family.machine)["length"], family.machine.system()
+    units, system = units_of(family.machine), family.machine.system()
     table = family.table()
     failure = [str(one or "") for one in table.pop("failure")]
     table.pop(family.field)
@@ -465,8 +490,8 @@ def _(family: ResponseFamily) -> Arrays:
             **columns,
             "failure": _column("member", np.array(failure, str)),
             "member": _column("point", owner),
-            "omega": _column("point", omega, "rad/s"),
-            "amplitude": _each("point", system, amplitude, unit),
+            "omega": _column("point", omega, units["frequency"]),
+            "amplitude": _each("point", system, amplitude, units["length"]),
         },
         _attributes(family, field=family.field),
     )

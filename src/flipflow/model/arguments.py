@@ -204,6 +204,12 @@ def takes(function: object, count: int) -> bool:
 
 
 def _binds(function: Callable[..., object], count: int) -> bool:
+    # A function without ornament, asked for at every motion, need not wait for its signature.
+    if type(function) is FunctionType and not (function.__dict__ or function.__kwdefaults__):
+        code = function.__code__
+        few = code.co_argcount - len(function.__defaults__ or ()) <= count
+        many = count <= code.co_argcount or bool(code.co_flags & inspect.CO_VARARGS)
+        return few and many and not code.co_kwonlyargcount
     try:
         inspect.signature(function).bind(*range(count))
     except (TypeError, ValueError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, Self, get_args
 
 import numpy as np
@@ -287,18 +288,24 @@ class FlipFlowScreen:
 
         They count from where the machine hangs under its weight, without contact.
         """
-        m1, m2 = self.main_mass, self.floating_mass
-        c1, c2 = self.isolation_damping, self.shear_damping
-        k1, k2 = self.isolation_stiffness, self.shear_stiffness
-        stop = self.stop()
-        return MechanicalSystem(
-            M=[[m1, 0.0], [0.0, m2]],
-            C=[[c1 + c2, -c2], [-c2, c2]],
-            K=[[k1 + k2, -k2], [-k2, k2]],
-            springs=(stop,) if stop.acts else (),
-            excitation=Unbalance([self.eccentric_moment, 0.0]),
-            coordinates={"main": (1.0, 0.0), "floating": (0.0, 1.0), "relative": (1.0, -1.0)},
-        )
+        return _equations(self)
+
+
+@lru_cache(64)
+def _equations(screen: FlipFlowScreen) -> MechanicalSystem:
+    """They are asked for at every motion of a screen, and making them takes long."""
+    m1, m2 = screen.main_mass, screen.floating_mass
+    c1, c2 = screen.isolation_damping, screen.shear_damping
+    k1, k2 = screen.isolation_stiffness, screen.shear_stiffness
+    stop = screen.stop()
+    return MechanicalSystem(
+        M=[[m1, 0.0], [0.0, m2]],
+        C=[[c1 + c2, -c2], [-c2, c2]],
+        K=[[k1 + k2, -k2], [-k2, k2]],
+        springs=(stop,) if stop.acts else (),
+        excitation=Unbalance([screen.eccentric_moment, 0.0]),
+        coordinates={"main": (1.0, 0.0), "floating": (0.0, 1.0), "relative": (1.0, -1.0)},
+    )
 
 
 def _factor_at(table: tuple[tuple[float, float], ...], temperature: float, whose: str) -> float:
@@ -318,6 +325,11 @@ def is_screen(machine: object) -> bool:
     if isinstance(machine, MechanicalSystem):
         return {"main", "floating", "relative"} <= set(machine.coordinates)
     return isinstance(machine, FlipFlowScreen)
+
+
+def unit_in(machine: object, unit: str) -> str:
+    """A unit as it is written behind a number of a machine, whose user's own are not told."""
+    return f" {unit}" if is_screen(machine) else ""
 
 
 def _checked_table(name: str, rows: object) -> tuple[tuple[float, float], ...]:

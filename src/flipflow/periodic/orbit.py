@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.compiled.arrays import Int, Real
-from flipflow.dynamics.motion import ContactInterval, Motion
+from flipflow.dynamics.motion import ContactInterval, Motion, states_on
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_index,
@@ -21,6 +22,7 @@ from flipflow.model.arguments import (
 )
 from flipflow.model.contact_law import OPEN, WHOLE, force_in, shares
 from flipflow.model.elements import ClearanceSpring
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
@@ -54,7 +56,7 @@ class Orbit(Frozen, Result):
     word: str | None = None
 
     def __repr__(self) -> str:
-        return f"Orbit({self.omega:.6g} rad/s, {self.stability})"
+        return f"Orbit({self.omega:.6g}{unit_in(self.machine, 'rad/s')}, {self.stability})"
 
     @property
     def unknowns(self) -> Real:
@@ -89,7 +91,8 @@ class Orbit(Frozen, Result):
     @cached_property
     def motion(self) -> Motion:
         """The motion as a function of time, with its record of contacts."""
-        return self.point.formulation.solver().motion(self.unknowns, self.omega)
+        with self.point.formulation.lent() as solver:
+            return solver.motion(self.unknowns, self.omega)
 
     @cached_property
     def t(self) -> Real:
@@ -100,7 +103,8 @@ class Orbit(Frozen, Result):
     def state(self) -> Real:
         """State (x, x') at t = 0, shape (2 N,)."""
         at = self.unknowns[None], np.array([self.omega])
-        return np.array(self.point.formulation.solver().states(*at)[0])
+        with self.point.formulation.lent() as solver:
+            return np.array(solver.states(*at)[0])
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -128,9 +132,8 @@ class Orbit(Frozen, Result):
     @cached_property
     def error(self) -> float:
         """Estimated distance in m from the exact motion; infinite where there is no estimate."""
-        return float(
-            self.point.formulation.solver().errors(self.unknowns[None], np.array([self.omega]))[0]
-        )
+        with self.point.formulation.lent() as solver:
+            return float(solver.errors(self.unknowns[None], np.array([self.omega]))[0])
 
     def displacement(self, which: Coordinate, t: ArrayLike | None = None) -> Real:
         """Displacement of a coordinate in m at times t (default: :attr:`t`)."""
@@ -148,7 +151,9 @@ class Orbit(Frozen, Result):
         """Force H of a stop in N at times t (default: :attr:`t`), positive against +d."""
         times = np.mod(self._times(t), self.period)
         flat = np.atleast_1d(times).ravel()
-        return self._force(spring, flat, self.motion.piece(flat)).reshape(times.shape)
+        piece = self.motion.piece(flat)
+        x, v, _ = states_on(self.motion, flat, piece)
+        return self._force(spring, x, v, piece).reshape(times.shape)
 
     def amplitude(self, which: Coordinate) -> float:
         """Half peak-to-peak of a coordinate over the period, in m; from the exact extremes."""
@@ -198,8 +203,8 @@ class Orbit(Frozen, Result):
 
     def stop_force_peak(self, spring: int = 0) -> float:
         """Greatest |H| of a stop over the period in N."""
-        t, piece, *_ = self._grid
-        return _summit(np.abs(self._force(spring, t, piece)), piece)
+        _, piece, x, v, _ = self._grid
+        return _summit(np.abs(self._force(spring, x, v, piece)), piece)
 
     def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
         """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
@@ -228,8 +233,8 @@ class Orbit(Frozen, Result):
         stop = self._spring(spring)
 
         def power(t: Real, piece: NDArray[np.intp]) -> Real:
-            rate = self.motion.piece_derivative(t, piece, 1) @ stop.direction
-            return self._force(spring, t, piece) * rate
+            x, v, _ = states_on(self.motion, t, piece)
+            return self._force(spring, x, v, piece) * (v @ stop.direction)
 
         return self._mean(power)
 
@@ -246,18 +251,16 @@ class Orbit(Frozen, Result):
         return self._mean(power)
 
     def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
-        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-        total = 0.0
-        for e, (start, length) in enumerate(
-            zip(self.motion.start, self.motion.length, strict=True)
-        ):
-            # A free piece may last the whole turn and hold many harmonics: cut it up.
-            parts = 1 + int(16.0 * length / self.period)
-            for part in range(parts):
-                t = start + length * (part + (nodes + 1.0) / 2.0) / parts
-                values = function(t, np.full(t.size, e))
-                total += float(weights @ values) * length / (2.0 * parts)
-        return float(total / self.period)
+        nodes, weights = _gauss_rule()
+        start, length = self.motion.start, self.motion.length
+        # A free piece may last the whole turn and hold many harmonics: cut it up.
+        parts = 1 + (16.0 * length / self.period).astype(np.intp)
+        piece = np.repeat(np.arange(start.size), parts)
+        part = np.concatenate([np.arange(count) for count in parts])
+        share = (part[:, None] + (nodes + 1.0) / 2.0) / parts[piece, None]
+        t = start[piece, None] + length[piece, None] * share
+        values = function(t.ravel(), np.repeat(piece, nodes.size)).reshape(t.shape)
+        return float((values @ weights) @ (length / (2.0 * parts))[piece] / self.period)
 
     def _times(self, t: ArrayLike | None) -> Real:
         return self.t if t is None else checked_numbers("t", t, "give finite times in s")
@@ -270,8 +273,7 @@ class Orbit(Frozen, Result):
     def _grid(self) -> tuple[Real, NDArray[np.intp], Real, Real, Real]:
         """Times, pieces, displacement, velocity, acceleration on the motion's own grid."""
         t, piece = self.motion.samples()
-        x, v, a = (self.motion.piece_derivative(t, piece, order) for order in range(3))
-        return t, piece, x, v, a
+        return t, piece, *states_on(self.motion, t, piece)
 
     @property
     def touches(self) -> bool:
@@ -302,16 +304,24 @@ class Orbit(Frozen, Result):
             return np.full(piece.shape, OPEN)
         return np.asarray(self.motion.regime[piece, self._kept.index(spring)])
 
-    def _force(self, spring: int, t: Real, piece: NDArray[np.intp]) -> Real:
-        """Force of a spring of the machine as it was given."""
+    def _force(self, spring: int, x: Real, v: Real, piece: NDArray[np.intp]) -> Real:
+        """Force of a spring of the machine as it was given, at displacement and velocity (K, N)."""
         stop, regime = self._spring(spring), self._regime(spring, piece)
-        y = self.motion.piece_derivative(t, piece, 0) @ stop.direction
-        v = self.motion.piece_derivative(t, piece, 1) @ stop.direction
-        return force_in(stop.law, stop.stiffness, stop.damping, stop.gaps, regime, y, v)
+        y, rate = x @ stop.direction, v @ stop.direction
+        return force_in(stop.law, stop.stiffness, stop.damping, stop.gaps, regime, y, rate)
+
+    @cached_property
+    def _seen(self) -> dict[bytes, tuple[float, float, complex]]:
+        """Extremes and first harmonic of the coordinates that were asked for."""
+        return {}
 
     def _extremes(self, which: Coordinate) -> tuple[float, float, complex]:
-        low, high, first = self.motion.extremes(self.system.coordinate(which)[None])
-        return float(low[0]), float(high[0]), complex(first[0])
+        vector = self.system.coordinate(which)
+        key = vector.tobytes()
+        if key not in self._seen:
+            low, high, first = self.motion.extremes(vector[None])
+            self._seen[key] = float(low[0]), float(high[0]), complex(first[0])
+        return self._seen[key]
 
 
 def checked_orbit(name: str, orbit: object) -> Orbit:
@@ -341,6 +351,13 @@ def initial_state(system: MechanicalSystem, initial: str | Orbit | ArrayLike) ->
     if state.shape != (2 * size,):
         raise InputError("initial", initial, remedy)
     return state
+
+
+@functools.cache
+def _gauss_rule() -> tuple[Real, Real]:
+    """Nodes and weights on (-1, 1)."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    return nodes, weights
 
 
 def _summit(values: Real, piece: NDArray[np.intp]) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -116,7 +118,7 @@ class Traced:
 
 
 @dataclass(frozen=True, eq=False)
-class Formulation:
+class Formulation(Frozen):
     """What is solved for periodic motions of a machine, without any scratch.
 
     Parameters
@@ -141,6 +143,22 @@ class Formulation:
         """A new solver, with scratch that no other caller uses."""
         return self.kind(self.system, *self.options, half_turn=self.half_turn, turns=self.turns)
 
+    @contextmanager
+    def lent(self) -> Iterator[Solver]:
+        """A solver for a moment, new where all others are in use: making one takes longer."""
+        try:
+            solver = self._idle.pop()
+        except IndexError:
+            solver = self.solver()
+        try:
+            yield solver
+        finally:
+            self._idle.append(solver)
+
+    @cached_property
+    def _idle(self) -> list[Solver]:
+        return []
+
 
 @dataclass(frozen=True, eq=False)
 class Point(Frozen):
@@ -161,7 +179,8 @@ class Point(Frozen):
         if self.known_map is not None:
             return self.known_map
         try:
-            return self.formulation.solver().return_map(self)
+            with self.formulation.lent() as solver:
+                return solver.return_map(self)
         except IncompleteError:
             return np.full((2 * self.formulation.system.size,) * 2, np.nan)
 

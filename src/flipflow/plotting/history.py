@@ -13,7 +13,8 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import LABELS, coordinates, label
-from flipflow.plotting.scales import KN, MM, RPM
+from flipflow.plotting.scales import KN, MM
+from flipflow.plotting.units import speed_of
 from flipflow.transient.history import History
 
 Real = NDArray[np.float64]
@@ -51,7 +52,7 @@ def history_figure(history: History, which: Coordinate | None = None) -> Figure:
     panels = [panel for row in rows for panel in _row(history, *row)]
     caption = (
         "Left: least and greatest values over the whole time. Right: the last turns. Shaft speed "
-        f"{history.omega[-1] * RPM:.4g} rpm at the end."
+        f"{speed_of(history, history.omega[-1])} at the end."
     )
     return Figure(
         "Motion over time", caption, tuple(panels), columns=2, height=80 + 170 * len(rows),

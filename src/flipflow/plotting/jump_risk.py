@@ -7,7 +7,8 @@ import numpy as np
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Panel, Trace
-from flipflow.plotting.scales import DEGREES, RPM
+from flipflow.plotting.scales import DEGREES
+from flipflow.plotting.units import speed_of
 from flipflow.studies.jump_risk import JumpRisk
 
 WAYS = ("along +x", "along -x")
@@ -30,7 +31,7 @@ def jump_risk_figure(risk: JumpRisk) -> Figure:
         Axis("shaft angle", "deg"), Axis("least impulse", "kg m/s", (0.0, top)), tuple(traces)
     )
     caption = (
-        f"At {risk.omega * RPM:.4g} rpm: an impulse at or above the line throws the machine onto "
+        f"At {speed_of(risk, risk.omega)}: an impulse at or above the line throws the machine onto "
         "another motion. Where there is no line, none that was tried does."
     )
     return Figure("What makes the motion jump", caption, (panel,), height=340)

@@ -138,9 +138,9 @@ def _apart(lines: list[float], halves: list[float], width: float) -> Iterator[fl
     for k, (line, half) in enumerate(zip(lines, halves, strict=True)):
         middle = line
         if moved:
-            middle, moved = line + half - 3.0, False
+            middle, moved = line + half - 1.0, False
         elif k + 1 < len(lines) and line + half > lines[k + 1] - halves[k + 1]:
-            middle, moved = line - half + 3.0, True
+            middle, moved = line - half + 1.0, True
         yield max(min(middle, width + RIGHT - half), half - 20.0)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flipflow.model.screen import unit_in
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
@@ -18,11 +19,11 @@ def lyapunov_figure(result: LyapunovExponents) -> Figure:
     count = np.arange(1.0, batches + 1.0)
     periods = count * result.periods / batches
     means = np.cumsum(result.batches, axis=0) / count[:, None]
-    traces = []
+    traces, unit = [], unit_in(result.machine, "1/s")
     for k in range(shown):
         value, error = result.exponents[k], result.standard_error[k]
         traces.append(
-            Trace(f"{value:.4g} +- {error:.2g} 1/s", periods, means[:, k], "stable",
+            Trace(f"{value:.4g} +- {error:.2g}{unit}", periods, means[:, k], "stable",
                   case_colour(k), case_symbol(k), bold=k == 0)
         )  # fmt: skip
     panel = Panel(

@@ -22,17 +22,26 @@ BandRole = Literal["allowed", "contact", "contact minus"]
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: label, unit, and where it shall begin and end or be ticked, if that is fixed."""
+    """One axis: label, unit, and where it shall begin and end or be ticked, if that is fixed.
+
+    Along an axis of ``decades`` stands the decimal logarithm of what is in the unit.
+    """
 
     label: str
     unit: str = ""
     bounds: tuple[float, float] | None = None
     ticks: tuple[tuple[float, str], ...] = ()
+    decades: bool = False
 
     @property
     def title(self) -> str:
         """Label with the unit."""
         return f"{self.label}, {self.unit}" if self.unit else self.label
+
+
+def decade_ticks(low: int, high: int) -> tuple[tuple[float, str], ...]:
+    """A tick at each decade from 10 to the power ``low`` to that of ``high``."""
+    return tuple((float(k), f"1e{k}") for k in range(low, high + 1))
 
 
 @dataclass(frozen=True, eq=False)

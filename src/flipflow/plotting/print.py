@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flipflow.errors import MissingExtra
 from flipflow.plotting.layout import (
+    CHARACTER,
     FONT,
     LABEL_ROW,
     SIDES,
@@ -97,12 +99,17 @@ def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
     import matplotlib as mpl  # noqa: PLC0415  slow to import
     from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
 
-    size = (figure.width / PIXELS_AN_INCH, figure.height / PIXELS_AN_INCH)
+    foot = subject_lines(figure)
+    height = figure.height + LABEL_ROW * len(foot)
     buffer = io.BytesIO()
     style: Any = {**STYLE, **own}
     with mpl.rc_context(style):
+        size = (figure.width / PIXELS_AN_INCH, height / PIXELS_AN_INCH)
         sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
-        _draw(sheet, figure, arrange(figure))
+        _draw(sheet, figure, arrange(figure), height)
+        if foot:
+            sheet.text(3.0 / figure.width, 3.0 / height, "\n".join(foot), color=COLOURS["mark"],
+                       va="bottom")  # fmt: skip
         undated = {DATE[form]: None} if form in DATE else {}
         sheet.savefig(buffer, format=form, dpi=RESOLUTION, metadata=undated)
     return buffer.getvalue()
@@ -116,12 +123,18 @@ def _families() -> list[str]:
     return [name for name in FAMILIES if name in known]
 
 
-def _draw(sheet: Sheet, figure: PanelGrid, geometry: Geometry) -> None:
+def subject_lines(figure: PanelGrid) -> list[str]:
+    """What a figure on its own belongs to, as lines below it."""
+    return textwrap.wrap(figure.subject, int(figure.width / CHARACTER), break_on_hyphens=False)
+
+
+def _draw(sheet: Sheet, figure: PanelGrid, geometry: Geometry, height: float) -> None:
+    """The panels and the legend on a sheet of this height in pixels, from its top down."""
     handles: dict[str, Any] = {}
     for k, (panel, rect) in enumerate(zip(figure.panels, geometry.rects, strict=True)):
-        foot = figure.height - rect.top - rect.height
-        place = (rect.left / figure.width, foot / figure.height, rect.width / figure.width,
-                 rect.height / figure.height)  # fmt: skip
+        foot = height - rect.top - rect.height
+        place = (rect.left / figure.width, foot / height, rect.width / figure.width,
+                 rect.height / height)  # fmt: skip
         axes = sheet.add_axes(place)
         _draw_panel(axes, panel, handles)
         _draw_labels(axes, panel, geometry, k)

@@ -6,7 +6,7 @@ import numpy as np
 
 from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.panels import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace, decade_ticks
 from flipflow.plotting.response import coordinates, label
 from flipflow.plotting.scales import HZ, MM
 from flipflow.studies.poincare import Section, Spectrum
@@ -39,7 +39,7 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
     floor = top * 10.0**-DECADES
     level = np.log10(np.maximum(amplitude, floor))
     low, high = int(np.floor(np.log10(floor))), int(np.ceil(np.log10(top)))
-    ticks = tuple((float(k), f"1e{k}") for k in range(low, high + 1))
+    ticks = decade_ticks(low, high)
     frequency = spectrum.frequencies[shown] * HZ
     line = Trace(label(spectrum.which), frequency, level, legend=False)
     marks = tuple(
@@ -48,7 +48,7 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
     )
     panel = Panel(
         Axis("frequency", "Hz", (0.0, float(frequency[-1]))),
-        Axis(f"{label(spectrum.which)} amplitude", "mm", (float(low), float(high)), ticks),
+        Axis(f"{label(spectrum.which)} amplitude", "mm", (float(low), float(high)), ticks, True),
         traces=(line,), lines=marks,
     )  # fmt: skip
     caption = "Amplitude of each harmonic part; w is the forcing frequency."

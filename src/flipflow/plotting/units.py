@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Callable
 from typing import Any, Literal, get_args
 
 from flipflow.model.arguments import checked_word
 from flipflow.model.screen import is_screen
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.panels import Axis, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace, decade_ticks
 from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
 
 Units = Literal["engineering", "SI", "dimensionless"]
+Way = Callable[[Any], Any]  # from a number in an axis' unit to one in another
 # What one of an axis' unit is in SI, and the SI unit.
 TO_SI = {
     "mm": (1.0 / MM, "m"), "um": (1e-6, "m"), "kN": (1.0 / KN, "N"), "rpm": (1.0 / RPM, "rad/s"),
     "Hz": (1.0 / HZ, "rad/s"), "deg": (1.0 / DEGREES, "rad"), "kW": (1e3, "W"),
 }  # fmt: skip
-WORDS = {"shaft speed": "angular frequency", "shaft angle": "phase of the force"}
+WORDS = {
+    "shaft speed": "angular frequency", "frequency": "angular frequency",
+    "shaft angle": "phase of the force",
+}  # fmt: skip
 
 
 def units_for(result: object, units: str | None) -> str:
@@ -42,6 +48,13 @@ def length_of(owner: object, metres: float, digits: int) -> str:
     return f"{metres:.{digits}g}"
 
 
+def speed_of(owner: object, omega: float) -> str:
+    """A frequency as a title says it: in rpm for a screen, without a unit for any other machine."""
+    if units_for(owner, None) == "engineering":
+        return f"{omega * RPM:.4g} rpm"
+    return f"{omega:.4g}"
+
+
 def in_units(figure: Figure, units: str) -> Figure:
     """The figure, which is drawn in an engineer's units, in others."""
     if units == "engineering":
@@ -53,12 +66,12 @@ def in_units(figure: Figure, units: str) -> Figure:
 def _rescaled(panel: Panel, units: str) -> Panel:
     (x, across), (y, upwards) = (_axis_in(axis, units) for axis in (panel.x, panel.y))
     scale = {"x": across, "y": upwards}
-    if across == 1.0 and upwards == 1.0 and units == "SI":
+    if (x, y) == (panel.x, panel.y) and units == "SI":
         return panel
 
-    def moved(part: Any, **factors: float) -> Any:
-        old = {name: getattr(part, name) for name in factors}
-        new = {k: None if old[k] is None else old[k] * factor for k, factor in factors.items()}
+    def moved(part: Any, **ways: Way) -> Any:
+        old = {name: getattr(part, name) for name in ways}
+        new = {name: None if old[name] is None else way(old[name]) for name, way in ways.items()}
         return dataclasses.replace(part, **new)
 
     def trace_in(trace: Trace) -> Trace:
@@ -88,12 +101,19 @@ def _rescaled(panel: Panel, units: str) -> Panel:
     )
 
 
-def _axis_in(axis: Axis, units: str) -> tuple[Axis, float]:
-    """The axis in SI, or without a unit, and the factor on what is drawn."""
+def _axis_in(axis: Axis, units: str) -> tuple[Axis, Way]:
+    """The axis in SI, or without a unit, and the way there of what is drawn."""
     factor, unit = TO_SI.get(axis.unit, (1.0, axis.unit))
-    bounds = None if axis.bounds is None else (axis.bounds[0] * factor, axis.bounds[1] * factor)
-    # Ticks of an angle in degrees mean nothing in radians; words and decades stay.
+    shift = math.log10(factor)
+
+    def way(value: Any) -> Any:
+        return value + shift if axis.decades else value * factor
+
+    bounds = None if axis.bounds is None else (way(axis.bounds[0]), way(axis.bounds[1]))
+    # Ticks of an angle in degrees mean nothing in radians; words stay.
     ticks = axis.ticks if factor == 1.0 else ()
+    if axis.decades and bounds is not None:
+        ticks = decade_ticks(math.ceil(bounds[0]), math.floor(bounds[1]))
     label = WORDS.get(axis.label, axis.label)
     known = unit if units == "SI" or axis.unit in ("", "%") else ""
-    return Axis(label, known, bounds, ticks), factor
+    return Axis(label, known, bounds, ticks, axis.decades), way

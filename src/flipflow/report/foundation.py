@@ -42,7 +42,9 @@ ROTATION = {
 def into_the_ground(assessment: Assessment) -> Iterator[Block]:
     """What goes into the ground, in a sentence."""
     if assessment.foundation is not None:
-        yield Heading(TITLE, 1)
+        # The figure of start and coast-down, half a page high, ends the page before; without it
+        # that page may hold a few lines only.
+        yield Heading(TITLE, 1, new_page=bool(assessment.foundation.runs))
         yield Text(assessment.foundation.sentence, "Into the ground:")
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 TEMPLATES = "templates"
 KIND = "vibration report"
+LONG = 15  # letters of a word from which on it can be broken anywhere in a table
+SHORT = 8  # rows of a table that is not cut across two pages
 
 
 def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
@@ -106,6 +108,8 @@ def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
             title=title,
             kind=kind,
             footer=footer,
+            longest=LONG,
+            short=SHORT,
             style=_template("report.css"),
             library=library(),
             start=START,

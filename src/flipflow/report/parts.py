@@ -49,7 +49,7 @@ ROWS = (
 )  # fmt: skip
 
 
-@section(Assessment, Part.DETAILS, 75)
+@section(Assessment, Part.DETAILS, 35)
 def parts(assessment: Assessment) -> Iterator[Block]:
     """Every part's load in its worst case."""
     cases = [case for case in assessment.cases if case.values]

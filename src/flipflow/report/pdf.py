@@ -13,7 +13,7 @@ from flipflow.errors import InputError, MissingExtra
 from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
-from flipflow.report.html import KIND, footer_of, title_of
+from flipflow.report.html import KIND, LONG, SHORT, footer_of, title_of
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment
 
@@ -67,6 +67,8 @@ def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper
         "kind": kind,
         "footer": footer,
         "paper": name,
+        "longest": LONG,
+        "short": SHORT,
         "blocks": [_shown(block, height) for block in blocks],
     }
     source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()

@@ -18,6 +18,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_reals, checked_word
 from flipflow.model.monitor import Monitor
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
@@ -84,7 +85,8 @@ class Basins(Frozen, Result):
 
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.labels.shape))
-        return f"Basins({self.omega:.6g} rad/s, {shape} cells, {len(self.orbits)} motions)"
+        omega = f"{self.omega:.6g}{unit_in(self.machine, 'rad/s')}"
+        return f"Basins({omega}, {shape} cells, {len(self.orbits)} motions)"
 
     @property
     def complete(self) -> bool:

@@ -13,6 +13,7 @@ from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, checked_number, checked_speed, real
 from flipflow.model.monitor import Monitor
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
@@ -100,7 +101,9 @@ class JumpRisk(Result):
     version: str = field(default=__version__)
 
     def __repr__(self) -> str:
-        return f"JumpRisk({self.omega:.6g} rad/s, {self.impulse:.4g} kg m/s, {self.lump:.4g} kg)"
+        sizes = ((self.impulse, "kg m/s"), (self.lump, "kg"))
+        blows = ", ".join(f"{size:.4g}{unit_in(self.machine, unit)}" for size, unit in sizes)
+        return f"JumpRisk({self.omega:.6g}{unit_in(self.machine, 'rad/s')}, {blows})"
 
     @property
     def omega(self) -> float:

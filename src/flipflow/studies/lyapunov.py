@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow import __version__
 from flipflow.model.arguments import checked_count, checked_monitor, checked_speed
 from flipflow.model.monitor import Monitor
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.results.result import Result
@@ -61,8 +62,9 @@ class LyapunovExponents(Result):
     version: str
 
     def __repr__(self) -> str:
-        largest = f"largest {self.exponents[0]:.4g} +- {self.standard_error[0]:.2g} 1/s"
-        return f"LyapunovExponents({self.omega:.6g} rad/s, {largest}, {self.word})"
+        omega, rate = (unit_in(self.machine, unit) for unit in ("rad/s", "1/s"))
+        largest = f"largest {self.exponents[0]:.4g} +- {self.standard_error[0]:.2g}{rate}"
+        return f"LyapunovExponents({self.omega:.6g}{omega}, {largest}, {self.word})"
 
     @property
     def system(self) -> MechanicalSystem:

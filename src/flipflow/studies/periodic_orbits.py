@@ -140,6 +140,7 @@ class _Search:
         self.settling = Settling(system_of(machine), max_periods)
         self.omega, self.max_periods = omega, max_periods
         self.found: list[Point] = []
+        self.mirrored: list[Point] = []  # those whose mirror image has been looked for
         self.flown = self.lost = 0
 
     def starts(self, rng: np.random.Generator) -> list[Real]:
@@ -258,19 +259,20 @@ class _Search:
         """Newton for a motion of so many periods and no fewer."""
         point = self.settling.solver_of(periods).solve(z, self.omega)
         if point is not None and self.settling.shortest(point) is point:
-            self._keep(point)
-            if self.settling.solver.system.symmetric:
-                self._keep(self._mirrored(point))
+            kept = self._keep(point)
+            if self.settling.solver.system.symmetric and kept not in self.mirrored:
+                self.mirrored += [kept, self._keep(self._mirrored(kept))]
 
-    def _keep(self, point: Point) -> None:
-        """Add a motion unless it is known, in whatever phase."""
+    def _keep(self, point: Point) -> Point:
+        """Add a motion unless it is known, in whatever phase; the one that then is known."""
         for known in self.found:
             if known.formulation.turns == point.formulation.turns and any(
                 self.settling.same(point.u, phase, self.omega)
                 for phase in self.settling.phases(known)
             ):
-                return
+                return known
         self.found.append(point)
+        return point
 
     def _mirrored(self, point: Point) -> Point:
         """The mirror image: minus the state half a turn later."""

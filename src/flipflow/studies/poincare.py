@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_kind, checked_speed
+from flipflow.model.screen import is_screen, unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.results.result import Result
@@ -47,7 +48,8 @@ class Section(Result):
     word: Word = UNDECIDED
 
     def __repr__(self) -> str:
-        return f"Section({self.states.shape[0]} turns at {self.omega:.6g} rad/s, {self.word})"
+        omega = f"{self.omega:.6g}{unit_in(self.system, 'rad/s')}"
+        return f"Section({self.states.shape[0]} turns at {omega}, {self.word})"
 
     def displacement(self, which: Coordinate) -> Real:
         """Displacement of a coordinate in m, (T,)."""
@@ -72,15 +74,20 @@ class Spectrum(Result):
         In m, (n,): a part a cos(w t + phi) that fits the time counts a; the mean counts once.
     which
         The coordinate.
+    system
+        The machine; None in files that earlier versions wrote, of a screen then.
     """
 
     omega: float
     frequencies: Real
     amplitudes: Real
     which: Coordinate
+    system: MechanicalSystem | None = None
 
     def __repr__(self) -> str:
-        highest = f"{self.frequencies[-1]:.6g} rad/s"
+        highest = f"{self.frequencies[-1]:.6g}"
+        if self.system is None or is_screen(self.system):
+            highest += " rad/s"
         return f"Spectrum({self.which!r}, {self.frequencies.size} lines up to {highest})"
 
 
@@ -168,7 +175,7 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
         amplitudes = 2.0 * np.abs(np.fft.rfft(motion.displacement(which, t))) / count
         amplitudes[0] /= 2.0
         lines = np.arange(amplitudes.size) * motion.omega / motion.periods
-        return Spectrum(motion.omega, lines, amplitudes, which)
+        return Spectrum(motion.omega, lines, amplitudes, which, motion.system)
     step = np.diff(motion.t)
     if motion.t.size < 3 or np.ptp(step) > UNEVEN * float(motion.t[-1]):
         raise InputError("motion", "times", "give a history sampled at even times")
@@ -183,4 +190,4 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
     amplitudes = 2.0 * np.abs(np.fft.rfft(window * x)) / window.sum()
     amplitudes[0] /= 2.0
     spaced = 2.0 * math.pi * np.fft.rfftfreq(count, float(step.mean()))
-    return Spectrum(omega, np.asarray(spaced, float), amplitudes, which)
+    return Spectrum(omega, np.asarray(spaced, float), amplitudes, which, motion.system)

@@ -16,7 +16,7 @@ from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, checked_positive, checked_speeds
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.monitor import Monitor
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.screen import FlipFlowScreen, unit_in
 from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.result import Result
@@ -79,8 +79,9 @@ class Ramp(Result):
 
     def __repr__(self) -> str:
         least, most = self.history.omega.min(), self.history.omega.max()
-        ends = f"{least:.6g} to {most:.6g} rad/s"
-        return f"Ramp({ends} at {self.rate:.4g} rad/s^2, {len(self.jumps)} jumps)"
+        ends = f"{least:.6g} to {most:.6g}{unit_in(self.machine, 'rad/s')}"
+        rate = f"{self.rate:.4g}{unit_in(self.machine, 'rad/s^2')}"
+        return f"Ramp({ends} at {rate}, {len(self.jumps)} jumps)"
 
     def amplitude(self, which: Coordinate) -> tuple[Real, Real]:
         """Speed in rad/s and amplitude in m at every turning point of a coordinate."""

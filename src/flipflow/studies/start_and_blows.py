@@ -154,16 +154,17 @@ def transients(
     alike: dict[FlipFlowScreen, list[str]] = {}
     for name, screen in screens.items():
         alike.setdefault(screen, []).append(name)
-    # Kernels leave the interpreter free, so that cases run side by side.
-    try:
-        with ThreadPoolExecutor(2) as pool:
-            runs = list(pool.map(lambda one: _runs(one, drive, omega), alike))
-    except InputError as error:
-        if _known(project):
-            raise
-        reasons["start"] = _not_assumed(error)
-        drive, runs = None, [_Runs((), None) for _ in alike]
-    jumps = [_jump(screen, omega) for screen in alike]
+    # Kernels leave the interpreter free, so that cases run side by side, and beside the blows.
+    with ThreadPoolExecutor(2) as pool:
+        waiting = [pool.submit(_runs, one, drive, omega) for one in alike]
+        jumps = [_jump(screen, omega) for screen in alike]
+        try:
+            runs = [one.result() for one in waiting]
+        except InputError as error:
+            if _known(project):
+                raise
+            reasons["start"] = _not_assumed(error)
+            drive, runs = None, [_Runs((), None) for _ in alike]
     starts = {
         name: (run, jump)
         for names, run, jump in zip(alike.values(), runs, jumps, strict=True)

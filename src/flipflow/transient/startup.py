@@ -23,7 +23,7 @@ from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.screen import FlipFlowScreen, unit_in
 from flipflow.model.system import Machine
 from flipflow.results.result import Result
 from flipflow.transient.chosen_drive import NOT_SETTLED, default_drive, fitted_drive
@@ -133,7 +133,9 @@ class RunUp(Result):
     angle: float = 0.0
 
     def __repr__(self) -> str:
-        return f"RunUp({self.outcome}, {self.final_speed:.6g} rad/s after {self.duration:.4g} s)"
+        speed, time = (unit_in(self.machine, unit) for unit in ("rad/s", "s"))
+        end = f"{self.final_speed:.6g}{speed} after {self.duration:.4g}{time}"
+        return f"RunUp({self.outcome}, {end})"
 
     @property
     def duration(self) -> float:

@@ -14,6 +14,7 @@ from flipflow import __version__
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_speeds
 from flipflow.model.monitor import Monitor
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.periodic.solver import Formulation, Point
@@ -78,7 +79,8 @@ class Sweep(Frozen, Result):
     complete: bool = True
 
     def __repr__(self) -> str:
-        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        unit = unit_in(self.machine, "rad/s")
+        ends = f"{self.omega.min():.6g} to {self.omega.max():.6g}{unit}"
         return f"Sweep({self.omega.size} speeds, {ends}, {len(self.jumps)} jumps)"
 
     @property
