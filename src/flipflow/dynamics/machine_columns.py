@@ -1,0 +1,162 @@
+"""How a machine's arrays change with its parameters: exact differences of ``.system()``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from flipflow.compiled.arrays import Real
+from flipflow.dynamics.assembly import machine_parts, with_springs
+from flipflow.dynamics.machine_series import MachineSeries, machine_series
+from flipflow.dynamics.parameter_tangent import Columns
+from flipflow.errors import InputError
+from flipflow.model.system import MechanicalSystem
+
+WIDTH = 1.0 / 16.0  # half the interval over which a parameter is looked at, as a share of it
+SMOOTH = "the machine has a kink or a jump at this value and no derivative; move it a little"
+
+
+@dataclass(frozen=True)
+class Named:
+    """A parameter of a machine: its name and value, and the system for other values."""
+
+    name: str
+    value: float
+    at: Callable[[float], MechanicalSystem]
+
+
+@dataclass(frozen=True, eq=False)
+class MachineColumns:
+    """Derivatives of a machine's arrays with respect to P parameters.
+
+    Parameters
+    ----------
+    parts
+        Those of M, C, K, forces, stops and gaps, each (P, ...), by the names of
+        :class:`~flipflow.dynamics.machine_series.MachineSeries`.
+    solved
+        The same, solved with M as kernels take them.
+    """
+
+    parts: Mapping[str, Real]
+    solved: Columns
+
+    @property
+    def keeps_mirror(self) -> bool:
+        """Whether a machine that is its own mirror image stays so with every parameter."""
+        gap = self.parts["gap"]
+        even = np.allclose(gap[..., 0], gap[..., 1], rtol=1e-9, atol=0.0)
+        return even and not self.parts["static"].any()
+
+
+def machine_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> MachineColumns:
+    """Derivatives with respect to parameters, exact for fields that enter polynomially.
+
+    Parameters
+    ----------
+    system
+        The machine as it was given.
+    parameters
+        What it is differentiated with respect to.
+
+    Raises
+    ------
+    InputError
+        Where the machine changes its kind at a parameter's value, and has no derivative.
+    """
+    kept = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
+    own = machine_parts(with_springs(system, kept))
+    rows = [_slopes(system, kept, one) for one in parameters]
+    parts = {
+        name: np.array([row[name] for row in rows]).reshape(len(rows), *array.shape)
+        for name, array in own.items()
+    }
+    return MachineColumns(parts, _solved(own["inertia"], parts))
+
+
+def _solved(M: Real, parts: Mapping[str, Real]) -> Columns:
+    """Solve with M what carries an index of its degrees of freedom."""
+    forces = parts["force"].shape[1] // 2
+    count, n = parts["static"].shape[0], M.shape[0]
+    rows = parts["direction"], parts["force"], parts["static"]
+    square = parts["inertia"], parts["damping"], parts["stiffness"]
+    right = [one.reshape(-1, n) for one in rows] + [
+        one.swapaxes(1, 2).reshape(-1, n) for one in square
+    ]
+    ends = np.cumsum([0, *(one.shape[0] for one in right)]).tolist()
+    solved = np.linalg.solve(M, np.concatenate(right).T).T
+    reach, force, static, inertia, damping, stiffness = (
+        solved[begin:end].reshape(count, -1, n) for begin, end in pairwise(ends)
+    )
+    kernel_ready = np.ascontiguousarray
+    return Columns(
+        inertia=kernel_ready(inertia.swapaxes(1, 2)),
+        damping=kernel_ready(damping.swapaxes(1, 2)),
+        stiffness=kernel_ready(stiffness.swapaxes(1, 2)),
+        direction=parts["direction"],
+        reach=kernel_ready(reach),
+        static=kernel_ready(static[:, 0]),
+        push=kernel_ready(force[:, :forces] + 1j * force[:, forces:]),
+        stop_stiffness=kernel_ready(parts["stop"][:, 0]),
+        stop_damping=kernel_ready(parts["stop"][:, 1]),
+        gap=parts["gap"],
+    )
+
+
+def _slopes(system: MechanicalSystem, kept: list[int], one: Named) -> dict[str, Real]:
+    """Derivatives of all parts with respect to one parameter."""
+    width = WIDTH * abs(one.value) or 1.0
+    for low, high in ((-width, width), (0.0, width), (-width, 0.0)):
+        try:
+            series = machine_series(
+                lambda value: _parts_at(system, kept, one, value),
+                one.value + low,
+                one.value + high,
+            )
+        except (ArithmeticError, _OtherKindError):
+            continue
+        except ValueError:  # the machine does not take a value on that side
+            continue
+        if series is not None:
+            return _slope_of(series, one.value)
+    raise InputError(one.name, one.value, SMOOTH)
+
+
+class _OtherKindError(Exception):
+    """Another number of springs or excitations, or another law, than the machine's own."""
+
+
+def _parts_at(
+    system: MechanicalSystem, kept: list[int], one: Named, value: float
+) -> dict[str, Real]:
+    found = one.at(value)
+    if _kind(found, kept) != _kind(system, kept):
+        raise _OtherKindError
+    return machine_parts(with_springs(found, kept))
+
+
+def _kind(system: MechanicalSystem, kept: list[int]) -> object:
+    """What must not change under a derivative."""
+    springs = system.springs
+    others = [one for j, one in enumerate(springs) if j not in kept]
+    laws = [one.law for one in springs]
+    terms = [(one.order, power) for one in system.excitations for power, _ in one.terms]
+    always = [one.acts and not one.bonded for one in others]
+    acting = [springs[j].acts and not springs[j].bonded for j in kept if j < len(springs)]
+    return laws, terms, any(always), all(acting), [one.acts for one in others]
+
+
+def _slope_of(series: MachineSeries, value: float) -> dict[str, Real]:
+    """Derivatives of a series' arrays at a value."""
+    width = series.high - series.low
+    x = (2.0 * value - series.low - series.high) / width
+    found = {}
+    for name in MachineSeries._fields[2:]:
+        terms = getattr(series, name)
+        slope = chebyshev.chebder(terms, scl=2.0 / width, axis=0)
+        found[name] = np.asarray(chebyshev.chebval(x, slope))
+    return found
