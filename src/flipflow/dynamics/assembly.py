@@ -112,7 +112,7 @@ def with_springs(system: MechanicalSystem, kept: list[int]) -> MechanicalSystem:
 
 
 def machine_parts(system: MechanicalSystem) -> dict[str, Real]:
-    """Arrays of a system, by the names of :class:`~flipflow.dynamics.machine_series.MachineSeries`."""
+    """Arrays of a system, by the names of a series of machines."""
     springs = system.springs
     force = np.array([vector for one in system.excitations for _, vector in one.terms])
     m, n = len(springs), system.size

@@ -350,6 +350,7 @@ def carry_tangent(
 def add_driven_slope(
     machine: MachineArrays, flow: Flow, slot: int, omega: float, t: float, share: float, U: Real
 ) -> None:
+    """Add a share of the driven motion's derivative in omega at time t to the last column."""
     last = U.shape[1] - 1
     for w in range(machine.order.shape[0]):
         order = machine.order[w]

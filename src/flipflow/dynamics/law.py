@@ -114,7 +114,7 @@ def exit_between(
     stops: Stops, j: int, before: int, after: int
 ) -> tuple[float, float, float, float]:
     """h = alpha p + beta p' of a change that has happened: alpha, beta, d alpha/dk, d beta/dc."""
-    if before != OPEN and after != OPEN:
+    if before * after != 0:
         law, piece = stops.law[j], abs(before)
         for e in range(MOST_EXITS):
             alpha, beta, target = exit_of(stops, j, before, e)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -81,30 +80,42 @@ def machine_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> Ma
 def _solved(M: Real, parts: Mapping[str, Real]) -> Columns:
     """Solve with M what carries an index of its degrees of freedom."""
     forces = parts["force"].shape[1] // 2
-    count, n = parts["static"].shape[0], M.shape[0]
-    rows = parts["direction"], parts["force"], parts["static"]
-    square = parts["inertia"], parts["damping"], parts["stiffness"]
-    right = [one.reshape(-1, n) for one in rows] + [
-        one.swapaxes(1, 2).reshape(-1, n) for one in square
-    ]
-    ends = np.cumsum([0, *(one.shape[0] for one in right)]).tolist()
-    solved = np.linalg.solve(M, np.concatenate(right).T).T
-    reach, force, static, inertia, damping, stiffness = (
-        solved[begin:end].reshape(count, -1, n) for begin, end in pairwise(ends)
-    )
+    n = M.shape[0]
+    carried = {name: parts[name] for name in ("direction", "force", "static")}
+    carried |= {name: parts[name].swapaxes(1, 2) for name in ("inertia", "damping", "stiffness")}
+    right = np.concatenate([one.reshape(-1, n) for one in carried.values()])
+    left = np.linalg.solve(M, right.T).T
+    solved = {}
+    for name, one in carried.items():
+        solved[name], left = left[: one.size // n].reshape(one.shape), left[one.size // n :]
+    push = solved["force"][:, :forces] + 1j * solved["force"][:, forces:]
     kernel_ready = np.ascontiguousarray
     return Columns(
-        inertia=kernel_ready(inertia.swapaxes(1, 2)),
-        damping=kernel_ready(damping.swapaxes(1, 2)),
-        stiffness=kernel_ready(stiffness.swapaxes(1, 2)),
+        inertia=kernel_ready(solved["inertia"].swapaxes(1, 2)),
+        damping=kernel_ready(solved["damping"].swapaxes(1, 2)),
+        stiffness=kernel_ready(solved["stiffness"].swapaxes(1, 2)),
         direction=parts["direction"],
-        reach=kernel_ready(reach),
-        static=kernel_ready(static[:, 0]),
-        push=kernel_ready(force[:, :forces] + 1j * force[:, forces:]),
+        reach=kernel_ready(solved["direction"]),
+        static=kernel_ready(solved["static"][:, 0]),
+        push=kernel_ready(push),
         stop_stiffness=kernel_ready(parts["stop"][:, 0]),
         stop_damping=kernel_ready(parts["stop"][:, 1]),
         gap=parts["gap"],
     )
+
+
+def stop_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> dict[str, Real]:
+    """Derivatives of "stop", "gap" and "direction" of every spring that acts, (P, ...) each.
+
+    Springs without gap are among them, which the columns of a machine know as its matrices.
+    """
+    acting = [j for j, spring in enumerate(system.springs) if spring.acts]
+    own = machine_parts(with_springs(system, acting))
+    rows = [_slopes(system, acting, one) for one in parameters]
+    return {
+        name: np.array([row[name] for row in rows]).reshape(len(rows), *own[name].shape)
+        for name in ("stop", "gap", "direction")
+    }
 
 
 def _slopes(system: MechanicalSystem, kept: list[int], one: Named) -> dict[str, Real]:
@@ -117,37 +128,27 @@ def _slopes(system: MechanicalSystem, kept: list[int], one: Named) -> dict[str, 
                 one.value + low,
                 one.value + high,
             )
-        except (ArithmeticError, _OtherKindError):
-            continue
-        except ValueError:  # the machine does not take a value on that side
+        except (ArithmeticError, ValueError):  # the machine does not take a value on that side
             continue
         if series is not None:
             return _slope_of(series, one.value)
     raise InputError(one.name, one.value, SMOOTH)
 
 
-class _OtherKindError(Exception):
-    """Another number of springs or excitations, or another law, than the machine's own."""
-
-
 def _parts_at(
     system: MechanicalSystem, kept: list[int], one: Named, value: float
 ) -> dict[str, Real]:
     found = one.at(value)
-    if _kind(found, kept) != _kind(system, kept):
-        raise _OtherKindError
+    if _kind(found) != _kind(system):
+        raise InputError(one.name, value, SMOOTH)
     return machine_parts(with_springs(found, kept))
 
 
-def _kind(system: MechanicalSystem, kept: list[int]) -> object:
+def _kind(system: MechanicalSystem) -> object:
     """What must not change under a derivative."""
-    springs = system.springs
-    others = [one for j, one in enumerate(springs) if j not in kept]
-    laws = [one.law for one in springs]
+    springs = [(one.law, one.acts, one.bonded) for one in system.springs]
     terms = [(one.order, power) for one in system.excitations for power, _ in one.terms]
-    always = [one.acts and not one.bonded for one in others]
-    acting = [springs[j].acts and not springs[j].bonded for j in kept if j < len(springs)]
-    return laws, terms, any(always), all(acting), [one.acts for one in others]
+    return system.size, springs, terms
 
 
 def _slope_of(series: MachineSeries, value: float) -> dict[str, Real]:

@@ -1,7 +1,7 @@
 r"""How a recorded flow moves with the machine's parameters: exact first and second derivatives.
 
-With M x'' + C x' + K x + sum_j d_j H_j = f, the derivative x_p at fixed time follows the equation of
-the machine itself under the force
+With M x'' + C x' + K x + sum_j d_j H_j = f, the derivative x_p at fixed time follows the equation
+of the machine itself under the force
 
     f_p - M_p x'' - C_p x' - K_p x - sum_j (d_p H_j + d_j H_jp),
 
@@ -127,7 +127,7 @@ def drift_integral(a: complex, e_a: complex, t: float) -> complex:
     return 0.5 * t * t * series
 
 
-@kernel(inline=True)
+@kernel
 def _prepare(
     machine: MachineArrays, flow: Flow, e: int, omega: float, t: float, work: ColumnWork
 ) -> None:
@@ -154,7 +154,7 @@ def _prepare(
             work.behind[i, w] = turn.conjugate() * back
 
 
-@kernel(inline=True)
+@kernel
 def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
     """W of a free motion with modal amplitudes q (R,)."""
     modes = flow.modes
@@ -178,7 +178,7 @@ def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
                     work.acceleration[i, k] += two * a.conjugate()
 
 
-@kernel(inline=True)
+@kernel
 def _spread_steady(
     machine: MachineArrays, flow: Flow, e: int, omega: float, work: ColumnWork
 ) -> None:
@@ -201,7 +201,7 @@ def _spread_steady(
                 work.acceleration[i, k] += ahead * a + behind * a.conjugate()
 
 
-@kernel(inline=True)
+@kernel
 def _gain(
     machine: MachineArrays,
     flow: Flow,
@@ -237,7 +237,7 @@ def _gain(
     return total
 
 
-@kernel(inline=True)
+@kernel
 def _stop_gain(
     machine: MachineArrays,
     flow: Flow,
@@ -375,7 +375,7 @@ def carry_columns(
             kick_columns(machine, flow, e, columns, U, work)
 
 
-@kernel(inline=True)
+@kernel
 def _set_shifts(
     machine: MachineArrays,
     flow: Flow,
@@ -413,7 +413,7 @@ def _set_shifts(
         shift[p] = -change / (alpha * rate + beta * bend)
 
 
-@kernel(inline=True)
+@kernel
 def _vary_map(
     machine: MachineArrays,
     flow: Flow,
@@ -430,27 +430,11 @@ def _vary_map(
 
     ``longer`` and ``before`` tell how its end and its start move.
     """
-    modes, slot, size = flow.modes, flow.slot[e], T.shape[0]
-    count, parameters = modes.mode_count[slot], columns.static.shape[0]
+    slot, size = flow.slot[e], T.shape[0]
     for p in range(slopes.shape[0]):
         carry_free(flow, slot, flow.length[e], slopes[p], work.pairs)
     for c in range(size):
-        for i in range(count):
-            work.amplitude[i] = 0j
-            for k in range(size):
-                work.amplitude[i] += modes.left[slot, i, k] * T[k, c]
-        _spread_free(flow, slot, work.amplitude, work)
-        for k in range(size):
-            work.slope[k, c] = 0.0
-        for i in range(count):
-            after = modes.rate[slot, i] * work.factor[i] * work.amplitude[i]
-            for k in range(size):
-                work.slope[k, c] += modes.weight[slot, i] * (modes.right[slot, k, i] * after).real
-            for p in range(parameters):
-                gain = _gain(machine, flow, e, omega, columns, i, p, 0.0, work)
-                gain *= modes.weight[slot, i]
-                for k in range(size):
-                    slopes[p, k, c] += (modes.right[slot, k, i] * gain).real
+        _vary_column(machine, flow, e, omega, columns, c, T, slopes, work)
     for p in range(slopes.shape[0]):
         more = longer[p] - before[p]
         for k in range(size):
@@ -459,7 +443,40 @@ def _vary_map(
     carry_free(flow, slot, flow.length[e], T, work.pairs)
 
 
-@kernel(inline=True)
+@kernel
+def _vary_column(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    c: int,
+    T: Real,
+    slopes: Real,
+    work: ColumnWork,
+) -> None:
+    """What the parameters bring into column c of the map, and its rate at the segment's end."""
+    modes, slot, size = flow.modes, flow.slot[e], T.shape[0]
+    count = modes.mode_count[slot]
+    for i in range(count):
+        work.amplitude[i] = 0j
+        for k in range(size):
+            work.amplitude[i] += modes.left[slot, i, k] * T[k, c]
+    _spread_free(flow, slot, work.amplitude, work)
+    for k in range(size):
+        work.slope[k, c] = 0.0
+    for i in range(count):
+        weight = modes.weight[slot, i]
+        after = weight * modes.rate[slot, i] * work.factor[i] * work.amplitude[i]
+        for k in range(size):
+            work.slope[k, c] += (modes.right[slot, k, i] * after).real
+        for p in range(columns.static.shape[0]):
+            gain = weight * _gain(machine, flow, e, omega, columns, i, p, 0.0, work)
+            for k in range(size):
+                slopes[p, k, c] += (modes.right[slot, k, i] * gain).real
+
+
+@kernel
 def _kick_map(
     machine: MachineArrays, flow: Flow, e: int, columns: Columns, T: Real, slopes: Real
 ) -> None:

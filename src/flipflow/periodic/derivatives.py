@@ -164,25 +164,26 @@ class MotionDerivatives:
 
         Those are (2 N, P + 1), NaN where two multipliers coincide and may part as a square root.
         """
-        M, slopes = self.map_slopes
-        value, right = np.linalg.eig(M)
-        left = np.linalg.inv(right)
-        slope = np.einsum("ik,pkl,li->ip", left, slopes, right)
-        away = np.abs(value[:, None] - value) + np.diag(np.full(value.size, np.inf))
-        slope[away.min(axis=1) < APART * np.abs(value).max()] = np.nan
+        value, slope = self.eigenvalues
         if self.half_turn:
             slope = 2.0 * value[:, None] * slope
-        mu = full_turn(value, half_turn=self.half_turn)
         order = np.argsort(-np.abs(value), kind="stable")
-        return mu, slope[order]
+        return full_turn(value, half_turn=self.half_turn), slope[order]
+
+    @cached_property
+    def eigenvalues(self) -> tuple[Complex, Complex]:
+        """Eigenvalues of the return map (2 N,) and their derivatives (2 N, P + 1)."""
+        M, slopes = self.map_slopes
+        value, right = np.linalg.eig(M)
+        slope = np.einsum("ik,pkl,li->ip", np.linalg.inv(right), slopes, right)
+        away = np.abs(value[:, None] - value) + np.diag(np.full(value.size, np.inf))
+        slope[away.min(axis=1) < APART * np.abs(value).max()] = np.nan
+        return value, slope
 
     @cached_property
     def map_slopes(self) -> tuple[Real, Real]:
         """The monodromy matrix (with sign over half a turn) and its derivatives (P + 1, ...)."""
-        return self.map_slopes_along(self.state)
-
-    def map_slopes_along(self, state: Real) -> tuple[Real, Real]:
-        """As ``map_slopes``, the state's derivatives (2 N, P + 1) given."""
+        state = self.state
         self._fly(self.problem)
         _, _, T, slopes = self._vary(state, with_map=True)
         return self.problem.sign * T, self.problem.sign * slopes
@@ -210,7 +211,7 @@ class MotionDerivatives:
         motion, spring = self.motion, self.solver.springs[j]
         t, piece = motion.samples(SAMPLES * self.solver.turns)
         y, v = (motion.piece_derivative(t, piece, k) @ spring.direction for k in range(2))
-        turn = np.flatnonzero((v[:-1] * v[1:] <= 0.0) & (piece[:-1] == piece[1:]))
+        turn = np.flatnonzero((v[:-1] * v[1:] <= 0.0) & (np.diff(piece) == 0))
         if turn.size == 0:
             return False
         low, high, where = t[turn], t[turn + 1], piece[turn]
@@ -220,9 +221,9 @@ class MotionDerivatives:
             step = np.divide(rate, bend, out=np.zeros(rate.shape), where=bend != 0.0)
             top = np.clip(top - step, low, high)
         tops = motion.piece_derivative(top, where, 0) @ spring.direction
-        limit = GRAZES * float(np.abs(y).max())
-        gaps = spring.gaps[0], -spring.gaps[1]
-        return any(bool((np.abs(tops - gap) < limit).any()) for gap in gaps)
+        gaps = np.array([spring.gaps[0], -spring.gaps[1]])
+        away = float(np.min(np.abs(np.subtract.outer(tops, gaps))))
+        return away < GRAZES * float(np.abs(y).max())
 
     def _refuse_one_sided_damping(self) -> None:
         """A damper that acts on the way in alone has no derivative at zero damping."""
