@@ -10,7 +10,7 @@ from numpy.polynomial import chebyshev
 
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_parts, with_springs
-from flipflow.dynamics.machine_series import MachineSeries, machine_series
+from flipflow.dynamics.machine_series import EXACT, MachineSeries, machine_series
 from flipflow.dynamics.parameter_tangent import Columns
 from flipflow.errors import InputError
 from flipflow.model.system import MechanicalSystem
@@ -69,7 +69,7 @@ def machine_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> Ma
     """
     kept = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
     own = machine_parts(with_springs(system, kept))
-    rows = [_slopes(system, kept, one) for one in parameters]
+    rows = [_slopes(system, kept, own, one) for one in parameters]
     parts = {
         name: np.array([row[name] for row in rows]).reshape(len(rows), *array.shape)
         for name, array in own.items()
@@ -111,28 +111,54 @@ def stop_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> dict[
     """
     acting = [j for j, spring in enumerate(system.springs) if spring.acts]
     own = machine_parts(with_springs(system, acting))
-    rows = [_slopes(system, acting, one) for one in parameters]
+    rows = [_slopes(system, acting, own, one) for one in parameters]
     return {
         name: np.array([row[name] for row in rows]).reshape(len(rows), *own[name].shape)
         for name in ("stop", "gap", "direction")
     }
 
 
-def _slopes(system: MechanicalSystem, kept: list[int], one: Named) -> dict[str, Real]:
-    """Derivatives of all parts with respect to one parameter."""
+def _slopes(
+    system: MechanicalSystem, kept: list[int], own: dict[str, Real], one: Named
+) -> dict[str, Real]:
+    """Derivatives of all parts with respect to one parameter; ``own`` are the machine's own."""
     width = WIDTH * abs(one.value) or 1.0
+
+    def at(value: float) -> dict[str, Real]:
+        return _parts_at(system, kept, one, value)
+
     for low, high in ((-width, width), (0.0, width), (-width, 0.0)):
         try:
-            series = machine_series(
-                lambda value: _parts_at(system, kept, one, value),
-                one.value + low,
-                one.value + high,
-            )
+            if low < 0.0 < high:
+                quadratic = _quadratic_slope(at, own, one.value, width)
+                if quadratic is not None:
+                    return quadratic
+            series = machine_series(at, one.value + low, one.value + high)
         except (ArithmeticError, ValueError):  # the machine does not take a value on that side
             continue
         if series is not None:
             return _slope_of(series, one.value)
     raise InputError(one.name, one.value, SMOOTH)
+
+
+def _quadratic_slope(
+    at: Callable[[float], dict[str, Real]], own: dict[str, Real], value: float, width: float
+) -> dict[str, Real] | None:
+    """Central differences, exact where every part is quadratic; None where one is not."""
+    far, near = ([at(value + share * width) for share in (-s, s)] for s in (1.0, 0.5))
+    found = {}
+    for name, middle in own.items():
+        finite = np.isfinite(middle)
+        here = np.where(finite, middle, 0.0)
+        wide, close = ([np.where(finite, one[name], 0.0) for one in pair] for pair in (far, near))
+        slope, again = (wide[1] - wide[0]) / 2.0, close[1] - close[0]
+        bend, half_bend = (pair[1] - 2.0 * here + pair[0] for pair in (wide, close))
+        off = max(np.abs(slope - again).max(initial=0.0),
+                  np.abs(bend - 4.0 * half_bend).max(initial=0.0))  # fmt: skip
+        if off > EXACT * np.abs(here).max(initial=0.0) + EXACT * np.abs(slope).max(initial=0.0):
+            return None
+        found[name] = np.asarray(slope / width)
+    return found
 
 
 def _parts_at(
