@@ -227,9 +227,9 @@ class MotionDerivatives:
 
     def _refuse_one_sided_damping(self) -> None:
         """A damper that acts on the way in alone has no derivative at zero damping."""
-        touched = self.columns.parts["stop"][:, 1].any(axis=0)
+        touched = np.flatnonzero(self.columns.parts["stop"][:, 1].any(axis=0))
         for j, spring in enumerate(self.solver.springs):
-            if touched[j] and spring.damping == 0.0 and spring.law == "undamped-rebound":
+            if j in touched and spring.damping == 0.0 and spring.law == "undamped-rebound":
                 remedy = "give the undamped-rebound stop some damping first"
                 raise InputError("damping", spring.damping, remedy)
 
