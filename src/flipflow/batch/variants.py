@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Int, Real
-from flipflow.dynamics.assembly import machine_arrays, system_parts
+from flipflow.dynamics.assembly import machine_arrays, machine_parts
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
 from flipflow.errors import InputError
@@ -154,7 +154,7 @@ def _flat(machine: Machine) -> tuple[Real, Shapes, MechanicalSystem] | None:
     system = machine.system()
     if any(not spring.acts or spring.bonded for spring in system.springs):
         return None
-    parts = system_parts(system)
+    parts = machine_parts(system)
     flat = np.concatenate([part.ravel() for part in parts.values()])
     return flat, {name: part.shape for name, part in parts.items()}, system
 

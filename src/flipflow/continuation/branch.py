@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +33,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import STABLE, stability_words
 from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Result, above
 
 Real = NDArray[np.float64]
 Node = tuple[float, float]  # position along the branch, and omega there
@@ -73,6 +75,35 @@ class SpecialPoint:
     def amplitude(self, which: Coordinate) -> float:
         """Half peak-to-peak of a coordinate in m."""
         return self.orbit.amplitude(which)
+
+    def sensitivity(self, names: Sequence[str]) -> Real:
+        r"""Exact derivatives of the point's frequency with respect to parameters of the machine.
+
+        Of a fold, with l the left vector of the eigenvalue 1 and r the residual of the motion,
+
+        .. math:: \frac{d \omega}{d p} = -\frac{l\, r_p}{l\, r_\omega} ;
+
+        of the others by what is zero there: the depth at a gap, the eigenvalue + 1, the size of
+        the pair - 1.
+
+        Parameters
+        ----------
+        names
+            P parameters, as of :meth:`Orbit.sensitivity`, without "omega".
+
+        Returns
+        -------
+        ndarray
+            In rad/s per SI unit of each parameter, (P,).
+
+        Raises
+        ------
+        InputError
+            For an unknown name, and for a kind of point that no such condition defines.
+        IncompleteError
+            Where the point is a corner, and where a parameter takes it away.
+        """
+        return cast("Real", above("studies.derivatives", "point_sensitivity")(self, names))
 
 
 @dataclass(frozen=True)

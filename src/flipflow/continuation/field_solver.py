@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation.correction import SHARP, Course
 from flipflow.continuation.varied import Varied, new_varied_work
-from flipflow.dynamics.assembly import system_parts
+from flipflow.dynamics.assembly import machine_parts, with_springs
 from flipflow.dynamics.machine_series import machine_series
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
@@ -59,10 +59,10 @@ class FieldSolver(ExactSolver):
         low, high = bounds
         inner = system_at(own if low < own < high else 0.5 * (low + high))
         kept = [j for j, spring in enumerate(inner.springs) if spring.acts and not spring.bonded]
-        super().__init__(_with_springs(inner, kept), half_turn=half_turn, turns=turns)
+        super().__init__(with_springs(inner, kept), half_turn=half_turn, turns=turns)
         self.system_at, self.bounds, self.own, self.omega = system_at, bounds, own, omega
         series = machine_series(
-            lambda value: system_parts(_with_springs(system_at(value), kept)), *bounds
+            lambda value: machine_parts(with_springs(system_at(value), kept)), *bounds
         )
         if series is None:
             raise IncompleteError(
@@ -138,10 +138,3 @@ class FoldSolver(FieldSolver):
     ) -> None:  # fmt: skip
         super().__init__(system_at, bounds, own, 0.0, half_turn=half_turn, turns=turns)
         self.unknowns = 2 * self.system.size + 1
-
-
-def _with_springs(system: MechanicalSystem, kept: list[int]) -> MechanicalSystem:
-    """A system with these springs, whatever their gaps; of the others those that always act."""
-    others = [spring for j, spring in enumerate(system.springs) if j not in kept]
-    rest = replace(system, springs=tuple(others)).with_bonded()
-    return replace(rest, springs=tuple(system.springs[j] for j in kept))

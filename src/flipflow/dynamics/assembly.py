@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -68,23 +69,6 @@ def machine_arrays(system: MechanicalSystem, *, damped: bool = True) -> MachineA
     )
 
 
-def system_parts(system: MechanicalSystem) -> dict[str, Real]:
-    """Arrays of a system, by the names that a machine's series has."""
-    springs = system.springs
-    force = np.array([vector for one in system.excitations for _, vector in one.terms])
-    m, n = len(springs), system.size
-    return {
-        "inertia": system.M,
-        "damping": system.C,
-        "stiffness": system.K,
-        "direction": np.array([spring.direction for spring in springs]).reshape(m, n),
-        "force": np.concatenate([force.real, force.imag]),
-        "static": system.constant_force[None],
-        "stop": np.array([[s.stiffness for s in springs], [s.damping for s in springs]], float),
-        "gap": np.array([spring.gaps for spring in springs], float).reshape(m, 2),
-    }
-
-
 def _require_hold(system: MechanicalSystem) -> None:
     """Refuse a machine with a free motion that no stop ever ends, or that nothing damps."""
     sizes = np.linalg.svd(system.K, compute_uv=False).tolist()
@@ -118,3 +102,27 @@ def stops_of(springs: Sequence[ClearanceSpring]) -> Stops:
         damping=np.array([spring.damping for spring in springs], float),
         gap=np.array([spring.gaps for spring in springs], float).reshape(-1, 2),
     )
+
+
+def with_springs(system: MechanicalSystem, kept: list[int]) -> MechanicalSystem:
+    """A system with these springs, whatever their gaps; of the others those that always act."""
+    others = [spring for j, spring in enumerate(system.springs) if j not in kept]
+    rest = replace(system, springs=tuple(others)).with_bonded()
+    return replace(rest, springs=tuple(system.springs[j] for j in kept))
+
+
+def machine_parts(system: MechanicalSystem) -> dict[str, Real]:
+    """Arrays of a system, by the names of a series of machines."""
+    springs = system.springs
+    force = np.array([vector for one in system.excitations for _, vector in one.terms])
+    m, n = len(springs), system.size
+    return {
+        "inertia": system.M,
+        "damping": system.C,
+        "stiffness": system.K,
+        "direction": np.array([spring.direction for spring in springs]).reshape(m, n),
+        "force": np.concatenate([force.real, force.imag]),
+        "static": system.constant_force[None],
+        "stop": np.array([[s.stiffness for s in springs], [s.damping for s in springs]], float),
+        "gap": np.array([spring.gaps for spring in springs], float).reshape(m, 2),
+    }

@@ -338,18 +338,19 @@ def carry_tangent(
         slot = flow.slot[e]
         length = flow.length[e]
         if slope != 0.0:
-            _add_driven_slope(machine, flow, slot, omega, flow.start[e], -slope, U)
-        _carry_free(flow, slot, length, U, work)
+            add_driven_slope(machine, flow, slot, omega, flow.start[e], -slope, U)
+        carry_free(flow, slot, length, U, work)
         if slope != 0.0:
-            _add_driven_slope(machine, flow, slot, omega, flow.start[e] + length, slope, U)
+            add_driven_slope(machine, flow, slot, omega, flow.start[e] + length, slope, U)
         if flow.kick[e] != 0.0:
             saltation(machine, flow.spring[e], flow.kick[e], U, size)
 
 
 @kernel(inline=True)
-def _add_driven_slope(
+def add_driven_slope(
     machine: MachineArrays, flow: Flow, slot: int, omega: float, t: float, share: float, U: Real
 ) -> None:
+    """Add a share of the driven motion's derivative in omega at time t to the last column."""
     last = U.shape[1] - 1
     for w in range(machine.order.shape[0]):
         order = machine.order[w]
@@ -360,7 +361,7 @@ def _add_driven_slope(
 
 
 @kernel(inline=True)
-def _carry_free(flow: Flow, slot: int, length: float, U: Real, work: Complex) -> None:
+def carry_free(flow: Flow, slot: int, length: float, U: Real, work: Complex) -> None:
     """U = exp(A length) U by the modes of the contact state."""
     modes = flow.modes
     size, columns = U.shape

@@ -110,6 +110,20 @@ def exit_of(stops: Stops, j: int, regime: int, e: int) -> tuple[float, float, in
 
 
 @kernel(inline=True)
+def exit_between(
+    stops: Stops, j: int, before: int, after: int
+) -> tuple[float, float, float, float]:
+    """h = alpha p + beta p' of a change that has happened: alpha, beta, d alpha/dk, d beta/dc."""
+    if before * after != 0:
+        law, piece = stops.law[j], abs(before)
+        for e in range(MOST_EXITS):
+            alpha, beta, target = exit_of(stops, j, before, e)
+            if target == abs(after):
+                return alpha, beta, EXITS[law, piece, e, 1], EXITS[law, piece, e, 3]
+    return 1.0, 0.0, 0.0, 0.0
+
+
+@kernel(inline=True)
 def regime_at(stops: Stops, j: int, y: float, v: float) -> int:
     """Regime of spring j at position y and rate v; exactly at the gap the rate decides."""
     plus, minus = stops.gap[j, 0], stops.gap[j, 1]

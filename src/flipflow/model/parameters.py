@@ -18,13 +18,14 @@ from flipflow.errors import InputError
 from flipflow.model.arguments import checked_text
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import scaled
-from flipflow.model.fields import MOTION_FIELDS
+from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 
 OF_SPRING = ("stiffness", "damping", "clearance", "clearance_minus")
 PATH = re.compile(rf"springs\[([0-9]+)\]\.({'|'.join(OF_SPRING)})")
 FORCING = "forcing"
+FINITE = "give the machine a finite value of it first"
 COUNTS = (int, "int")  # fields of this type are counted, and have no values between
 
 
@@ -48,8 +49,27 @@ def parameter_of(machine: Machine, name: object) -> Parameter:
     """
     found = named_parameter(machine, name, "field", ("omega",))
     if not math.isfinite(found.value):
-        raise InputError(found.name, found.value, "give the machine a finite value of it first")
+        raise InputError(found.name, found.value, FINITE)
     return found
+
+
+def differentiable(machine: Machine, name: object) -> Parameter:
+    """The parameter of a machine with respect to which a motion is differentiated, by its name.
+
+    Of a screen any field that holds a number and no count will do, those of quantities, too.
+
+    Raises
+    ------
+    InputError
+        As of :func:`parameter_of`.
+    """
+    field = FIELD.get(name) if isinstance(name, str) else None
+    if isinstance(machine, FlipFlowScreen) and field is not None and not field.whole:
+        found = _of_fields(machine, field.name)
+        if not math.isfinite(found.value):
+            raise InputError(field.name, getattr(machine, field.name), FINITE)
+        return found
+    return parameter_of(machine, name)
 
 
 def named_parameter(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,10 +28,12 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
 from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Result, above
 
+Pieces = NDArray[np.intp]
 GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 POINTS_PER_TURN = 720  # default times in each forcing period
+ZOOMS, ZOOMED = 2, 33  # how often a summit is looked at more closely, and at how many times
 QUANTITY = "give a function of (t, x, v, a) that returns one number for each time"
 
 
@@ -189,22 +192,26 @@ class Orbit(Frozen, Result):
         """Greatest |quantity| over the period.
 
         ``quantity(t, x, v, a)`` gets times (K,) and displacement, velocity, acceleration (K, N) on
-        a grid with both sides of every change of contact, and returns (K,); the summit between
-        grid points is that of a parabola through the three highest, within one piece.
+        a grid with both sides of every change of contact, and returns (K,); then on finer and finer
+        ones about the highest point, within one piece.
         """
         if not takes(quantity, 4):
             raise InputError("quantity", quantity, QUANTITY)
-        t, piece, *states = self._grid
-        handed = [part.copy() for part in (t, *states)]
-        values = checked_reals("quantity", quantity(*handed), QUANTITY)
-        if values.shape != t.shape:
-            raise InputError("quantity", values, QUANTITY)
-        return _summit(np.abs(values), piece)
+
+        def size(t: Real, _: Pieces, x: Real, v: Real, a: Real) -> Real:
+            handed = (part.copy() for part in (t, x, v, a))
+            values = checked_reals("quantity", quantity(*handed), QUANTITY)
+            if values.shape != t.shape:
+                raise InputError("quantity", values, QUANTITY)
+            return np.abs(values)
+
+        return self._highest(size)
 
     def stop_force_peak(self, spring: int = 0) -> float:
         """Greatest |H| of a stop over the period in N."""
-        _, piece, x, v, _ = self._grid
-        return _summit(np.abs(self._force(spring, x, v, piece)), piece)
+        return self._highest(
+            lambda _, piece, x, v, __: np.abs(self._force(spring, x, v, piece)),
+        )
 
     def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
         """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
@@ -216,7 +223,7 @@ class Orbit(Frozen, Result):
         if spring is not None:
             self._spring(spring)
 
-        def square(t: Real, piece: NDArray[np.intp]) -> Real:
+        def square(t: Real, piece: Pieces) -> Real:
             rate = self.motion.piece_derivative(t, piece, 1) @ vector
             if spring is None:
                 return np.asarray(rate**2)
@@ -232,7 +239,7 @@ class Orbit(Frozen, Result):
         """
         stop = self._spring(spring)
 
-        def power(t: Real, piece: NDArray[np.intp]) -> Real:
+        def power(t: Real, piece: Pieces) -> Real:
             x, v, _ = states_on(self.motion, t, piece)
             return self._force(spring, x, v, piece) * (v @ stop.direction)
 
@@ -243,14 +250,51 @@ class Orbit(Frozen, Result):
         speeds = [1j * order * self.omega for order in self.system.orders]
         forces = [self.system.force(self.omega, order) for order in self.system.orders]
 
-        def power(t: Real, piece: NDArray[np.intp]) -> Real:
+        def power(t: Real, piece: Pieces) -> Real:
             turns = np.exp(np.outer(t, speeds))
             rate = self.motion.piece_derivative(t, piece, 1)
             return np.asarray(np.sum((turns @ forces).real * rate, axis=1))
 
         return self._mean(power)
 
-    def _mean(self, function: Callable[[Real, NDArray[np.intp]], Real]) -> float:
+    def sensitivity(
+        self, quantity: str | tuple[str, Coordinate], names: Sequence[str]
+    ) -> NDArray[Any]:
+        r"""Exact derivatives of what is read off the motion, as it moves with parameters.
+
+        With the flow :math:`\varphi` over the period, z = phi(z, p) gives the state's
+        :math:`z_p = (I - M)^{-1} \varphi_p`, M the monodromy matrix; what is read off follows by
+        the chain rule along the motion, own dependence on a parameter included.
+
+        Parameters
+        ----------
+        quantity
+            "state" at t = 0, "multipliers", a quantity of the machine such as "stop_force", or a
+            reading with its coordinate or spring: ("amplitude", "relative"), ("mean", 0),
+            ("phase", 0), ("mean_square_velocity", 0), ("contact_share", 0),
+            ("stop_force_peak", 0).
+        names
+            P parameters: fields of the machine, or of a plain system "forcing" and places such
+            as "springs[0].clearance"; and "omega".
+
+        Returns
+        -------
+        ndarray
+            In SI, (P,); of the state (2 N, P), of the multipliers (2 N, P), complex, NaN where two
+            of them coincide.
+
+        Raises
+        ------
+        InputError
+            For an unknown quantity or name, and where the machine has a kink in a parameter.
+        IncompleteError
+            At a fold, and where a derivative has two sides: at grazing under a law whose force
+            kicks on entry (for multipliers under every law), at two peaks of one height.
+        """
+        found = above("studies.derivatives", "orbit_sensitivity")(self, quantity, names)
+        return cast("NDArray[Any]", found)
+
+    def _mean(self, function: Callable[[Real, Pieces], Real]) -> float:
         nodes, weights = _gauss_rule()
         start, length = self.motion.start, self.motion.length
         # A free piece may last the whole turn and hold many harmonics: cut it up.
@@ -270,10 +314,23 @@ class Orbit(Frozen, Result):
         return np.asarray(self.motion.derivative(times, order) @ self.system.coordinate(which))
 
     @cached_property
-    def _grid(self) -> tuple[Real, NDArray[np.intp], Real, Real, Real]:
+    def _grid(self) -> tuple[Real, Pieces, Real, Real, Real]:
         """Times, pieces, displacement, velocity, acceleration on the motion's own grid."""
         t, piece = self.motion.samples()
         return t, piece, *states_on(self.motion, t, piece)
+
+    def _highest(self, size: Callable[[Real, Pieces, Real, Real, Real], Real]) -> float:
+        """Greatest value over the period of a function of times, pieces and states."""
+        t, piece, *states = self._grid
+        values = size(t, piece, *states)
+        for _ in range(ZOOMS):
+            k = int(values.argmax())
+            low, high = max(k - 1, 0), min(k + 1, t.size - 1)
+            low, high = (one if piece[one] == piece[k] else k for one in (low, high))
+            t = np.linspace(t[low], t[high], ZOOMED)
+            piece = np.full(ZOOMED, piece[k])
+            values = size(t, piece, *states_on(self.motion, t, piece))
+        return _summit(values)
 
     @property
     def touches(self) -> bool:
@@ -296,7 +353,7 @@ class Orbit(Frozen, Result):
         remedy = f"the machine has {count} springs, from 0 on"
         return self._springs[checked_index("spring", number, count, remedy)]
 
-    def _regime(self, spring: int, piece: NDArray[np.intp]) -> Int:
+    def _regime(self, spring: int, piece: Pieces) -> Int:
         """Regime of a spring in each piece: one without gap always pushes."""
         if self._spring(spring).bonded:
             return np.full(piece.shape, WHOLE)
@@ -304,7 +361,7 @@ class Orbit(Frozen, Result):
             return np.full(piece.shape, OPEN)
         return np.asarray(self.motion.regime[piece, self._kept.index(spring)])
 
-    def _force(self, spring: int, x: Real, v: Real, piece: NDArray[np.intp]) -> Real:
+    def _force(self, spring: int, x: Real, v: Real, piece: Pieces) -> Real:
         """Force of a spring of the machine as it was given, at displacement and velocity (K, N)."""
         stop, regime = self._spring(spring), self._regime(spring, piece)
         y, rate = x @ stop.direction, v @ stop.direction
@@ -360,11 +417,11 @@ def _gauss_rule() -> tuple[Real, Real]:
     return nodes, weights
 
 
-def _summit(values: Real, piece: NDArray[np.intp]) -> float:
-    """Top of the parabola through the highest sample and its neighbours in the same piece."""
+def _summit(values: Real) -> float:
+    """Top of the parabola through the highest sample and its neighbours."""
     k = int(values.argmax())
-    if k in (0, values.size - 1) or not piece[k - 1] == piece[k] == piece[k + 1]:
+    if k in (0, values.size - 1):
         return float(values[k])
-    a, b, c = values[k - 1], values[k], values[k + 1]
+    a, b, c = values[k - 1 : k + 2].tolist()
     curvature = a - 2.0 * b + c
-    return float(b - (c - a) ** 2 / (8.0 * curvature)) if curvature < 0.0 else float(b)
+    return b - (c - a) ** 2 / (8.0 * curvature) if curvature < 0.0 else b

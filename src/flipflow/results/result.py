@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from flipflow.model.system import Coordinate
 
 
-def _above(module: str, name: str) -> Any:
+def above(module: str, name: str) -> Any:
+    """A function of a room above, loaded when it is called for."""
     return getattr(importlib.import_module(f"flipflow.{module}"), name)
 
 
@@ -33,7 +34,7 @@ class Result:
         MissingExtra
             Where xarray is not installed.
         """
-        return cast("xr.Dataset", _above("io.tables", "dataset")(self._arrays()))
+        return cast("xr.Dataset", above("io.tables", "dataset")(self._arrays()))
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the result as one table, a column for each coordinate; units in ``attrs``.
@@ -43,10 +44,10 @@ class Result:
         MissingExtra
             Where pandas is not installed.
         """
-        return cast("pd.DataFrame", _above("io.tables", "dataframe")(self._arrays()))
+        return cast("pd.DataFrame", above("io.tables", "dataframe")(self._arrays()))
 
     def _arrays(self) -> Any:
-        return _above("io.arrays", "arrays_of")(self)
+        return above("io.arrays", "arrays_of")(self)
 
     def plot(
         self,
@@ -74,13 +75,13 @@ class Result:
         MissingExtra
             Where matplotlib is not installed.
         """
-        return cast("Axes", _above("plotting.axes", "draw_on")(self, ax, coordinate, units))
+        return cast("Axes", above("plotting.axes", "draw_on")(self, ax, coordinate, units))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result to a file: see :func:`flipflow.save`."""
-        _above("io.results", "save")(self, path)
+        above("io.results", "save")(self, path)
 
     def _repr_html_(self) -> str:
         """A small table and a small picture, for notebooks."""
-        table = _above("io.tables", "html_table")(self._arrays())
-        return str(table + _above("plotting.notebook", "picture_of")(self))
+        table = above("io.tables", "html_table")(self._arrays())
+        return str(table + above("plotting.notebook", "picture_of")(self))

@@ -1,0 +1,579 @@
+r"""How a recorded flow moves with the machine's parameters: exact first and second derivatives.
+
+With M x'' + C x' + K x + sum_j d_j H_j = f, the derivative x_p at fixed time follows the equation
+of the machine itself under the force
+
+    f_p - M_p x'' - C_p x' - K_p x - sum_j (d_p H_j + d_j H_jp),
+
+H_jp at a fixed state. Within a segment x is a sum of exponentials u_k exp(rate_k t), those of the
+drive and of the rest among them. Mode i answers to each of them with the divided difference
+
+    phi_ik = (exp(rate_i t) - exp(rate_k t)) / (rate_i - rate_k),
+
+so that W_i = sum_k phi_ik u_k is worked out once for all parameters. Where a stop's force jumps the
+velocity is kicked by c M^-1 d times d x_p + d_p x - e_p, the shift of the state against the gap.
+
+The tangent map is a product of exponentials and saltations. Its derivative needs the same W of
+its columns, and how the times of contact move: h_p dt = -(h_z z_p + h_p) / h', with each law's h.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_search import exponential, reciprocal
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.flow import (
+    Flow,
+    add_driven_slope,
+    carry_free,
+    saltation,
+    segment_state,
+)
+from flipflow.dynamics.law import damping_share, exit_between, signed_gap, stiffness_share
+
+CLOSE = 0.3  # half the difference of two exponents below which their quotient is a series
+
+
+class Columns(NamedTuple):
+    """Derivatives of a machine's arrays with respect to P parameters; P = 0 is the same type."""
+
+    inertia: Real  # (P, N, N) M^-1 M_p
+    damping: Real  # (P, N, N) M^-1 C_p
+    stiffness: Real  # (P, N, N) M^-1 K_p
+    direction: Real  # (P, m, N) d_p
+    reach: Real  # (P, m, N) M^-1 d_p
+    static: Real  # (P, N) M^-1 f_0p
+    push: Complex  # (P, E, N) M^-1 f_p
+    stop_stiffness: Real  # (P, m)
+    stop_damping: Real  # (P, m)
+    gap: Real  # (P, m, 2)
+
+
+class ColumnWork(NamedTuple):
+    """Scratch for R modes, W multiples of omega, P parameters and omega."""
+
+    factor: Complex  # (R,) exp(rate_i t)
+    equal: Complex  # (R, R) phi of rates i and j
+    conjugate: Complex  # (R, R) phi of rate i and the conjugate of rate j
+    still: Complex  # (R,) phi of rate i and 0
+    drifting: Complex  # (R,) the same for what grows as t
+    ahead: Complex  # (R, W) half of phi of rate i and i n omega, turned to the segment's start
+    behind: Complex  # (R, W) the same for -i n omega
+    place: Complex  # (R, N) W of the displacements
+    speed: Complex  # (R, N) W of the velocities
+    acceleration: Complex  # (R, N) W of the accelerations
+    amplitude: Complex  # (R,) modal amplitudes of a tangent
+    gain: Complex  # (R, P) what the modes gain over a segment
+    pairs: Complex  # (R, 2 N + P + 1) scratch of the columns carried freely
+    slope: Real  # (2 N, 2 N) rate of the tangent map
+    z: Real  # (2 N,)
+    rate: Real  # (2 N,)
+
+
+def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
+    """Scratch for one lane."""
+    n, waves = machine.direction.shape[1], machine.order.shape[0]
+    R = 2 * n
+    return ColumnWork(
+        factor=np.zeros(R, np.complex128),
+        equal=np.zeros((R, R), np.complex128),
+        conjugate=np.zeros((R, R), np.complex128),
+        still=np.zeros(R, np.complex128),
+        drifting=np.zeros(R, np.complex128),
+        ahead=np.zeros((R, waves), np.complex128),
+        behind=np.zeros((R, waves), np.complex128),
+        place=np.zeros((R, n), np.complex128),
+        speed=np.zeros((R, n), np.complex128),
+        acceleration=np.zeros((R, n), np.complex128),
+        amplitude=np.zeros(R, np.complex128),
+        gain=np.zeros((R, parameters), np.complex128),
+        pairs=np.zeros((R, R + parameters + 1), np.complex128),
+        slope=np.zeros((R, R)),
+        z=np.zeros(R),
+        rate=np.zeros(R),
+    )
+
+
+@kernel(inline=True)
+def divided_difference(a: complex, b: complex, e_a: complex, e_b: complex, t: float) -> complex:
+    """(exp(a t) - exp(b t)) / (a - b), given both exponentials; t exp(a t) where a = b."""
+    x = 0.5 * t * (a - b)
+    square = x * x
+    if x.real * x.real + x.imag * x.imag > CLOSE * CLOSE:
+        return (e_a - e_b) * reciprocal(a - b)
+    series = 1.0 + square / 110.0
+    series = 1.0 + square / 72.0 * series
+    series = 1.0 + square / 42.0 * series
+    series = 1.0 + square / 20.0 * series
+    series = 1.0 + square / 6.0 * series
+    return t * exponential(0.5 * t * (a + b)) * series
+
+
+@kernel(inline=True)
+def drift_integral(a: complex, e_a: complex, t: float) -> complex:
+    """int_0^t exp(a (t - s)) s ds = (exp(a t) - 1 - a t) / a^2."""
+    x = a * t
+    if x.real * x.real + x.imag * x.imag > CLOSE * CLOSE:
+        gap = reciprocal(a)
+        return (e_a - 1.0 - x) * gap * gap
+    series = 1.0 + 0j
+    for k in range(12, 2, -1):
+        series = 1.0 + x / k * series
+    return 0.5 * t * t * series
+
+
+@kernel
+def _prepare(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, t: float, work: ColumnWork
+) -> None:
+    """Divided differences of all rates after ``t`` in segment e."""
+    modes, slot = flow.modes, flow.slot[e]
+    count = modes.mode_count[slot]
+    for i in range(count):
+        work.factor[i] = exponential(modes.rate[slot, i] * t)
+    for i in range(count):
+        a, e_a = modes.rate[slot, i], work.factor[i]
+        work.still[i] = divided_difference(a, 0j, e_a, 1.0 + 0j, t)
+        work.drifting[i] = drift_integral(a, e_a, t)
+        for j in range(count):
+            b, e_b = modes.rate[slot, j], work.factor[j]
+            work.equal[i, j] = divided_difference(a, b, e_a, e_b, t)
+            work.conjugate[i, j] = divided_difference(a, b.conjugate(), e_a, e_b.conjugate(), t)
+    for w in range(machine.order.shape[0]):
+        turning = 1j * (machine.order[w] * omega)
+        turn, after = 0.5 * exponential(turning * flow.start[e]), exponential(turning * t)
+        for i in range(count):
+            a, e_a = modes.rate[slot, i], work.factor[i]
+            work.ahead[i, w] = turn * divided_difference(a, turning, e_a, after, t)
+            back = divided_difference(a, -turning, e_a, after.conjugate(), t)
+            work.behind[i, w] = turn.conjugate() * back
+
+
+@kernel
+def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
+    """W of a free motion with modal amplitudes q (R,)."""
+    modes = flow.modes
+    n, count = work.place.shape[1], modes.mode_count[slot]
+    for i in range(count):
+        for k in range(n):
+            work.place[i, k], work.speed[i, k], work.acceleration[i, k] = 0j, 0j, 0j
+        for j in range(count):
+            rate = modes.rate[slot, j]
+            one, two = work.equal[i, j], work.conjugate[i, j]
+            pair = modes.weight[slot, j] == 2.0
+            for k in range(n):
+                x, v = modes.right[slot, k, j] * q[j], modes.right[slot, n + k, j] * q[j]
+                a = rate * v
+                work.place[i, k] += one * x
+                work.speed[i, k] += one * v
+                work.acceleration[i, k] += one * a
+                if pair:
+                    work.place[i, k] += two * x.conjugate()
+                    work.speed[i, k] += two * v.conjugate()
+                    work.acceleration[i, k] += two * a.conjugate()
+
+
+@kernel
+def _spread_steady(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, work: ColumnWork
+) -> None:
+    """Add W of the drive and of the rest of segment e."""
+    modes, slot = flow.modes, flow.slot[e]
+    n = work.place.shape[1]
+    for i in range(modes.mode_count[slot]):
+        for k in range(n):
+            drift = modes.drift[slot, k]
+            work.place[i, k] += flow.rest[e, k] * work.still[i] + drift * work.drifting[i]
+            work.speed[i, k] += drift * work.still[i]
+        for w in range(machine.order.shape[0]):
+            turning = 1j * (machine.order[w] * omega)
+            ahead, behind = work.ahead[i, w], work.behind[i, w]
+            for k in range(n):
+                x, v = flow.drive[slot, w, k], flow.drive[slot, w, n + k]
+                a = turning * v
+                work.place[i, k] += ahead * x + behind * x.conjugate()
+                work.speed[i, k] += ahead * v + behind * v.conjugate()
+                work.acceleration[i, k] += ahead * a + behind * a.conjugate()
+
+
+@kernel
+def _gain(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    i: int,
+    p: int,
+    driven: float,
+    work: ColumnWork,
+) -> complex:
+    """What mode i gains by parameter p: of the motion itself (driven 1) or of a tangent (0)."""
+    n, slot, left = work.place.shape[1], flow.slot[e], flow.modes.left
+    total = 0j
+    for r in range(n):
+        push = columns.static[p, r] * driven * work.still[i]
+        for s in range(n):
+            push -= (
+                columns.inertia[p, r, s] * work.acceleration[i, s]
+                + columns.damping[p, r, s] * work.speed[i, s]
+                + columns.stiffness[p, r, s] * work.place[i, s]
+            )
+        total += left[slot, i, n + r] * push
+    if driven != 0.0:
+        for x in range(machine.power.shape[0]):
+            w, scale = machine.wave[x], omega ** machine.power[x]
+            for r in range(n):
+                one = columns.push[p, x, r]
+                push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
+                total += left[slot, i, n + r] * push * scale
+    for j in range(machine.direction.shape[0]):
+        total -= _stop_gain(machine, flow, e, columns, i, j, p, driven, work)
+    return total
+
+
+@kernel
+def _stop_gain(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    columns: Columns,
+    i: int,
+    j: int,
+    p: int,
+    driven: float,
+    work: ColumnWork,
+) -> complex:
+    """The share of stop j in ``_gain``."""
+    regime, stops, n = flow.regimes[e, j], machine.stops, work.place.shape[1]
+    f_k, f_c = stiffness_share(stops, j, regime), damping_share(stops, j, regime)
+    if f_k == 0.0 and f_c == 0.0:
+        return 0j
+    slot, still = flow.slot[e], driven * work.still[i]
+    depth = -signed_gap(stops, j, regime) * still
+    turned = -gap_slope(columns, j, regime, p) * still
+    rate, turned_rate = 0j, 0j
+    for s in range(n):
+        depth += machine.direction[j, s] * work.place[i, s]
+        turned += columns.direction[p, j, s] * work.place[i, s]
+        rate += machine.direction[j, s] * work.speed[i, s]
+        turned_rate += columns.direction[p, j, s] * work.speed[i, s]
+    k, c = stops.stiffness[j], stops.damping[j]
+    force = f_k * k * depth + f_c * c * rate
+    slope = f_k * (columns.stop_stiffness[p, j] * depth + k * turned)
+    slope += f_c * (columns.stop_damping[p, j] * rate + c * turned_rate)
+    total = flow.modes.gap_pick[slot, i, j] * slope
+    for r in range(n):
+        total += flow.modes.left[slot, i, n + r] * columns.reach[p, j, r] * force
+    return total
+
+
+@kernel(inline=True)
+def gap_slope(columns: Columns, j: int, regime: int, p: int) -> float:
+    """Derivative of the position of the gap on a regime's side."""
+    return columns.gap[p, j, 0] if regime > 0 else -columns.gap[p, j, 1]
+
+
+@kernel(inline=True)
+def _add_gains(flow: Flow, slot: int, U: Real, work: ColumnWork) -> None:
+    """Add what the modes have gained to the first columns of U."""
+    modes = flow.modes
+    for i in range(modes.mode_count[slot]):
+        for p in range(work.gain.shape[1]):
+            gain = modes.weight[slot, i] * work.gain[i, p]
+            for k in range(U.shape[0]):
+                v = modes.right[slot, k, i]
+                U[k, p] += v.real * gain.real - v.imag * gain.imag
+
+
+@kernel(shared=True)
+def advance_columns(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    elapsed: float,
+    U: Real,
+    work: ColumnWork,
+) -> None:
+    """Carry columns from the start of segment e on by ``elapsed``.
+
+    U is (2 N, P), or (2 N, P + 1) with the derivative in omega at fixed time as the last column.
+    """
+    slot, parameters = flow.slot[e], columns.static.shape[0]
+    in_omega = U.shape[1] > parameters
+    _prepare(machine, flow, e, omega, elapsed, work)
+    if parameters > 0:
+        _spread_free(flow, slot, flow.q[e], work)
+        _spread_steady(machine, flow, e, omega, work)
+    for i in range(flow.modes.mode_count[slot]):
+        for p in range(parameters):
+            work.gain[i, p] = _gain(machine, flow, e, omega, columns, i, p, 1.0, work)
+    if in_omega:
+        add_driven_slope(machine, flow, slot, omega, flow.start[e], -1.0, U)
+    carry_free(flow, slot, elapsed, U, work.pairs)
+    _add_gains(flow, slot, U, work)
+    if in_omega:
+        add_driven_slope(machine, flow, slot, omega, flow.start[e] + elapsed, 1.0, U)
+
+
+@kernel(inline=True)
+def _side(flow: Flow, e: int) -> int:
+    """The regime that tells the side of the stop that changed at the end of segment e."""
+    j = flow.spring[e]
+    before = flow.regimes[e, j]
+    return before if before != 0 else flow.regimes[e + 1, j]
+
+
+@kernel(inline=True)
+def kick_columns(
+    machine: MachineArrays, flow: Flow, e: int, columns: Columns, U: Real, work: ColumnWork
+) -> None:
+    """Saltation of the columns at the end of segment e, at the state in work.z."""
+    j, side, n = flow.spring[e], _side(flow, e), U.shape[0] // 2
+    kick = flow.kick[e] * machine.stops.damping[j]
+    for p in range(U.shape[1]):
+        moved, _ = _moved(machine, columns, j, side, U, p, work)
+        for k in range(n):
+            U[n + k, p] += kick * machine.reach[j, k] * moved
+
+
+@kernel(inline=True)
+def _moved(
+    machine: MachineArrays, columns: Columns, j: int, side: int, U: Real, p: int, work: ColumnWork
+) -> tuple[float, float]:
+    """d x_p + d_p x - e_p and its rate at the state in work.z; p = P stands for omega."""
+    n = U.shape[0] // 2
+    place, rate = 0.0, 0.0
+    for k in range(n):
+        place += machine.direction[j, k] * U[k, p]
+        rate += machine.direction[j, k] * U[n + k, p]
+    if p < columns.static.shape[0]:
+        place -= gap_slope(columns, j, side, p)
+        for k in range(n):
+            place += columns.direction[p, j, k] * work.z[k]
+            rate += columns.direction[p, j, k] * work.z[n + k]
+    return place, rate
+
+
+@kernel(shared=True)
+def carry_columns(
+    machine: MachineArrays, flow: Flow, omega: float, columns: Columns, U: Real, work: ColumnWork
+) -> None:
+    """Carry columns of U, (2 N, P) or (2 N, P + 1), over the recorded flow, at fixed times."""
+    for e in range(flow.segments[0]):
+        length = flow.length[e]
+        advance_columns(machine, flow, e, omega, columns, length, U, work)
+        if flow.kick[e] != 0.0:
+            segment_state(machine, flow, e, omega, length, work.z, work.rate)
+            kick_columns(machine, flow, e, columns, U, work)
+
+
+@kernel
+def _set_shifts(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    U: Real,
+    shift: Real,
+    work: ColumnWork,
+) -> None:
+    """How the end of segment e moves in time, (P + 1,); the state there is in work.z.
+
+    The flow's own end stands at a phase of the force and moves with omega alone.
+    """
+    j, n, parameters = flow.spring[e], U.shape[0] // 2, columns.static.shape[0]
+    if j < 0:
+        for p in range(parameters):
+            shift[p] = 0.0
+        shift[parameters] = -(flow.start[e] + flow.length[e]) / omega
+        return
+    side, stops = _side(flow, e), machine.stops
+    before, after = flow.regimes[e, j], flow.regimes[e + 1, j]
+    alpha, beta, alpha_k, beta_c = exit_between(stops, j, before, after)
+    depth, rate, bend = -signed_gap(stops, j, side), 0.0, 0.0
+    for k in range(n):
+        depth += machine.direction[j, k] * work.z[k]
+        rate += machine.direction[j, k] * work.rate[k]
+        bend += machine.direction[j, k] * work.rate[n + k]
+    for p in range(parameters + 1):
+        moved, moved_rate = _moved(machine, columns, j, side, U, p, work)
+        change = alpha * moved + beta * moved_rate
+        if p < parameters:
+            change += alpha_k * columns.stop_stiffness[p, j] * depth
+            change += beta_c * columns.stop_damping[p, j] * rate
+        shift[p] = -change / (alpha * rate + beta * bend)
+
+
+@kernel
+def _vary_map(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    longer: Real,
+    before: Real,
+    T: Real,
+    slopes: Real,
+    work: ColumnWork,
+) -> None:
+    """Carry T and its derivatives over segment e, which ``_prepare`` has prepared.
+
+    ``longer`` and ``before`` tell how its end and its start move.
+    """
+    slot, size = flow.slot[e], T.shape[0]
+    for p in range(slopes.shape[0]):
+        carry_free(flow, slot, flow.length[e], slopes[p], work.pairs)
+    for c in range(size):
+        _vary_column(machine, flow, e, omega, columns, c, T, slopes, work)
+    for p in range(slopes.shape[0]):
+        more = longer[p] - before[p]
+        for k in range(size):
+            for c in range(size):
+                slopes[p, k, c] += more * work.slope[k, c]
+    carry_free(flow, slot, flow.length[e], T, work.pairs)
+
+
+@kernel
+def _vary_column(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    c: int,
+    T: Real,
+    slopes: Real,
+    work: ColumnWork,
+) -> None:
+    """What the parameters bring into column c of the map, and its rate at the segment's end."""
+    modes, slot, size = flow.modes, flow.slot[e], T.shape[0]
+    count = modes.mode_count[slot]
+    for i in range(count):
+        work.amplitude[i] = 0j
+        for k in range(size):
+            work.amplitude[i] += modes.left[slot, i, k] * T[k, c]
+    _spread_free(flow, slot, work.amplitude, work)
+    for k in range(size):
+        work.slope[k, c] = 0.0
+    for i in range(count):
+        weight = modes.weight[slot, i]
+        after = weight * modes.rate[slot, i] * work.factor[i] * work.amplitude[i]
+        for k in range(size):
+            work.slope[k, c] += (modes.right[slot, k, i] * after).real
+        for p in range(columns.static.shape[0]):
+            gain = weight * _gain(machine, flow, e, omega, columns, i, p, 0.0, work)
+            for k in range(size):
+                slopes[p, k, c] += (modes.right[slot, k, i] * gain).real
+
+
+@kernel
+def _kick_map(
+    machine: MachineArrays, flow: Flow, e: int, columns: Columns, T: Real, slopes: Real
+) -> None:
+    """Saltation S of the map at the end of segment e: S T_p + S_p T, and S T."""
+    j, sign, size = flow.spring[e], flow.kick[e], T.shape[0]
+    n, c = size // 2, machine.stops.damping[j]
+    for p in range(slopes.shape[0]):
+        saltation(machine, j, sign, slopes[p], size)
+    for p in range(columns.static.shape[0]):
+        for column in range(size):
+            gap, turned = 0.0, 0.0
+            for k in range(n):
+                gap += machine.direction[j, k] * T[k, column]
+                turned += columns.direction[p, j, k] * T[k, column]
+            for k in range(n):
+                reach = columns.reach[p, j, k]
+                for s in range(n):
+                    reach -= columns.inertia[p, k, s] * machine.reach[j, s]
+                slope = columns.stop_damping[p, j] * machine.reach[j, k] + c * reach
+                slopes[p, n + k, column] += sign * (slope * gap + c * machine.reach[j, k] * turned)
+    saltation(machine, j, sign, T, size)
+
+
+@kernel(shared=True)
+def carry_variation(
+    machine: MachineArrays,
+    flow: Flow,
+    omega: float,
+    columns: Columns,
+    U: Real,
+    starts: Real,
+    shift: Real,
+    T: Real,
+    slopes: Real,
+    work: ColumnWork,
+) -> None:
+    """Carry columns, the tangent map and the map's derivatives over the recorded flow.
+
+    U (2 N, P + 1) holds the derivatives of the state at its start, omega last, at fixed time;
+    ``starts`` (E, 2 N, P + 1) keeps them at the start of each segment, and ``shift`` (E + 1, P + 1)
+    how the segments' limits move in time. T (2 N, 2 N) is the map, I at first, and ``slopes``
+    (P + 1, 2 N, 2 N) its derivatives, 0 at first; with P + 1 = 0 of them T stays as it is.
+    """
+    parameters = columns.static.shape[0]
+    for p in range(parameters):
+        shift[0, p] = 0.0
+    shift[0, parameters] = -flow.start[0] / omega
+    for e in range(flow.segments[0]):
+        length = flow.length[e]
+        for k in range(U.shape[0]):
+            for p in range(U.shape[1]):
+                starts[e, k, p] = U[k, p]
+        advance_columns(machine, flow, e, omega, columns, length, U, work)
+        segment_state(machine, flow, e, omega, length, work.z, work.rate)
+        _set_shifts(machine, flow, e, omega, columns, U, shift[e + 1], work)
+        if slopes.shape[0] > 0:
+            _vary_map(machine, flow, e, omega, columns, shift[e + 1], shift[e], T, slopes, work)
+        if flow.kick[e] != 0.0:
+            kick_columns(machine, flow, e, columns, U, work)
+            if slopes.shape[0] > 0:
+                _kick_map(machine, flow, e, columns, T, slopes)
+
+
+@kernel(entry=True)
+def vary_flow(
+    machine: MachineArrays,
+    flow: Flow,
+    omega: float,
+    columns: Columns,
+    U: Real,
+    starts: Real,
+    shift: Real,
+    T: Real,
+    slopes: Real,
+    work: ColumnWork,
+) -> None:
+    """``carry_variation`` for callers outside the kernels."""
+    carry_variation(machine, flow, omega, columns, U, starts, shift, T, slopes, work)
+
+
+@kernel(entry=True)
+def columns_at(
+    machine: MachineArrays,
+    flow: Flow,
+    omega: float,
+    columns: Columns,
+    starts: Real,
+    t: Real,
+    piece: Int,
+    out: Real,
+    work: ColumnWork,
+) -> None:
+    """Derivatives of the state (K, 2 N, P + 1) at times t (K,) in given segments (K,)."""
+    for s in range(t.shape[0]):
+        e = piece[s]
+        for k in range(out.shape[1]):
+            for p in range(out.shape[2]):
+                out[s, k, p] = starts[e, k, p]
+        elapsed = t[s] - flow.start[e]
+        advance_columns(machine, flow, e, omega, columns, elapsed, out[s], work)
