@@ -33,7 +33,9 @@ from flipflow.results.result import Result, above
 Pieces = NDArray[np.intp]
 GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 POINTS_PER_TURN = 720  # default times in each forcing period
-ZOOMS, ZOOMED = 2, 33  # how often a summit is looked at more closely, and at how many times
+ZOOMS, ZOOMED = 2, 17  # how often a summit is looked at more closely, and at how many times
+MOST_TOPS = 8  # summits that are looked at more closely
+NEARLY = 0.98  # share of the highest sample below which no summit beside one is higher
 QUANTITY = "give a function of (t, x, v, a) that returns one number for each time"
 
 
@@ -323,14 +325,18 @@ class Orbit(Frozen, Result):
         """Greatest value over the period of a function of times, pieces and states."""
         t, piece, *states = self._grid
         values = size(t, piece, *states)
-        for _ in range(ZOOMS):
-            k = int(values.argmax())
+        best = float(values.max())
+        for k in _tops(values, piece):
             low, high = max(k - 1, 0), min(k + 1, t.size - 1)
             low, high = (one if piece[one] == piece[k] else k for one in (low, high))
-            t = np.linspace(t[low], t[high], ZOOMED)
-            piece = np.full(ZOOMED, piece[k])
-            values = size(t, piece, *states_on(self.motion, t, piece))
-        return _summit(values)
+            ends = t[low], t[high]
+            for _ in range(ZOOMS):
+                fine, same = np.linspace(*ends, ZOOMED), np.full(ZOOMED, piece[k])
+                seen = size(fine, same, *states_on(self.motion, fine, same))
+                top = int(seen.argmax())
+                ends = fine[max(top - 1, 0)], fine[min(top + 1, ZOOMED - 1)]
+            best = max(best, _summit(seen))
+        return best
 
     @property
     def touches(self) -> bool:
@@ -425,3 +431,12 @@ def _summit(values: Real) -> float:
     a, b, c = values[k - 1 : k + 2].tolist()
     curvature = a - 2.0 * b + c
     return b - (c - a) ** 2 / (8.0 * curvature) if curvature < 0.0 else b
+
+
+def _tops(values: Real, piece: Pieces) -> Pieces:
+    """Indices of samples no lower than those beside them in their piece, and nearly the highest."""
+    change = np.diff(piece) != 0
+    rising = np.concatenate([[True], change | (np.diff(values) >= 0.0)])
+    falling = np.concatenate([change | (np.diff(values) <= 0.0), [True]])
+    tops = np.flatnonzero(rising & falling & (values >= NEARLY * values.max()))
+    return tops[np.argsort(-values[tops], kind="stable")[:MOST_TOPS]]
