@@ -27,6 +27,7 @@ from types import NoneType
 import numpy as np
 
 import flipflow as ff
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -252,6 +253,10 @@ def functions() -> tuple[Call, ...]:
         Call("coast_down", ff.coast_down,
              {"machine": tiny(), "speed": OMEGA, "drive": profile(), "duration": 0.1,
               "method": None, "monitor": None}, (RunUp,)),
+        Call("continue_bifurcation", ff.continue_bifurcation,
+             {"point": folded().folds[0], "parameters": ("clearance", "omega"),
+              "bounds": ((5.9e-3, 6.1e-3), (190.0, 215.0)), "monitor": None},
+             (BifurcationCurve,)),
         Call("continue_fold", ff.continue_fold,
              {"fold": folded().folds[0], "field": "clearance", "interval": (5.9e-3, 6.1e-3),
               "monitor": None}, (FieldBranch,)),

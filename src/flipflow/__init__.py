@@ -103,12 +103,16 @@ _HOME = {
 __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
+    from flipflow.continuation.bifurcation_curve import BifurcationCurve as BifurcationCurve
     from flipflow.continuation.branch import Branch as Branch
     from flipflow.continuation.branch import SpecialPoint as SpecialPoint
     from flipflow.continuation.branch_status import BranchStatus as BranchStatus
 
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
-    from flipflow.continuation.continue_field import continue_fold as continue_fold
+    from flipflow.continuation.continue_bifurcation import (
+        continue_bifurcation as continue_bifurcation,
+    )
+    from flipflow.continuation.continue_bifurcation import continue_fold as continue_fold
     from flipflow.continuation.continue_orbit import continue_orbit as continue_orbit
     from flipflow.continuation.continue_orbit import switch_branch as switch_branch
     from flipflow.continuation.field_branch import FieldBranch as FieldBranch

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -87,6 +88,16 @@ MADE: dict[type, list[Callable[[], object]]] = {
     FieldBranch: [
         lambda: ff.continue_orbit(response().orbit(3), "clearance", (5.9e-3, 6.1e-3)),
         lambda: ff.continue_fold(response().folds[0], "clearance", (5.8e-3, 6.2e-3)),
+    ],
+    BifurcationCurve: [
+        lambda: ff.continue_bifurcation(
+            response().folds[0], ("clearance", "omega"), ((5.8e-3, 6.2e-3), (190.0, 215.0))
+        ),
+        lambda: ff.continue_bifurcation(
+            response().folds[0],
+            ("stop_stiffness", "clearance"),
+            ((8e6, 8.2e6), (5.8e-3, 6.2e-3)),
+        ),
     ],
     Orbit: [
         lambda: response().orbits_at(203.0)[0],

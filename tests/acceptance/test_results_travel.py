@@ -47,6 +47,9 @@ def large() -> ff.Orbit:
 MADE: dict[str, Callable[[], object]] = {
     "Branch": branch,
     "FieldBranch": lambda: ff.continue_orbit(large(), "clearance", (5e-3, 7e-3)),
+    "BifurcationCurve": lambda: ff.continue_bifurcation(
+        branch().folds[0], ("clearance", "omega"), ((5e-3, 7e-3), (150.0, 230.0))
+    ),
     "Orbit": large,
     "Basins": lambda: ff.basins(
         screen(),

@@ -13,6 +13,7 @@ from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.orbit_row import OrbitRow
 from flipflow.errors import InputError
+from flipflow.model.arguments import checked_text
 from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
 
@@ -31,7 +32,7 @@ class CurvePoint(SpecialPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class BifurcationCurve(OrbitRow[CurvePoint]):
+class BifurcationCurve(OrbitRow):
     """Special points of one kind followed in the plane of two parameters.
 
     Arrays are (n,) over its points, in their order along the curve. It is what
@@ -77,7 +78,9 @@ class BifurcationCurve(OrbitRow[CurvePoint]):
         kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
         over = " and ".join(self.parameters)
         size = len(self.orbits)
-        return f"BifurcationCurve({self.kind} over {over}, {size} points, {kinds}, {self.status.name})"
+        return (
+            f"BifurcationCurve({self.kind} over {over}, {size} points, {kinds}, {self.status.name})"
+        )
 
     def along(self, parameter: str) -> Real:
         """Values of one of both parameters along the curve, (n,)."""
@@ -85,3 +88,8 @@ class BifurcationCurve(OrbitRow[CurvePoint]):
             choice = " or ".join(map(repr, self.parameters))
             raise InputError("parameter", parameter, f"give {choice}")
         return np.asarray(self.values[:, self.parameters.index(parameter)])
+
+    def points_of(self, kind: str) -> tuple[CurvePoint, ...]:
+        """Special points of one kind, in the curve's order."""
+        checked_text("kind", kind)
+        return tuple(point for point in self.special_points if point.kind == kind)

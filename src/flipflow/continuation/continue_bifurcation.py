@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import cast
@@ -106,16 +105,17 @@ def continue_bifurcation(
     names = _checked_names(parameters)
     plane = _plane(point.orbit, names, bounds)
     followed = _followed(point, plane, say)
-    order = slice(None) if names == plane.names else slice(None, None, -1)
+    turned = names != plane.names
     kind = GRAZES if point.kind in (CONTACT_BEGIN, CONTACT_END) else point.kind
     return BifurcationCurve(
         machine=point.orbit.machine,
         kind=kind,
         parameters=names,
         orbits=followed.orbits,
-        values=np.ascontiguousarray(followed.values[:, order]),
+        values=followed.values[:, ::-1].copy() if turned else followed.values,
         special_points=tuple(
-            replace(one, values=one.values[order]) for one in followed.special_points
+            replace(one, values=one.values[::-1]) if turned else one
+            for one in followed.special_points
         ),
         status=followed.status,
         notes=followed.notes,
@@ -255,16 +255,16 @@ def _plane(orbit: Orbit, names: tuple[str, str], bounds: object) -> Plane:
             raise InputError("bounds", bounds, "give speeds above 0 rad/s")
         return orbit.machine
 
-    parts = []
+    parts: list[tuple[str, float, tuple[float, float]]] = []
     for k in sorted(range(2), key=lambda k: names[k] == OMEGA):
         if names[k] == OMEGA:
             parameter = Parameter(OMEGA, orbit.omega, at_speed)
         else:
             parameter = parameter_of(orbit.machine, names[k])
-        own = parameter.value
-        parts.append((parameter.name, own, checked_bounds(f"bounds[{k}]", parameter, given[k])))
-    ordered, own, limits = zip(*parts, strict=True)
-    return Plane(orbit.machine, ordered, own, limits)
+        limits = checked_bounds(f"bounds[{k}]", parameter, given[k])
+        parts.append((parameter.name, parameter.value, limits))
+    (first, own, within), (second, at, beside) = parts
+    return Plane(orbit.machine, (first, second), (own, at), (within, beside))
 
 
 def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:

@@ -52,7 +52,7 @@ Of = Callable[[Complex], float]
 
 def curve_points(solver: FieldSolver, traced: Traced) -> tuple[list[Found], list[str]]:
     """All special points in the curve's order, and a sentence for each that was not refined."""
-    values = eigenvalues(traced.jacobian[:, : traced.jacobian.shape[1] - 1, : -1] + _eye(traced))
+    values = eigenvalues(traced.jacobian[:, : traced.jacobian.shape[1] - 1, :-1] + _eye(traced))
     tests = [
         *_turning_tests(solver, traced),
         *_map_tests(solver.sought.test, values, half_turn=solver.half_turn),
@@ -60,9 +60,7 @@ def curve_points(solver: FieldSolver, traced: Traced) -> tuple[list[Found], list
     ]
     found, notes = zeros_of(tests, solver, traced)
     by_kind = {(test.kind, test.spring, test.side): test for test in tests}
-    kept = [
-        one for one in found if not _jumps(by_kind[one.kind, one.spring, one.side], one)
-    ]
+    kept = [one for one in found if not _jumps(by_kind[one.kind, one.spring, one.side], one)]
     return _with_cusps(solver, traced, kept), notes
 
 

@@ -12,6 +12,7 @@ from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.orbit_row import OrbitRow
 from flipflow.continuation.special_points import FOLD
+from flipflow.model.arguments import checked_text
 from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
 
@@ -32,7 +33,7 @@ class FieldSpecialPoint(SpecialPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class FieldBranch(OrbitRow[FieldSpecialPoint]):
+class FieldBranch(OrbitRow):
     """Periodic motions, or folds, followed over a field of the machine.
 
     Arrays are (n,) over its points, in their order along the branch. It is what
@@ -79,3 +80,8 @@ class FieldBranch(OrbitRow[FieldSpecialPoint]):
     def folds(self) -> tuple[FieldSpecialPoint, ...]:
         """The saddle-nodes, in branch order."""
         return self.points_of(FOLD)
+
+    def points_of(self, kind: str) -> tuple[FieldSpecialPoint, ...]:
+        """Special points of one kind, in branch order."""
+        checked_text("kind", kind)
+        return tuple(point for point in self.special_points if point.kind == kind)

@@ -59,7 +59,7 @@ class FieldPoint(Point):
 
 
 class FieldSolver(ExactSolver):
-    """Motions at a fixed frequency, the value of a field the last unknown; curves in two parameters.
+    """Motions at a fixed frequency over a field, the last unknown, and curves in two parameters.
 
     The unknown beside the state is on a curve the frequency, or a second field.
 
@@ -108,9 +108,7 @@ class FieldSolver(ExactSolver):
         curve = sought.test != MOTION
         self.branches_off = not curve
         self.unknowns += int(curve)
-        self.problem = Varied(
-            self.problem, series, omega, own, sought.own, sought.test, sought.gap
-        )
+        self.problem = Varied(self.problem, series, omega, own, sought.own, sought.test, sought.gap)
         self.scratch = new_varied_work(
             self.shooting_work, self.system.size, len(self.springs), pairs=sought.test == PAIR
         )

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
-from flipflow.model.arguments import checked_index, checked_text
+from flipflow.model.arguments import checked_index
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
@@ -18,19 +16,17 @@ from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 
 Real = NDArray[np.float64]
-S = TypeVar("S", bound=SpecialPoint)
 
 
-class OrbitRow(Frozen, Result, Generic[S]):
+class OrbitRow(Frozen, Result):
     """Motions in their order along a branch or a curve, (n,), and what is read off them."""
 
     orbits: tuple[Orbit, ...]
-    special_points: tuple[S, ...]
     status: BranchStatus
 
     @cached_property
     def omega(self) -> Real:
-        """Frequency in rad/s along the branch, (n,); it varies along a curve of folds only."""
+        """Frequency in rad/s, (n,); it varies along curves in two parameters only."""
         return np.array([orbit.omega for orbit in self.orbits])
 
     @cached_property
@@ -57,11 +53,6 @@ class OrbitRow(Frozen, Result, Generic[S]):
     def complete(self) -> bool:
         """Whether the branch was followed to both its ends, or all round."""
         return self.status.complete
-
-    def points_of(self, kind: str) -> tuple[S, ...]:
-        """Special points of one kind, in branch order."""
-        checked_text("kind", kind)
-        return tuple(point for point in self.special_points if point.kind == kind)
 
     def amplitude(self, which: Coordinate) -> Real:
         """Half peak-to-peak of a coordinate at every point in m, (n,)."""

@@ -42,6 +42,8 @@ from flipflow.periodic.shooting import (
 # Step of a difference quotient, as a share of the unknown's own size: the same share of a wide
 # interval would swamp the value.
 DIFFERENCE = 1e-6
+OF_DEPTH = 0.01  # the same as a share of the depth to which a stop is touched
+SMALLEST = 1e-11  # least step; at a smaller one rounding would drown the difference
 BEYOND = 0.01  # share of the interval by which a correction may leave it on its way
 BESIDE_SHARE = 0.2  # size of the second parameter as an unknown, as a share of it
 VALUE_SHARE = 0.05  # longest step in the value, as a share of its size
@@ -80,7 +82,7 @@ class VariedWork(NamedTuple):
 
 
 def new_varied_work(shooting: ShootingWork, size: int, stops: int, *, pairs: bool) -> VariedWork:
-    """Scratch for machines of N degrees of freedom; ``pairs`` where a pair of multipliers counts."""
+    """Scratch for N degrees of freedom; ``pairs`` where pairs of multipliers count."""
     n = 2 * size
     rows = n * (n - 1) // 2 if pairs else n
     return VariedWork(
@@ -165,7 +167,12 @@ def varied_residual(
     for k in range(n):
         work.z[k] = u[k]
     work.z[n] = value
-    set_moves(problem, work, n)
+    set_moves(problem, work, n, DIFFERENCE)
+    if n > size:
+        code, test = evaluate(problem, work, n)
+        if code != status.OK:
+            return code
+        set_moves(problem, work, n, step_share(problem, work))
     for k in range(n + 1):
         code = add_differences(problem, work, n, k, J)
         if code != status.OK:
@@ -182,16 +189,31 @@ def varied_residual(
 
 
 @kernel
-def set_moves(problem: Varied, work: VariedWork, n: int) -> None:
+def step_share(problem: Varied, work: VariedWork) -> float:
+    """Step of a difference quotient of the last motion, as a share of the unknown's size.
+
+    Where a stop is hardly touched the map changes within the depth: the step is a share of that.
+    """
+    flow_depths(problem.shooting, work.shooting, float(work.at[2]), work.depth)
+    least = math.inf
+    for j in range(work.depth.shape[0]):
+        for side in range(2):
+            least = min(least, abs(work.depth[j, side]))
+    state_scale(problem.shooting, work.z, float(work.at[2]), work.move)
+    return max(SMALLEST, min(DIFFERENCE, OF_DEPTH * least / float(work.move[0])))
+
+
+@kernel
+def set_moves(problem: Varied, work: VariedWork, n: int, share: float) -> None:
     """Steps of the difference quotients about the n + 1 unknowns in work.z."""
     size = work.r.shape[0]
     omega = frequency(problem, work.z[:n])
     state_scale(problem.shooting, work.z, omega, work.move)
     for k in range(size):
-        work.move[k] *= DIFFERENCE
+        work.move[k] *= share
     if n > size:
-        work.move[size] = DIFFERENCE * size_beside(problem, float(work.z[size]))
-    work.move[n] = DIFFERENCE * value_size(problem, float(work.z[n]))
+        work.move[size] = share * size_beside(problem, float(work.z[size]))
+    work.move[n] = share * value_size(problem, float(work.z[n]))
 
 
 @kernel
@@ -223,9 +245,7 @@ def add_differences(problem: Varied, work: VariedWork, n: int, k: int, J: Real) 
     behind, ahead = here - step, here + step
     if field:
         series = problem.series
-        low, high = (
-            (series.low, series.high) if k == n else (series.beside_low, series.beside_high)
-        )
+        low, high = (series.low, series.high) if k == n else (series.beside_low, series.beside_high)
         behind, ahead = max(behind, low), min(ahead, high)
     work.z[k] = ahead
     code, after = evaluate(problem, work, n)
@@ -245,7 +265,7 @@ def add_differences(problem: Varied, work: VariedWork, n: int, k: int, J: Real) 
 
 @kernel
 def evaluate(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
-    """Status, and the test function, at the unknowns in work.z; the motion's into work.r, work.J."""
+    """Status, and the test function, at the unknowns in work.z; the motion's are left in work."""
     omega = frequency(problem, work.z[:n])
     if not stand_at(problem, work, float(work.z[n]), value_beside(problem, work.z[:n])):
         return status.NO_CONVERGENCE, math.nan
@@ -261,7 +281,7 @@ def evaluate(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
 
 @kernel
 def critical(problem: Varied, work: VariedWork) -> tuple[int, float]:
-    """Status, and the determinant that is zero where multipliers of the map work.J + I are critical.
+    """Status, and the determinant that is zero where multipliers of work.J + I are critical.
 
     With one at +1 it is that of map - I, with one at -1 that of map + I, and with a product of two
     of 1 that of the second compound matrix of the map, whose eigenvalues these products are, - I.
@@ -365,7 +385,7 @@ def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, en
         return status.OK
     for k in range(n + 1):
         work.z[k] = w[k]
-    set_moves(problem, work, n)
+    set_moves(problem, work, n, DIFFERENCE)
     share = 0.0
     for k in range(n + 1):
         share = max(share, abs(tangent[k]) / work.move[k])

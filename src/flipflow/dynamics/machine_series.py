@@ -2,7 +2,7 @@ r"""A machine that depends on one parameter or on two, as Chebyshev series of it
 
 Masses, dampings, stiffnesses, gaps and forces of a machine over intervals of its parameters are
 
-.. math:: A(v, w) = \sum_{k, l} A_{kl} T_k(x) T_l(y), \qquad x = \frac{2 v - low - high}{high - low},
+.. math:: A(v, w) = \sum_{kl} A_{kl} T_k(x) T_l(y), \qquad x = \frac{2 v - low - high}{high - low},
 
 y likewise of the second. Nearly every field of a machine enters its matrices linearly, and two
 terms are exact.
@@ -196,7 +196,7 @@ def machine_series(
                 name: np.ascontiguousarray(part.reshape(*counts, *array.shape))
                 for (name, array), part in zip(first.items(), split, strict=True)
             }
-            return MachineSeries(low, high, *beside, **arrays)
+            return MachineSeries(low, high, beside[0], beside[1], **arrays)
         terms = 2 * terms - 1
     return None
 

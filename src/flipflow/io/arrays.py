@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
 from flipflow.io.labelled import Arrays, Variable
+from flipflow.model.fields import FIELD
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import is_screen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -144,6 +146,40 @@ def _(branch: FieldBranch) -> Arrays:
         },
         _attributes(branch, field=branch.field, status=branch.status.value),
     )
+
+
+@arrays_of.register
+def _(curve: BifurcationCurve) -> Arrays:
+    unit, system = units_of(curve.machine)["length"], curve.machine.system()
+    values = np.reshape([point.values for point in curve.special_points], (-1, 2))
+    columns = {
+        name: _column("point", curve.values[:, k], unit_of(name))
+        for k, name in enumerate(curve.parameters)
+    }
+    specials = {
+        f"special_{name}": _column("special", values[:, k], unit_of(name))
+        for k, name in enumerate(curve.parameters)
+    }
+    return Arrays(
+        f"{curve.kind} over {' and '.join(curve.parameters)}",
+        "point",
+        {"coordinate": _labels(system.named)},
+        {
+            "omega": _column("point", curve.omega, "rad/s"),
+            **columns,
+            "amplitude": _each("point", system, curve.amplitude, unit),
+            "phase": _each("point", system, curve.phase, "rad"),
+            "multipliers": Variable(("point", "multiplier"), curve.multipliers),
+            **_specials(curve.special_points, system, unit),
+            **specials,
+        },
+        _attributes(curve, kind=curve.kind, status=curve.status.value),
+    )
+
+
+def unit_of(parameter: str) -> str:
+    """The unit of a parameter in SI; none of a field of a user's machine."""
+    return "rad/s" if parameter == "omega" else FIELD[parameter].unit if parameter in FIELD else ""
 
 
 @arrays_of.register

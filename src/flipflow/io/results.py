@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import singledispatch
 from typing import Any
 
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -45,6 +46,7 @@ ORBITS = "flipflow/orbits/1"
 SCHEMAS: dict[type, str] = {
     Branch: "flipflow/branch/1",
     FieldBranch: "flipflow/field-branch/1",
+    BifurcationCurve: "flipflow/bifurcation-curve/1",
     Orbit: "flipflow/orbit/1",
     Basins: "flipflow/basins/1",
     JumpRisk: "flipflow/jump-risk/1",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -15,6 +16,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.bifurcation import bifurcation_figure
+from flipflow.plotting.bifurcation_curves import curves_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.compare import comparison_figure
 from flipflow.plotting.family import family_figure
@@ -74,6 +76,7 @@ OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
     LyapunovExponents: lyapunov_figure,
     JumpRisk: jump_risk_figure,
     Comparison: comparison_figure,
+    BifurcationCurve: curves_figure,
     FoundationLoads: foundation_figure,
 }
 
@@ -92,7 +95,7 @@ def figure(
     ----------
     result
         What an analysis returns: a branch, an orbit, a sweep, an assessment, ...; a list of
-        branches, or the motions of ``periodic_orbits``.
+        branches or of bifurcation curves, or the motions of ``periodic_orbits``.
     coordinate
         What is drawn of the motion, a name or an index; None: what matters most, or all.
     units
@@ -149,4 +152,6 @@ def _builder(result: object, which: Coordinate | None) -> Callable[[], Figure]:
 def _of_several(result: Sequence[object], which: Coordinate | None) -> Figure:
     if result and all(isinstance(one, Orbit) for one in result):
         return orbits_in_time_figure(result, which)  # type: ignore[arg-type]
+    if result and all(isinstance(one, BifurcationCurve) for one in result):
+        return curves_figure(*result)  # type: ignore[arg-type]
     return branches_figure(result, which)  # type: ignore[arg-type]
