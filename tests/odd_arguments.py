@@ -40,6 +40,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins, GridAxis
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import Components, FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -263,6 +264,9 @@ def functions() -> tuple[Call, ...]:
         Call("continue_orbit", ff.continue_orbit,
              {"orbit": orbit(), "field": "omega", "interval": narrow, "monitor": None},
              (Branch, FieldBranch)),
+        Call("design_map", ff.design_map,
+             {"screen": plain(), "omega": OMEGA, "clearance": [5e-3, 6e-3],
+              "stop_stiffness": [7e6, 8e6], "load": ff.Load(), "monitor": None}, (DesignMap,)),
         Call("foundation_loads", ff.foundation_loads,
              {"motions": {"empty": running()}, "runs": None}, (FoundationLoads,)),
         Call("figure", ff.figure,

@@ -29,6 +29,7 @@ _HOME = {
     "switch_branch": "flipflow.continuation.continue_orbit",
     "continue_bifurcation": "flipflow.continuation.continue_bifurcation",
     "continue_fold": "flipflow.continuation.continue_bifurcation",
+    "design_map": "flipflow.studies.design_map",
     "assess": "flipflow.studies.assessment",
     "compare": "flipflow.studies.compare",
     "simulate": "flipflow.transient.simulate",
@@ -72,6 +73,7 @@ _HOME = {
     "Branch": "flipflow.continuation.branch",
     "BranchStatus": "flipflow.continuation.branch_status",
     "Comparison": "flipflow.studies.compare",
+    "DesignMap": "flipflow.studies.design_map",
     "FieldBranch": "flipflow.continuation.field_branch",
     "Figure": "flipflow.plotting.figure",
     "FoundationLoads": "flipflow.studies.foundation_loads",
@@ -164,6 +166,8 @@ if TYPE_CHECKING:
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
     from flipflow.studies.compare import Comparison as Comparison
     from flipflow.studies.compare import compare as compare
+    from flipflow.studies.design_map import DesignMap as DesignMap
+    from flipflow.studies.design_map import design_map as design_map
     from flipflow.studies.foundation_loads import FoundationLoads as FoundationLoads
     from flipflow.studies.foundation_loads import foundation_loads as foundation_loads
     from flipflow.studies.jump_risk import JumpRisk as JumpRisk

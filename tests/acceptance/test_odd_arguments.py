@@ -68,6 +68,7 @@ def test_odd_arguments(kind):
 
 SLOW = {
     "basins",
+    "design_map",
     "jump_risk",
     "continue_bifurcation",
     "continue_fold",

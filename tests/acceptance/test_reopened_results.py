@@ -30,6 +30,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -149,6 +150,7 @@ MADE: dict[type, list[Callable[[], object]]] = {
         )
     ],
     Loading: [lambda: ff.loading(screen(), ff.Load(stiffness_factor=1.1, name="wet"))],
+    DesignMap: [lambda: ff.design_map(screen(), 120.0, [5e-3, 7e-3], [6e6, 9e6])],
     ResponseFamily: [
         lambda: ff.response_family(screen(), {"clearance": [5e-3, 6e-3]}, omega=(80.0, 230.0))
     ],

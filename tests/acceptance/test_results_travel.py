@@ -69,6 +69,9 @@ MADE: dict[str, Callable[[], object]] = {
     "LinearResponse": lambda: ff.linear_response(screen(), np.linspace(10.0, 60.0, 9)),
     "OperatingRegion": lambda: ff.operating_region(screen()),
     "Loading": lambda: ff.loading(screen(), ff.Load(stiffness_factor=1.1)),
+    "DesignMap": lambda: ff.design_map(
+        screen(), 120.0, [5e-3, 7e-3], [6e6, 9e6], load=ff.Load(stiffness_factor=1.1)
+    ),
     "ResponseFamily": lambda: ff.response_family(screen(), {"clearance": [5e-3, 6e-3]}),
     "Sensitivity": lambda: ff.sensitivity(
         screen(), {"clearance": (5.4e-3, 6.6e-3)}, "relative_amplitude", omega=120.0, n=16, rng=0

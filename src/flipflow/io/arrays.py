@@ -27,6 +27,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import (
     DIRECTIONS,
     CaseLoads,
@@ -452,6 +453,19 @@ def _(region: OperatingRegion) -> Arrays:
         },
         _attributes(region, cases="; ".join(case.name or "empty" for case in region.cases)),
     )
+
+
+@arrays_of.register
+def _(found: DesignMap) -> Arrays:
+    dims = "stop_stiffness", "clearance"
+    units = {
+        "omega_cs": "rad/s", "omega_lb": "rad/s", "omega_ub": "rad/s", "width": "rad/s",
+        "amplitude": "m", "steadiness": "",
+    }  # fmt: skip
+    axes = {name: _column(name, getattr(found, name), unit_of(name)) for name in dims}
+    values = {name: Variable(dims, getattr(found, name), unit) for name, unit in units.items()}
+    said = _attributes(found, omega=found.omega)
+    return Arrays("Gap and stop stiffness", "clearance", axes, values, said)
 
 
 @arrays_of.register

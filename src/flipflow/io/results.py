@@ -27,6 +27,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
@@ -60,6 +61,7 @@ SCHEMAS: dict[type, str] = {
     LyapunovExponents: "flipflow/lyapunov-exponents/1",
     BifurcationDiagram: "flipflow/bifurcation-diagram/1",
     LinearResponse: "flipflow/linear-response/1",
+    DesignMap: "flipflow/design-map/1",
     OperatingRegion: "flipflow/operating-region/1",
     Loading: "flipflow/loading/1",
     ResponseFamily: "flipflow/response-family/1",
