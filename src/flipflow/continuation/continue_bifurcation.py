@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
-from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.continue_field import checked_bounds, course_over
-from flipflow.continuation.correction import SHARP
+from flipflow.continuation.correction import QUICK, SHARP, Course
 from flipflow.continuation.curve_points import CUSP, GRAZES, TURNING, curve_points, pair_sum
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
 from flipflow.continuation.field_solver import FieldPoint, FieldSolver, Sought
+from flipflow.continuation.refinement import FOLD as OF_FOLD
 from flipflow.continuation.special_points import (
     CONTACT_BEGIN,
     CONTACT_END,
@@ -29,11 +29,12 @@ from flipflow.continuation.special_points import (
 )
 from flipflow.continuation.switching import follow_both_ways
 from flipflow.continuation.varied import FLIP, GRAZING, PAIR, SADDLE_NODE
-from flipflow.errors import InputError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, members_of
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import Parameter, parameter_of, with_values
 from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import UNDETERMINED
@@ -45,6 +46,8 @@ TESTS = {
     CONTACT_BEGIN: GRAZING, CONTACT_END: GRAZING,
 }  # fmt: skip
 CRITICAL = 1e-3  # distance of a multiplier from 1 beyond which a fold is none of the map
+BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
+FINE = 20.0  # steps in each of these intervals
 GRAZED = 1e-6  # depth beyond a gap that a motion grazes, as a share of the motion
 AT_CORNER = (
     "The fold lies where a contact begins and the branch has a corner: the curve is that of the "
@@ -274,7 +277,7 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
     half_turn = own.half_turn and plane.stays_symmetric
     if point.kind == SYMMETRY and not half_turn:
         raise InputError("parameters", plane.names, "the machine must stay its own mirror image")
-    test, gap, notes = _sought(point)
+    test, gap, start, notes = _sought(point)
     sought = Sought(test, gap) if over_omega else Sought(test, gap, plane.bounds[1], plane.own[1])
     solver = FieldSolver(
         plane.system_at, plane.bounds[0], plane.own[0], 0.0 if over_omega else orbit.omega,
@@ -282,7 +285,7 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
     )  # fmt: skip
     low, high = plane.bounds[1]
     course = course_over(plane.bounds[0], SHARP)._replace(beside_lower=low, beside_upper=high)
-    u = np.append(orbit.state, plane.own[1])
+    u = np.append(start.u, start.omega if over_omega else plane.own[1])
     traced = follow_both_ways(solver, u, plane.own[0], course, say).traced
     say("special points", SPECIAL_SHARE)
     found, unsettled = curve_points(solver, traced) if traced.omega.size else ([], [])
@@ -318,31 +321,66 @@ def _where_it_holds(solver: FieldSolver, traced: Traced, plane: Plane) -> slice:
     """The points of the curve: those of a pair of multipliers up to where it becomes real."""
     if solver.sought.test != PAIR or traced.omega.size == 0:
         return slice(0, traced.omega.size)
-    size = traced.jacobian.shape[1] - 1
-    values = eigenvalues(traced.jacobian[:, :size, :size] + np.eye(size))
-    real = np.abs([pair_sum(row) for row in values]) > 2.0
-    at = np.column_stack([traced.omega, traced.u[:, -1]])
-    start = int(np.abs((at - plane.own) / np.abs(plane.own)).sum(axis=1).argmin())
+    real = np.abs([pair_sum(row) for row in solver.own_multipliers(traced)]) > 2.0
+    off = np.column_stack([traced.omega, traced.u[:, -1]]) - plane.own
+    start = int(np.abs(off / np.ptp(plane.bounds, axis=1)).sum(axis=1).argmin())
     before, after = np.flatnonzero(real[:start]), np.flatnonzero(real[start:])
     first = int(before[-1]) + 1 if before.size else 0
     return slice(first, start + int(after[0]) if after.size else real.size)
 
 
-def _sought(point: SpecialPoint) -> tuple[int, int, list[str]]:
-    """Test and gap of a special point, and what must be said."""
-    test = TESTS[point.kind]
+def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
+    """Test and gap of a special point, the motion to start from, and what must be said."""
+    orbit, test = point.orbit, TESTS[point.kind]
+    # An exact motion, whatever the method that found the point.
+    own = orbit.point.formulation
+    exact = ExactSolver(own.system, half_turn=own.half_turn, turns=own.turns)
+    start = Point(exact.formulation, orbit.state, orbit.omega)
     if test == GRAZING:
-        return test, 2 * point.spring + (0 if point.side > 0 else 1), []
-    values = point.orbit.point.eigenvalues
-    if test != SADDLE_NODE or np.abs(values - 1.0).min() < CRITICAL:
-        return test, 0, []
-    gap = _grazed(point.orbit.point)
-    return (test, 0, []) if gap is None else (GRAZING, gap, [AT_CORNER])
+        return test, 2 * point.spring + (0 if point.side > 0 else 1), start, []
+    if test != SADDLE_NODE or _is_critical(orbit.point):
+        return test, 0, start, []
+    gap = _grazed(start, exact)
+    beside = None if gap is None else _fold_beside(start, exact)
+    if gap is None or beside is not None:
+        return test, 0, beside or start, []
+    return GRAZING, gap, start, [AT_CORNER]
 
 
-def _grazed(point: Point) -> int | None:
+def _is_critical(point: Point) -> bool:
+    return bool(np.abs(point.eigenvalues - 1.0).min() < CRITICAL)
+
+
+def _fold_beside(point: Point, solver: ExactSolver) -> Point | None:
+    """The fold of the map nearest to a motion that grazes.
+
+    Before a hard stop a branch turns back hardly beyond grazing, where both look like one point.
+    """
+    for share in BESIDE:
+        width = share * point.omega
+        course = Course(
+            point.omega - width, point.omega + width, width / FINE, FINE * share, 1.0, QUICK
+        )
+        traced = follow_both_ways(solver, point.u, point.omega, course).traced
+        turns = np.flatnonzero(np.diff(np.sign(traced.tangent[:, -1])))
+        for p in map(int, turns):
+            found = _fold_within(solver, traced, p)
+            if found is not None:
+                return found
+    return None
+
+
+def _fold_within(solver: ExactSolver, traced: Traced, p: int) -> Point | None:
+    """The fold of the map within step p; None where the tangent jumps."""
+    try:
+        _, found = solver.zero_between(traced, OF_FOLD, p, 0.0, 1.0)
+    except IncompleteError:
+        return None
+    return found if _is_critical(found) else None
+
+
+def _grazed(point: Point, solver: ExactSolver) -> int | None:
     """The gap that a motion grazes."""
-    solver = point.formulation.solver()
     size = GRAZED * np.abs(point.u[: point.u.size // 2]).max()
     depths = [
         abs(solver.depth(point, j, side)) for j in range(len(solver.springs)) for side in range(2)

@@ -45,6 +45,7 @@ TWICE = {
 RESONANCES = {"1:1 resonance": 2.0, "1:2 resonance": -2.0, "1:3 resonance": -1.0,
               "1:4 resonance": 0.0}  # fmt: skip
 JUMP = 1e-3  # a test above this share of its values at the ends has jumped there
+NOISE = 1e-8  # share of a parameter by which it changes in a step, below which it stands still
 PARALLEL = 1e-3  # share of the largest tangent in a parameter below which the curve stands still
 
 Of = Callable[[Complex], float]
@@ -52,7 +53,7 @@ Of = Callable[[Complex], float]
 
 def curve_points(solver: FieldSolver, traced: Traced) -> tuple[list[Found], list[str]]:
     """All special points in the curve's order, and a sentence for each that was not refined."""
-    values = eigenvalues(traced.jacobian[:, : traced.jacobian.shape[1] - 1, :-1] + _eye(traced))
+    values = solver.own_multipliers(traced)
     tests = [
         *_turning_tests(solver, traced),
         *_map_tests(solver.sought.test, values, half_turn=solver.half_turn),
@@ -62,10 +63,6 @@ def curve_points(solver: FieldSolver, traced: Traced) -> tuple[list[Found], list
     by_kind = {(test.kind, test.spring, test.side): test for test in tests}
     kept = [one for one in found if not _jumps(by_kind[one.kind, one.spring, one.side], one)]
     return _with_cusps(solver, traced, kept), notes
-
-
-def _eye(traced: Traced) -> Real:
-    return np.eye(traced.jacobian.shape[1] - 1)
 
 
 def pair_sum(values: Complex) -> float:
@@ -171,10 +168,12 @@ def _depth_tests(solver: FieldSolver, traced: Traced) -> list[Test]:
 
 
 def _jumps(test: Test, found: Found) -> bool:
-    """Whether a test changes its sign without a zero, as multipliers do at a corner."""
+    """Whether a test changes its sign without a zero: at a corner, or where it is rounding."""
+    ends = np.abs(test.values[found.index : found.index + 2])
+    if test.kind == TURNING and test.side == 1:
+        return bool(ends.max() < NOISE * abs(cast("FieldPoint", found.point).beside))
     if test.spring >= 0 or test.kind == TURNING:
         return False
-    ends = np.abs(test.values[found.index : found.index + 2])
     if "Neimark-Sacker" in test.kind and not _has_pair(found.point):
         return True
     return abs(test.evaluate(found.point)) > JUMP * ends.max()

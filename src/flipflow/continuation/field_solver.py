@@ -161,10 +161,14 @@ class FieldSolver(ExactSolver):
         tangent = float(work.tangent[-2] * work.scale[-2])
         return share, replace(point, beside_tangent=tangent, own_map=self._map(work.J[:, :-1]))
 
+    def own_multipliers(self, traced: Traced) -> Complex:
+        """Eigenvalues of the return maps along a curve, (n, 2 N)."""
+        return eigenvalues(self._map(traced.jacobian))
+
     def _map(self, jacobian: Real) -> Real:
-        """The return map in a Jacobian."""
+        """The return map in a Jacobian, or in each of several."""
         size = 2 * self.system.size
-        return np.asarray(jacobian[:size, :size] + np.eye(size))
+        return np.asarray(jacobian[..., :size, :size] + np.eye(size))
 
     def _point(
         self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None

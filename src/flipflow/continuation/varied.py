@@ -145,6 +145,14 @@ def open_gap(problem: Varied) -> None:
 
 
 @kernel
+def show_gap(problem: Varied, work: VariedWork) -> None:
+    """Let the grazed gap be what it is, for what is read off a motion."""
+    if problem.test == GRAZING:
+        for side in range(2):
+            problem.shooting.machine.stops.gap[problem.gap // 2, side] = work.gap[side]
+
+
+@kernel
 def frequency(problem: Varied, u: Real) -> float:
     """Frequency of the unknowns u, without the value."""
     return problem.omega if problem.omega > 0.0 else float(u[u.shape[0] - 1])
@@ -337,9 +345,7 @@ def varied_crossings(problem: Varied, work: VariedWork) -> int:
 @kernel
 def varied_depths(problem: Varied, work: VariedWork, value: float, depth: Real) -> None:
     """The shooting's depths, (m, 2); the machine stands at the value already."""
-    if problem.test == GRAZING:
-        for side in range(2):
-            problem.shooting.machine.stops.gap[problem.gap // 2, side] = work.gap[side]
+    show_gap(problem, work)
     flow_depths(problem.shooting, work.shooting, float(work.at[2]), depth)
     if problem.test == GRAZING:
         open_gap(problem)
@@ -359,7 +365,11 @@ def varied_scale(problem: Varied, u: Real, value: float, scale: Real) -> None:
 @kernel
 def varied_better(problem: Varied, work: VariedWork, value: float) -> float:
     """The shooting's better section."""
-    return section.better_section(problem.shooting, work.shooting, float(work.at[2]))
+    show_gap(problem, work)
+    phase = section.better_section(problem.shooting, work.shooting, float(work.at[2]))
+    if problem.test == GRAZING:
+        open_gap(problem)
+    return float(phase)
 
 
 @kernel
