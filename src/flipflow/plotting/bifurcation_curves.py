@@ -11,12 +11,13 @@ from flipflow.plotting.branches import field_axis
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Panel, Trace
-from flipflow.plotting.response import KIND_SYMBOLS, KIND_WORDS, speed_axis
+from flipflow.plotting.response import KIND_SYMBOLS, KIND_WORDS
 from flipflow.plotting.scales import RPM
 
 Real = NDArray[np.float64]
 DASHES = {"grazing": "dot", "period doubling": "dash", "symmetry breaking": "dash",
           "Neimark-Sacker": "dashdot"}  # fmt: skip
+OMEGA = "omega"
 WORDS = {"fold": "jump speed (fold)", "grazing": "contact begins (grazing)"}
 
 
@@ -67,4 +68,6 @@ def curves_figure(*curves: BifurcationCurve) -> Figure:
 
 def _axis(name: str, values: Real) -> tuple[Axis, float]:
     """Axis of a parameter over all of its values, and the factor from SI to its unit."""
-    return (speed_axis(values), RPM) if name == "omega" else field_axis(name, values)
+    if name == OMEGA:
+        return Axis("shaft speed", "rpm"), RPM
+    return field_axis(name, values)
