@@ -177,11 +177,14 @@ def continue_fold(
     return FieldBranch(
         machine=machine,
         field=parameter.name,
-        orbits=followed.orbits,
+        orbits=tuple(map(_over_field, followed.orbits, followed.values[:, 0])),
         values=followed.values[:, 0].copy(),
         special_points=tuple(
             FieldSpecialPoint(
-                CUSP if one.kind == CUSP else FOLD, one.orbit, one.position, value=one.values[0]
+                CUSP if one.kind == CUSP else FOLD,
+                _over_field(one.orbit, one.values[0]),
+                one.position,
+                value=one.values[0],
             )
             for one in turns
             if one.kind in (CUSP, TURNING)
@@ -190,6 +193,15 @@ def continue_fold(
         notes=followed.notes,
         version=__version__,
     )
+
+
+def _over_field(orbit: Orbit, value: float) -> Orbit:
+    """The motion as one of a branch over a field."""
+    at = orbit.point
+    point = FieldPoint(
+        at.formulation, at.u, at.omega, at.omega_tangent, at.known_map, value=float(value)
+    )
+    return replace(orbit, point=point)
 
 
 @dataclass(frozen=True)
