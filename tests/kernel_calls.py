@@ -113,6 +113,6 @@ def varied(problem, work, u, value, r, J):
 
 
 @kernel(entry=True)
-def series_machine(series, work, value, machine):
+def series_machine(series, work, value, beside, machine):
     """``set_machine``."""
-    return set_machine(series, work, value, machine)
+    return set_machine(series, work, value, beside, machine)

@@ -27,6 +27,7 @@ from types import NoneType
 import numpy as np
 
 import flipflow as ff
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -39,6 +40,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins, GridAxis
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import Components, FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -252,12 +254,19 @@ def functions() -> tuple[Call, ...]:
         Call("coast_down", ff.coast_down,
              {"machine": tiny(), "speed": OMEGA, "drive": profile(), "duration": 0.1,
               "method": None, "monitor": None}, (RunUp,)),
+        Call("continue_bifurcation", ff.continue_bifurcation,
+             {"point": folded().folds[0], "parameters": ("clearance", "omega"),
+              "bounds": ((5.9e-3, 6.1e-3), (190.0, 215.0)), "monitor": None},
+             (BifurcationCurve,)),
         Call("continue_fold", ff.continue_fold,
              {"fold": folded().folds[0], "field": "clearance", "interval": (5.9e-3, 6.1e-3),
               "monitor": None}, (FieldBranch,)),
         Call("continue_orbit", ff.continue_orbit,
              {"orbit": orbit(), "field": "omega", "interval": narrow, "monitor": None},
              (Branch, FieldBranch)),
+        Call("design_map", ff.design_map,
+             {"screen": plain(), "omega": OMEGA, "clearance": [5e-3, 6e-3],
+              "stop_stiffness": [7e6, 8e6], "load": ff.Load(), "monitor": None}, (DesignMap,)),
         Call("foundation_loads", ff.foundation_loads,
              {"motions": {"empty": running()}, "runs": None}, (FoundationLoads,)),
         Call("figure", ff.figure,

@@ -27,7 +27,9 @@ _HOME = {
     "coast_down": "flipflow.transient.startup",
     "continue_orbit": "flipflow.continuation.continue_orbit",
     "switch_branch": "flipflow.continuation.continue_orbit",
-    "continue_fold": "flipflow.continuation.continue_field",
+    "continue_bifurcation": "flipflow.continuation.continue_bifurcation",
+    "continue_fold": "flipflow.continuation.continue_bifurcation",
+    "design_map": "flipflow.studies.design_map",
     "assess": "flipflow.studies.assessment",
     "compare": "flipflow.studies.compare",
     "simulate": "flipflow.transient.simulate",
@@ -66,10 +68,12 @@ _HOME = {
     "load_project": "flipflow.io.project",
     "Assessment": "flipflow.studies.assessment",
     "Basins": "flipflow.studies.basins",
+    "BifurcationCurve": "flipflow.continuation.bifurcation_curve",
     "BifurcationDiagram": "flipflow.studies.bifurcation_diagram",
     "Branch": "flipflow.continuation.branch",
     "BranchStatus": "flipflow.continuation.branch_status",
     "Comparison": "flipflow.studies.compare",
+    "DesignMap": "flipflow.studies.design_map",
     "FieldBranch": "flipflow.continuation.field_branch",
     "Figure": "flipflow.plotting.figure",
     "FoundationLoads": "flipflow.studies.foundation_loads",
@@ -101,12 +105,16 @@ _HOME = {
 __all__ = [*_HOME, "__version__"]  # noqa: PLE0604  the keys are strings
 
 if TYPE_CHECKING:
+    from flipflow.continuation.bifurcation_curve import BifurcationCurve as BifurcationCurve
     from flipflow.continuation.branch import Branch as Branch
     from flipflow.continuation.branch import SpecialPoint as SpecialPoint
     from flipflow.continuation.branch_status import BranchStatus as BranchStatus
 
     # "X as X" marks a public name for type checkers; _HOME says where it is loaded from.
-    from flipflow.continuation.continue_field import continue_fold as continue_fold
+    from flipflow.continuation.continue_bifurcation import (
+        continue_bifurcation as continue_bifurcation,
+    )
+    from flipflow.continuation.continue_bifurcation import continue_fold as continue_fold
     from flipflow.continuation.continue_orbit import continue_orbit as continue_orbit
     from flipflow.continuation.continue_orbit import switch_branch as switch_branch
     from flipflow.continuation.field_branch import FieldBranch as FieldBranch
@@ -158,6 +166,8 @@ if TYPE_CHECKING:
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
     from flipflow.studies.compare import Comparison as Comparison
     from flipflow.studies.compare import compare as compare
+    from flipflow.studies.design_map import DesignMap as DesignMap
+    from flipflow.studies.design_map import design_map as design_map
     from flipflow.studies.foundation_loads import FoundationLoads as FoundationLoads
     from flipflow.studies.foundation_loads import foundation_loads as foundation_loads
     from flipflow.studies.jump_risk import JumpRisk as JumpRisk

@@ -66,7 +66,15 @@ def test_odd_arguments(kind):
     assert not found, "\n".join(map(str, found))
 
 
-SLOW = {"basins", "jump_risk", "continue_fold", "periodic_orbits", "coast_down"}
+SLOW = {
+    "basins",
+    "design_map",
+    "jump_risk",
+    "continue_bifurcation",
+    "continue_fold",
+    "periodic_orbits",
+    "coast_down",
+}
 
 
 def test_every_public_name_is_called():
@@ -213,6 +221,12 @@ FOLLOWED = {
     ),
     "fold": lambda monitor: ff.continue_fold(
         folded().folds[0], "clearance", (5.9e-3, 6.1e-3), monitor=monitor
+    ),
+    "curve": lambda monitor: ff.continue_bifurcation(
+        folded().folds[0],
+        ("clearance", "omega"),
+        ((5.9e-3, 6.1e-3), (190.0, 215.0)),
+        monitor=monitor,
     ),
     "branching": lambda monitor: ff.switch_branch(
         doubled(), (doubled().omega - 0.1, doubled().omega + 0.1), monitor=monitor

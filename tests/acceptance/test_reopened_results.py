@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -29,6 +30,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -88,6 +90,16 @@ MADE: dict[type, list[Callable[[], object]]] = {
         lambda: ff.continue_orbit(response().orbit(3), "clearance", (5.9e-3, 6.1e-3)),
         lambda: ff.continue_fold(response().folds[0], "clearance", (5.8e-3, 6.2e-3)),
     ],
+    BifurcationCurve: [
+        lambda: ff.continue_bifurcation(
+            response().folds[0], ("clearance", "omega"), ((5.8e-3, 6.2e-3), (190.0, 215.0))
+        ),
+        lambda: ff.continue_bifurcation(
+            response().folds[0],
+            ("stop_stiffness", "clearance"),
+            ((8e6, 8.2e6), (5.8e-3, 6.2e-3)),
+        ),
+    ],
     Orbit: [
         lambda: response().orbits_at(203.0)[0],
         lambda: ff.frequency_response(chain(), (0.3, 0.9), ff.HarmonicBalance(3)).orbit(40),
@@ -138,6 +150,7 @@ MADE: dict[type, list[Callable[[], object]]] = {
         )
     ],
     Loading: [lambda: ff.loading(screen(), ff.Load(stiffness_factor=1.1, name="wet"))],
+    DesignMap: [lambda: ff.design_map(screen(), 120.0, [5e-3, 7e-3], [6e6, 9e6])],
     ResponseFamily: [
         lambda: ff.response_family(screen(), {"clearance": [5e-3, 6e-3]}, omega=(80.0, 230.0))
     ],

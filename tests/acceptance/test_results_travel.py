@@ -48,6 +48,9 @@ def large() -> ff.Orbit:
 MADE: dict[str, Callable[[], object]] = {
     "Branch": branch,
     "FieldBranch": lambda: ff.continue_orbit(large(), "clearance", (5e-3, 7e-3)),
+    "BifurcationCurve": lambda: ff.continue_bifurcation(
+        branch().folds[0], ("clearance", "omega"), ((5e-3, 7e-3), (150.0, 230.0))
+    ),
     "Orbit": large,
     "Basins": lambda: ff.basins(
         screen(),
@@ -67,6 +70,9 @@ MADE: dict[str, Callable[[], object]] = {
     "LinearResponse": lambda: ff.linear_response(screen(), np.linspace(10.0, 60.0, 9)),
     "OperatingRegion": lambda: ff.operating_region(screen()),
     "Loading": lambda: ff.loading(screen(), ff.Load(stiffness_factor=1.1)),
+    "DesignMap": lambda: ff.design_map(
+        screen(), 120.0, [5e-3, 7e-3], [6e6, 9e6], load=ff.Load(stiffness_factor=1.1)
+    ),
     "ResponseFamily": lambda: ff.response_family(screen(), {"clearance": [5e-3, 6e-3]}),
     "Sensitivity": lambda: ff.sensitivity(
         screen(), {"clearance": (5.4e-3, 6.6e-3)}, "relative_amplitude", omega=120.0, n=16, rng=0

@@ -1,14 +1,16 @@
-"""Motions and folds over a field: their Jacobians, and the machine as a series of the field."""
+"""Motions over a field, and curves in two: their Jacobians, Newton, the machine as a series."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.continuation.field_solver import FieldSolver, FoldSolver
+from flipflow.continuation.field_solver import MOTIONS, FieldSolver, Sought
+from flipflow.continuation.varied import FLIP, GRAZING, MOTION, PAIR, SADDLE_NODE
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.machine_series import machine_series
 from judge import close
@@ -18,21 +20,31 @@ pytestmark = pytest.mark.numerical
 BOUNDS = (2e-3, 9e-3)
 
 
-def solver(screen, kind):
-    speed = () if kind is FoldSolver else (203.0,)
-    return kind(
-        lambda e: screen.replace(clearance=e).system(), BOUNDS, 6e-3, *speed,
-        half_turn=True, turns=1,
-    )  # fmt: skip
+STIFFNESS = (5e6, 11e6)
+CURVES = [
+    Sought(test, 0, *more)
+    for test in (SADDLE_NODE, FLIP, PAIR, GRAZING)
+    for more in ((), (STIFFNESS, 8.1e6))
+]
 
 
-@pytest.mark.parametrize("kind", [FieldSolver, FoldSolver])
-def test_jacobians_by_differences_of_the_residual(screen, exact, kind) -> None:
+def solver(screen, sought):
+    """Over the clearance; beside it nothing, the speed, or the stiffness of the stop."""
+
+    def system(e: float, k: float):
+        return screen.replace(clearance=e, **({"stop_stiffness": k} if k else {})).system()
+
+    speed = 203.0 if sought.test == MOTION or sought.own else 0.0
+    return FieldSolver(system, BOUNDS, 6e-3, speed, half_turn=True, turns=1, sought=sought)
+
+
+@pytest.mark.parametrize("sought", [MOTIONS, *CURVES], ids=str)
+def test_jacobians_by_differences_of_the_residual(screen, exact, sought) -> None:
     """At points off the solution; 1e-5 of each row's size."""
     orbit = exact.orbits_at(203.0)[0]
-    ours = solver(screen, kind)
-    extra = [203.0, 6e-3] if kind is FoldSolver else [6e-3]
-    w = np.concatenate([1.01 * orbit.state, extra])
+    ours = solver(screen, sought)
+    beside = [] if sought.test == MOTION else [sought.own or 203.0]
+    w = np.concatenate([1.01 * orbit.state, beside, [6e-3]])
     evaluate = residual_of(varied, ours.problem, ours.scratch, ours.unknowns)
     _, J = evaluate(w[:-1], w[-1])
     columns = []
@@ -43,6 +55,27 @@ def test_jacobians_by_differences_of_the_residual(screen, exact, kind) -> None:
     differences = np.array(columns).T
     size = np.abs(J * np.abs(w)).max(axis=1, keepdims=True) / np.abs(w)
     assert np.all(np.abs(J - differences) <= 1e-5 * size)
+
+
+def test_newton_on_a_curve_is_of_second_order(screen, exact) -> None:
+    """Each step's length is about the square of the last one's, down to the difference quotients.
+
+    From 1e-3 beside the fold, lengths as shares of the unknowns.
+    """
+    ours = solver(screen, Sought(SADDLE_NODE))
+    evaluate = residual_of(varied, ours.problem, ours.scratch, ours.unknowns)
+    fold = exact.folds[0]
+    w = np.append(fold.orbit.state, fold.omega) * (1.0 + 1e-3)
+    size, lengths = np.abs(w), []
+    for _ in range(7):
+        r, J = evaluate(w, 6e-3)
+        step = np.linalg.solve(J[:, :-1], -r)
+        lengths.append(float(np.abs(step / size).max()))
+        w = w + step
+    assert lengths[-1] < 1e-10
+    for before, after in pairwise(lengths[1:]):
+        assert after < max(100.0 * before * before, 1e-5 * before, 1e-10), lengths
+    close("the fold", w[-1], fold.omega, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -59,11 +92,12 @@ def test_the_series_is_the_machine(screen, field: str, bounds) -> None:
         return screen.replace(**{field: value}).system()
 
     ours = FieldSolver(
-        system, bounds, getattr(screen, field), 203.0, half_turn=False, turns=1
+        lambda value, _: system(value), bounds, getattr(screen, field), 203.0,
+        half_turn=False, turns=1,
     )  # fmt: skip
     assert ours.problem.series.inertia.shape[0] == 2
     for value in np.linspace(*bounds, 7):
-        assert series_machine(ours.problem.series, ours.scratch.series, value, ours.machine)
+        assert series_machine(ours.problem.series, ours.scratch.series, value, 0.0, ours.machine)
         expected = machine_arrays(system(value))
         for name in ("stiffness", "damping", "direction", "reach", "push"):
             got, want = getattr(ours.machine, name), getattr(expected, name)
@@ -76,7 +110,7 @@ def test_a_series_takes_the_terms_it_needs() -> None:
     """Smooth: enough of them; with a kink: none are enough."""
 
     def parts(shape):
-        return lambda v: {
+        return lambda v, _: {
             "inertia": np.eye(1), "damping": np.eye(1), "stiffness": np.array([[shape(v)]]),
             "direction": np.eye(1), "force": np.ones((2, 1)), "static": np.zeros((1, 1)),
             "stop": np.ones((2, 1)), "gap": np.array([[v, math.inf]]),
@@ -85,9 +119,22 @@ def test_a_series_takes_the_terms_it_needs() -> None:
     smooth = machine_series(parts(math.exp), 0.0, 2.0)
     assert smooth is not None
     assert 9 <= smooth.stiffness.shape[0] <= 33
-    assert np.isinf(smooth.gap[0, 0, 1])
+    assert np.isinf(smooth.gap[0, 0, 0, 1])
     for kink in (1.0, 1.75, 1.95):
         assert machine_series(parts(lambda v, kink=kink: max(v, kink)), 0.0, 2.0) is None
+
+
+def test_a_series_in_two_fields_is_the_machine(screen) -> None:
+    """A product of both takes two terms in each."""
+    ours = solver(screen, Sought(SADDLE_NODE, 0, STIFFNESS, 8.1e6))
+    assert ours.problem.series.stop.shape[:2] == (2, 2)
+    for e in np.linspace(*BOUNDS, 4):
+        for k in np.linspace(*STIFFNESS, 4):
+            assert series_machine(ours.problem.series, ours.scratch.series, e, k, ours.machine)
+            want = machine_arrays(screen.replace(clearance=e, stop_stiffness=k).system())
+            for name in ("stiffness", "damping", "gap"):
+                got = getattr(ours.machine.stops, name)
+                close(name, got, getattr(want.stops, name), rel=1e-12)
 
 
 def test_folds_in_slivers_are_folds() -> None:

@@ -12,6 +12,7 @@ import flipflow as ff
 from flipflow.compiled.eigen import eigenvalues as eigenvalues_of
 from flipflow.continuation import correction
 from flipflow.continuation.correction import new_corrector
+from flipflow.continuation.frequency_loop import NOTHING
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import new_flow
 from flipflow.periodic.stability import determinant_minus, determinant_plus
@@ -36,7 +37,7 @@ def distance_from_helix(step: float, bends: bool) -> float:
     work = new_corrector(2, np.zeros(0))
     work.behind[:], work.behind_tangent[:] = helix(-step), helix_tangent(-step)
     work.here[:], work.before[:] = helix(0.0), helix_tangent(0.0)
-    assert not predicted(work, step, ANYWHERE, bends)
+    assert predicted(work, step, ANYWHERE, bends) == NOTHING
     near = minimize_scalar(
         lambda s: float(np.linalg.norm(helix(s) - work.guess)),
         bounds=(0.5 * step, 1.5 * step), method="bounded", options={"xatol": 1e-12},

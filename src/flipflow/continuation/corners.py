@@ -21,6 +21,7 @@ from flipflow.continuation.correction import (
     astray,
     bordered,
     correct,
+    in_bounds,
     new_tangent,
     recall,
 )
@@ -174,7 +175,7 @@ def step_round(
     code, _ = correct(sought, scratch, work, TOLERATED * abs(step))
     if code != status.OK or signature(sought, scratch) != contacts:
         return False
-    return bool(course.lower <= work.w[n] <= course.upper and astray(work) < abs(step))
+    return in_bounds(work, course) and astray(work) < abs(step)
 
 
 @kernel

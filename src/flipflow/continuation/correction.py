@@ -41,6 +41,9 @@ class Course(NamedTuple):
     u_step: float  # longest step in the unknowns, as a share of their size
     direction: float  # +1 or -1: sign of d omega at the start
     tolerance: float  # last Newton step, in steps; the error left is about its square
+    # Bounds of the last of the unknowns u, which on a curve is a second parameter.
+    beside_lower: float = -math.inf
+    beside_upper: float = math.inf
 
 
 class Corrector(NamedTuple):
@@ -264,6 +267,14 @@ def correct_between(
         return code
     new_tangent(work)
     return residual(problem, scratch, work.w, float(work.w[work.r.shape[0]]), work.r, work.J)
+
+
+@kernel
+def in_bounds(work: Corrector, course: Course) -> bool:
+    """Whether the corrected point lies within the bounds of both parameters."""
+    n = work.r.shape[0]
+    beside = course.beside_lower <= work.w[n - 1] <= course.beside_upper
+    return bool(beside and course.lower <= work.w[n] <= course.upper)
 
 
 @kernel

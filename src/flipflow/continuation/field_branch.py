@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.orbit_row import OrbitRow
 from flipflow.continuation.special_points import FOLD
-from flipflow.model.arguments import checked_index, checked_text
+from flipflow.model.arguments import checked_text
 from flipflow.model.screen import unit_in
-from flipflow.model.system import Coordinate, Machine
+from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
-from flipflow.periodic.stability import STABLE
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
 
 Real = NDArray[np.float64]
 
@@ -38,7 +35,7 @@ class FieldSpecialPoint(SpecialPoint):
 
 
 @dataclass(frozen=True, eq=False)
-class FieldBranch(Frozen, Result):
+class FieldBranch(OrbitRow):
     """Periodic motions, or folds, followed over a field of the machine.
 
     Arrays are (n,) over its points, in their order along the branch. It is what
@@ -81,56 +78,12 @@ class FieldBranch(Frozen, Result):
         size = len(self.orbits)
         return f"FieldBranch({self.field}, {size} points, {ends}{kinds}, {self.status.name})"
 
-    @cached_property
-    def omega(self) -> Real:
-        """Frequency in rad/s along the branch, (n,); it varies along a curve of folds only."""
-        return np.array([orbit.omega for orbit in self.orbits])
-
-    @cached_property
-    def multipliers(self) -> NDArray[np.complex128]:
-        """Floquet multipliers of the full period, (n, 2 N), largest modulus first."""
-        return np.array([orbit.multipliers for orbit in self.orbits])
-
-    @cached_property
-    def stability(self) -> NDArray[np.str_]:
-        """Words, (n,): "stable", "unstable" or "undetermined"."""
-        return np.array([orbit.stability for orbit in self.orbits], dtype="<U12")
-
-    @property
-    def stable(self) -> NDArray[np.bool_]:
-        """Where ``stability`` is "stable", (n,)."""
-        return np.asarray(self.stability == STABLE)
-
-    @cached_property
-    def error(self) -> Real:
-        """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
-        return np.array([orbit.error for orbit in self.orbits])
-
     @property
     def folds(self) -> tuple[FieldSpecialPoint, ...]:
         """The saddle-nodes, in branch order."""
         return self.points_of(FOLD)
 
-    @property
-    def complete(self) -> bool:
-        """Whether the branch was followed to both its ends, or all round."""
-        return self.status.complete
-
     def points_of(self, kind: str) -> tuple[FieldSpecialPoint, ...]:
         """Special points of one kind, in branch order."""
         checked_text("kind", kind)
         return tuple(point for point in self.special_points if point.kind == kind)
-
-    def amplitude(self, which: Coordinate) -> Real:
-        """Half peak-to-peak of a coordinate at every point in m, (n,)."""
-        return np.array([orbit.amplitude(which) for orbit in self.orbits])
-
-    def phase(self, which: Coordinate) -> Real:
-        """Phase of the first harmonic against the force in rad, (n,); positive: it leads."""
-        return np.array([orbit.phase(which) for orbit in self.orbits])
-
-    def orbit(self, i: int) -> Orbit:
-        """The motion at point i of the branch."""
-        n = len(self.orbits)
-        remedy = f"the branch has points 0 to {n - 1}"
-        return self.orbits[checked_index("i", i, n, remedy, least=-n)]

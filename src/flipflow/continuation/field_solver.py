@@ -1,16 +1,17 @@
-"""Solvers of motions, and of folds, over a parameter of the machine."""
+"""Solver of motions over a parameter of the machine, and of curves in two parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation.correction import SHARP, Course
-from flipflow.continuation.varied import Varied, new_varied_work
+from flipflow.continuation.varied import GRAZING, MOTION, PAIR, Varied, new_varied_work
 from flipflow.dynamics.assembly import machine_parts, with_springs
 from flipflow.dynamics.machine_series import machine_series
 from flipflow.errors import IncompleteError
@@ -18,31 +19,65 @@ from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Traced
 
-SystemAt = Callable[[float], MechanicalSystem]
+SystemAt = Callable[[float, float], MechanicalSystem]
+
+
+@dataclass(frozen=True)
+class Sought:
+    """What is followed: motions, or a curve of those where a test function is zero.
+
+    Parameters
+    ----------
+    test
+        MOTION, SADDLE_NODE, FLIP, PAIR or GRAZING.
+    gap
+        2 * spring + side of the gap that is grazed, side 0 plus, 1 minus.
+    bounds, own
+        Of a curve in two fields, (lower, upper) of the second, and its size.
+    """
+
+    test: int = MOTION
+    gap: int = 0
+    bounds: tuple[float, float] = (0.0, 0.0)
+    own: float = 0.0
+
+
+MOTIONS = Sought()
 
 
 @dataclass(frozen=True, eq=False)
 class FieldPoint(Point):
-    """A motion at a value of the field; ``omega_tangent`` is the tangent's share in the value."""
+    """A motion at a value of the field; ``omega_tangent`` is the tangent's share in the value.
+
+    ``beside`` is the second parameter on a curve, with the tangent's share in it, and ``own_map``
+    the return map from the phase at which the point was solved for.
+    """
 
     value: float = np.nan
+    beside: float = np.nan
+    beside_tangent: float = np.nan
+    own_map: Real | None = None
 
 
 class FieldSolver(ExactSolver):
-    """Motions at a fixed frequency, the value of a field the last unknown.
+    """Motions at a fixed frequency over a field, the last unknown, and curves in two parameters.
+
+    The unknown beside the state is on a curve the frequency, or a second field.
 
     Parameters
     ----------
     system_at
-        The machine's system for a value of the field.
+        The machine's system for a value of the field and one of the second field.
     bounds
         (lower, upper) values.
     own
         The machine's own value, which sets the scale of the field.
     omega
-        Frequency in rad/s.
+        Frequency in rad/s; 0 where it is the second parameter.
     half_turn, turns
         As of :class:`~flipflow.periodic.exact_solver.ExactSolver`.
+    sought
+        What is followed.
 
     Raises
     ------
@@ -54,34 +89,42 @@ class FieldSolver(ExactSolver):
 
     def __init__(
         self, system_at: SystemAt, bounds: tuple[float, float], own: float, omega: float, *,
-        half_turn: bool, turns: int,
+        half_turn: bool, turns: int, sought: Sought = MOTIONS,
     ) -> None:  # fmt: skip
         low, high = bounds
-        inner = system_at(own if low < own < high else 0.5 * (low + high))
+        middle = 0.5 * sum(sought.bounds)
+        inner = system_at(own if low < own < high else 0.5 * (low + high), middle)
         kept = [j for j, spring in enumerate(inner.springs) if spring.acts and not spring.bonded]
         super().__init__(with_springs(inner, kept), half_turn=half_turn, turns=turns)
         self.system_at, self.bounds, self.own, self.omega = system_at, bounds, own, omega
+        self.sought = sought
         series = machine_series(
-            lambda value: machine_parts(with_springs(system_at(value), kept)), *bounds
+            lambda *at: machine_parts(with_springs(system_at(*at), kept)), low, high, sought.bounds
         )
         if series is None:
             raise IncompleteError(
                 f"the machine does not change smoothly between {low:.6g} and {high:.6g}; "
                 "give an interval without a kink"
             )
-        self.problem = Varied(self.problem, series, omega, own)
-        self.scratch = new_varied_work(self.shooting_work, self.system.size)
+        curve = sought.test != MOTION
+        self.branches_off = not curve
+        self.unknowns += int(curve)
+        self.problem = Varied(self.problem, series, omega, own, sought.own, sought.test, sought.gap)
+        self.scratch = new_varied_work(
+            self.shooting_work, self.system.size, len(self.springs), pairs=sought.test == PAIR
+        )
 
     @property
     def uneven(self) -> Real:
         gap = self.problem.series.gap
         with np.errstate(invalid="ignore"):
-            return np.where((gap[:, :, 0] == gap[:, :, 1]).all(axis=0), 0.0, 1.0)
+            return np.where((gap[..., 0] == gap[..., 1]).all(axis=(0, 1)), 0.0, 1.0)
 
     def like(self, *, half_turn: bool, turns: int) -> FieldSolver:
         return FieldSolver(
-            self.system_at, self.bounds, self.own, self.omega, half_turn=half_turn, turns=turns
-        )
+            self.system_at, self.bounds, self.own, self.omega, half_turn=half_turn, turns=turns,
+            sought=self.sought,
+        )  # fmt: skip
 
     def frequency(self, at: float) -> float:  # noqa: ARG002
         return self.omega
@@ -91,7 +134,8 @@ class FieldSolver(ExactSolver):
 
     def solver_at(self, value: float) -> ExactSolver:
         """A solver of the motions at a value of the field."""
-        return ExactSolver(self.system_at(value), half_turn=self.half_turn, turns=self.turns)
+        system = self.system_at(value, self.sought.own)
+        return ExactSolver(system, half_turn=self.half_turn, turns=self.turns)
 
     def solve(self, u: Real, omega: float) -> Point | None:
         low, high = self.bounds
@@ -109,14 +153,58 @@ class FieldSolver(ExactSolver):
     def return_map(self, point: Point) -> Real:
         return point.formulation.solver().return_map(point)
 
-    def _point(self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None) -> Point:
-        size = 2 * self.system.size
-        formulation = Formulation(ExactSolver, self.system_at(omega), self.half_turn, self.turns)
-        known = None if jacobian is None else jacobian[:size, :size] + np.eye(size)
-        speed = self.omega if self.unknowns == size else float(u[size])
-        return FieldPoint(formulation, u[:size], speed, omega_tangent, known, value=omega)
+    def zero_between(
+        self, traced: Traced, test: int, p: int, low: float, high: float
+    ) -> tuple[float, FieldPoint]:
+        share, found = super().zero_between(traced, test, p, low, high)
+        point, work = cast("FieldPoint", found), self.corrector
+        # The corrector holds the point just solved for.
+        tangent = float(work.tangent[-2] * work.scale[-2])
+        return share, replace(point, beside_tangent=tangent, own_map=self._map(work.J[:, :-1]))
 
-    def points(self, traced: Traced) -> list[Point]:
+    def own_multipliers(self, traced: Traced) -> Complex:
+        """Eigenvalues of the return maps along a curve, (n, 2 N)."""
+        return eigenvalues(self._map(traced.jacobian))
+
+    def _map(self, jacobian: Real) -> Real:
+        """The return map in a Jacobian, or in each of several."""
+        size = 2 * self.system.size
+        return np.asarray(jacobian[..., :size, :size] + np.eye(size))
+
+    def _point(
+        self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None
+    ) -> FieldPoint:
+        size = 2 * self.system.size
+        # On a curve a second parameter stands beside the state.
+        beside = float(u[size]) if u.size > size else np.nan
+        speed, other = (self.omega, beside) if self.omega > 0.0 else (beside, 0.0)
+        formulation = Formulation(
+            ExactSolver, self.system_at(omega, other), self.half_turn, self.turns
+        )
+        known = None if jacobian is None else self._map(jacobian)
+        point = FieldPoint(
+            formulation, u[:size], speed, omega_tangent, known, value=omega, beside=beside
+        )
+        if self.sought.test == GRAZING and known is None:
+            return replace(point, known_map=self._before_contact(point))
+        return point
+
+    def _before_contact(self, point: FieldPoint) -> Real:
+        """The return map of a motion that grazes, of the side without the contact."""
+        system = point.formulation.system.with_bonded()
+        spring, side = divmod(self.sought.gap, 2)
+        gaps = list(system.springs[spring].gaps)
+        sides = (0, 1) if self.half_turn else (side,)
+        for one in sides:
+            gaps[one] = np.inf
+        opened = replace(system.springs[spring], clearance=gaps[0], clearance_minus=gaps[1])
+        springs = (*system.springs[:spring], opened, *system.springs[spring + 1 :])
+        solver = ExactSolver(
+            replace(system, springs=springs), half_turn=self.half_turn, turns=self.turns
+        )
+        return solver.return_map(replace(point, known_map=None))
+
+    def points(self, traced: Traced) -> list[FieldPoint]:
         """The motions of a branch."""
         record = traced.record
         known = [
@@ -125,16 +213,3 @@ class FieldSolver(ExactSolver):
         ]
         rows = zip(record.u, record.omega, record.tangent[:, -1], known, strict=True)
         return [self._point(u, float(at), float(slope), J) for u, at, slope, J in rows]
-
-
-class FoldSolver(FieldSolver):
-    """Folds over a field: the frequency is an unknown, too."""
-
-    branches_off = False
-
-    def __init__(
-        self, system_at: SystemAt, bounds: tuple[float, float], own: float, *, half_turn: bool,
-        turns: int,
-    ) -> None:  # fmt: skip
-        super().__init__(system_at, bounds, own, 0.0, half_turn=half_turn, turns=turns)
-        self.unknowns = 2 * self.system.size + 1

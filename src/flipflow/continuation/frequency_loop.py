@@ -27,6 +27,7 @@ from flipflow.continuation.correction import (
     chord_behind,
     correct,
     correct_between,
+    in_bounds,
     move_section,
     new_tangent,
     recall,
@@ -59,6 +60,7 @@ STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
 CROSSING = 1e-2  # least pivot of that matrix, as a share of its largest, where others may cross
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
+NOTHING = -1  # in place of an unknown that ends on a bound
 # Why a step was refused, as a branch records it.
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
@@ -129,30 +131,35 @@ def load(
 
 
 @kernel
-def predict(work: Corrector, step: float, course: Course, bends: bool) -> bool:
-    """Guess a step along the branch from the last point; True when it ends on a bound of omega.
+def predict(work: Corrector, step: float, course: Course, bends: bool) -> int:
+    """Guess a step along the branch from the last point; the unknown that ends on a bound, or -1.
 
-    A guess beyond the bound is drawn back along the tangent and corrected at that omega. Where
-    ``bends`` the guess lies on the cubic through the last two points, if these are not too near.
+    A guess beyond a bound is drawn back along the tangent and corrected with that unknown fixed.
+    Where ``bends`` the guess lies on the cubic through the last two points, if these are not too
+    near.
     """
-    n = work.r.shape[0]
-    omega = float(work.here[n] + step * work.before[n] * work.scale[n])
-    share = 1.0
-    ends = omega > course.upper or omega < course.lower
-    if ends:
-        bound = course.upper if omega > course.upper else course.lower
-        share = float((bound - work.here[n]) / (omega - work.here[n]))
-        omega = bound
-    for k in range(n):
-        work.guess[k] = work.here[k] + share * step * work.before[k] * work.scale[k]
-        work.border[k] = 0.0 if ends else work.before[k]
-    work.guess[n] = omega
-    work.border[n] = 1.0 if ends else work.before[n]
-    if not ends and bends:
+    n, share, ended = work.r.shape[0], 1.0, NOTHING
+    for k in range(n - 1, n + 1):
+        low = course.lower if k == n else course.beside_lower
+        high = course.upper if k == n else course.beside_upper
+        ahead = float(work.here[k] + step * work.before[k] * work.scale[k])
+        bound = min(max(ahead, low), high)
+        if bound != ahead:
+            to_bound = (bound - work.here[k]) / (ahead - work.here[k])
+            if to_bound < share or ended == NOTHING:
+                share, ended = float(to_bound), k
+                work.guess[k] = bound
+    for k in range(n + 1):
+        if k != ended:
+            work.guess[k] = work.here[k] + share * step * work.before[k] * work.scale[k]
+        work.border[k] = work.before[k] if ended == NOTHING else 0.0
+    if ended != NOTHING:
+        work.border[ended] = 1.0
+    elif bends:
         chord = chord_behind(work)
         if step < FAR * chord:
             bend(work, step, chord)
-    return bool(ends)
+    return ended
 
 
 @kernel
@@ -165,11 +172,10 @@ def judge(
     The sign of det [J; tangent] is the same all along a branch, except where others cross it and at
     corners. A corrected point where it differs lies on another strand that runs the other way.
     """
-    n = work.r.shape[0]
     laboured = iterations > NEWTON_MANY and step > SHORT_STEP
     if code != status.OK or laboured:
         return REASON_NEWTON
-    if work.w[n] > course.upper or work.w[n] < course.lower:
+    if not in_bounds(work, course):
         return REASON_BOUND
     cosine = tangent_ahead(work)
     off = ASTRAY_MOST if step > SHORT_STEP else ASTRAY_AT_CORNER
@@ -182,7 +188,7 @@ def judge(
     other_side = work.side[0] != branch.side[p]
     # Where another branch crosses the matrix is singular; a mere jump to another strand is not.
     may_cross = step <= STRAND_STEP and (changed or lu_spread(work.A) < CROSSING)
-    depths(problem, scratch, float(work.w[n]), work.depth)
+    depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
     if (other_side and not may_cross) or begins_to_lean(
         problem, scratch, work, branch.depth[p], step
     ):
@@ -254,7 +260,8 @@ def arrival(branch: Record, course: Course, p: int, ends: bool, back: bool) -> i
         return status.CLOSED
     if not ends:
         return status.OK
-    return status.REACHED_UPPER if branch.omega[p] == course.upper else status.REACHED_LOWER
+    upper = branch.omega[p] == course.upper or branch.u[p, -1] == course.beside_upper
+    return status.REACHED_UPPER if upper else status.REACHED_LOWER
 
 
 @kernel
@@ -310,12 +317,14 @@ def attempt(
 ) -> tuple[float, bool, int]:  # fmt: skip
     """Try a step to point p; its length, 0 where it is refused, whether it ends, iterations."""
     same = p > 1 and branch.signature[p - 1] == branch.signature[p - 2]
-    ends = predict(work, step, course, same)
+    ended = predict(work, step, course, same)
     # A correction as long as the step itself would not tell one strand from the next.
     code, iterations = correct(problem, scratch, work, min(course.tolerance, TOLERATED * step))
+    if ended != NOTHING:
+        work.w[ended] = work.guess[ended]  # to the last digit
     reason = judge(problem, scratch, work, branch, p - 1, step, code, iterations, course)
     if reason == REASON_NONE:
-        return step, ends, iterations
+        return step, ended != NOTHING, iterations
     branch.reason[p] = reason
     branch.rejected[p] += 1
     if step > CORNER_STEP:

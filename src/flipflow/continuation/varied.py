@@ -1,11 +1,13 @@
-"""Motions over a parameter of the machine, and folds over it, as problems of the loop.
+"""Motions over a parameter of the machine, and curves in two parameters, as problems of the loop.
 
-Unknowns are the state z and the parameter's value, or z, omega and the value. A motion solves
+Unknowns are the state z and the parameter's value; on a curve z, a second parameter, which is omega
+or another field, and the value. A motion solves
 
     sign flow(z; omega, value) - z = 0,
 
-a fold also det(d r / d z) = 0. Derivatives in the value, and those of the determinant, are central
-differences; the rest is exact.
+a point of a curve also g = 0, g being a test function of its return map or the depth beyond a gap.
+Derivatives in fields of the machine, and those of g, which hold the second ones of the flow, are
+central differences of second order; the rest is exact.
 """
 
 from __future__ import annotations
@@ -40,18 +42,26 @@ from flipflow.periodic.shooting import (
 # Step of a difference quotient, as a share of the unknown's own size: the same share of a wide
 # interval would swamp the value.
 DIFFERENCE = 1e-6
+OF_DEPTH = 0.01  # the same as a share of the depth to which a stop is touched
+SMALLEST = 1e-11  # least step; at a smaller one rounding would drown the difference
 BEYOND = 0.01  # share of the interval by which a correction may leave it on its way
-SPEED_SHARE = 0.2  # size of omega as an unknown, as a share of it
+BESIDE_SHARE = 0.2  # size of the second parameter as an unknown, as a share of it
 VALUE_SHARE = 0.05  # longest step in the value, as a share of its size
+# What is followed: motions, or those with a multiplier +1, with one -1, with two of product 1, and
+# those that graze a gap.
+MOTION, SADDLE_NODE, FLIP, PAIR, GRAZING = range(5)
 
 
 class Varied(NamedTuple):
-    """The problem: shooting, its machine rewritten for every value of the parameter."""
+    """The problem: shooting, its machine rewritten for every value of the parameters."""
 
     shooting: Shooting
     series: MachineSeries
-    omega: float  # frequency of the motions; 0 where it is an unknown and folds are sought
+    omega: float  # frequency of the motions; 0 where it is the unknown beside the state
     own: float  # the value that sets the parameter's size
+    beside: float  # that of the field beside the state, where there is one
+    test: int  # MOTION, or the test function whose zeros are followed
+    gap: int  # 2 * spring + side of the gap that is grazed
 
 
 class VariedWork(NamedTuple):
@@ -59,50 +69,87 @@ class VariedWork(NamedTuple):
 
     shooting: ShootingWork
     series: SeriesWork
-    at: Real  # (2,) value for which the machine stands, and the frequency of the last flow
+    at: Real  # (3,) values of both parameters for which the machine stands; the last frequency
+    gap: Real  # (2,) gaps of the grazed spring, which the flow does not see
     z: Real  # (2 N + 2,) unknowns moved for a difference
     move: Real  # (2 N + 2,) how far
     ahead: Real  # (2 N,)
     r: Real  # (2 N,)
     J: Real  # (2 N, 2 N + 1)
-    square: Real  # (2 N, 2 N)
-    pivot: Int  # (2 N,)
+    depth: Real  # (m, 2)
+    square: Real  # (2 N, 2 N), or of as many rows as there are pairs of multipliers
+    pivot: Int  # one for each of its rows
 
 
-def new_varied_work(shooting: ShootingWork, size: int) -> VariedWork:
-    """Scratch for machines of N degrees of freedom."""
+def new_varied_work(shooting: ShootingWork, size: int, stops: int, *, pairs: bool) -> VariedWork:
+    """Scratch for N degrees of freedom; ``pairs`` where pairs of multipliers count."""
     n = 2 * size
+    rows = n * (n - 1) // 2 if pairs else n
     return VariedWork(
         shooting=shooting,
         series=new_series_work(size),
-        at=np.full(2, np.nan),
+        at=np.full(3, np.nan),
+        gap=np.full(2, np.inf),
         z=np.zeros(n + 2),
         move=np.zeros(n + 2),
         ahead=np.zeros(n),
         r=np.zeros(n),
         J=np.zeros((n, n + 1)),
-        square=np.zeros((n, n)),
-        pivot=np.zeros(n, np.int64),
+        depth=np.zeros((stops, 2)),
+        square=np.zeros((rows, rows)),
+        pivot=np.zeros(rows, np.int64),
     )
 
 
 @kernel
-def stand_at(problem: Varied, work: VariedWork, value: float) -> bool:
-    """Let the machine be that of a value; False where it cannot."""
-    if work.at[0] == value:
+def stand_at(problem: Varied, work: VariedWork, value: float, beside: float) -> bool:
+    """Let the machine be that of both values; False where it cannot."""
+    if work.at[0] == value and work.at[1] == beside:
         return True
     work.at[0] = math.nan
-    series, width = problem.series, problem.series.high - problem.series.low
-    if not series.low - BEYOND * width <= value <= series.high + BEYOND * width:
+    series, flow = problem.series, work.shooting.flow
+    if not (
+        inside(value, series.low, series.high)
+        and inside(beside, series.beside_low, series.beside_high)
+    ):
         return False
-    flow = work.shooting.flow
     for slot in range(flow.modes.ready.shape[0]):
         flow.modes.ready[slot] = 0
         flow.driven_at[slot] = math.nan
-    if not set_machine(series, work.series, value, problem.shooting.machine):
+    machine = problem.shooting.machine
+    if not set_machine(series, work.series, value, beside, machine):
         return False
-    work.at[0] = value
+    if problem.test == GRAZING:
+        # Up to the grazing the gap is not met: without it the motion is smooth beyond as well.
+        for side in range(2):
+            work.gap[side] = machine.stops.gap[problem.gap // 2, side]
+        open_gap(problem)
+    work.at[0], work.at[1] = value, beside
     return True
+
+
+@kernel
+def inside(value: float, low: float, high: float) -> bool:
+    """Whether a value lies in an interval, or so little beyond that a correction may pass it."""
+    width = high - low
+    return low - BEYOND * width <= value <= high + BEYOND * width
+
+
+@kernel
+def open_gap(problem: Varied) -> None:
+    """Let the grazed gap be infinite, of a motion that is its own mirror image on both sides."""
+    gap, spring = problem.shooting.machine.stops.gap, problem.gap // 2
+    gap[spring, problem.gap % 2] = math.inf
+    if problem.shooting.sign < 0.0:
+        gap[spring, 1 - problem.gap % 2] = math.inf
+
+
+@kernel
+def show_gap(problem: Varied, work: VariedWork) -> None:
+    """Let the grazed gap be what it is, for what is read off a motion."""
+    if problem.test == GRAZING:
+        for side in range(2):
+            problem.shooting.machine.stops.gap[problem.gap // 2, side] = work.gap[side]
 
 
 @kernel
@@ -112,52 +159,69 @@ def frequency(problem: Varied, u: Real) -> float:
 
 
 @kernel
+def value_beside(problem: Varied, u: Real) -> float:
+    """The field beside the state in the unknowns u, without the value."""
+    if problem.omega > 0.0 and problem.test != MOTION:
+        return float(u[u.shape[0] - 1])
+    return problem.series.beside_low
+
+
+@kernel
 def varied_residual(
     problem: Varied, work: VariedWork, u: Real, value: float, r: Real, J: Real
 ) -> int:
-    """r and J = [dr/du, dr/d value] of a motion, or of a fold."""
+    """r and J = [dr/du, dr/d value] of a motion, or of one where a test function is zero."""
     size, n = work.r.shape[0], r.shape[0]
     for k in range(n):
         work.z[k] = u[k]
     work.z[n] = value
-    set_moves(problem, work, n)
-    code = status.OK
+    set_moves(problem, work, n, DIFFERENCE)
     if n > size:
-        code = fold_row(problem, work, r, J)
-    for k in range(size):
-        J[k, n] = 0.0
-    # At an end of the interval the difference is one-sided: beyond it may lie another law.
-    step = float(work.move[n])
-    low, high = max(value - step, problem.series.low), min(value + step, problem.series.high)
-    if code == status.OK:
-        code = add_value_slope(problem, work, n, high, 1.0 / (high - low), J)
-    if code == status.OK:
-        code = add_value_slope(problem, work, n, low, -1.0 / (high - low), J)
-    if code != status.OK:
-        return code
-    if not stand_at(problem, work, value):
-        return status.NO_CONVERGENCE
-    omega = frequency(problem, u[:n])
-    work.at[1] = omega
-    code = shooting_residual(problem.shooting, work.shooting, u, omega, work.r, work.J)
+        code, test = evaluate(problem, work, n)
+        if code != status.OK:
+            return code
+        set_moves(problem, work, n, step_share(problem, work))
+    for k in range(n + 1):
+        code = add_differences(problem, work, n, k, J)
+        if code != status.OK:
+            return code
+    code, test = evaluate(problem, work, n)
+    omega_column = size if problem.omega == 0.0 else size - 1
     for i in range(size):
         r[i] = work.r[i]
-        for k in range(n):
+        for k in range(omega_column + 1):
             J[i, k] = work.J[i, k]
+    if n > size:
+        r[size] = test
     return code
 
 
 @kernel
-def set_moves(problem: Varied, work: VariedWork, n: int) -> None:
+def step_share(problem: Varied, work: VariedWork) -> float:
+    """Step of a difference quotient of the last motion, as a share of the unknown's size.
+
+    Where a stop is hardly touched the map changes within the depth: the step is a share of that.
+    """
+    flow_depths(problem.shooting, work.shooting, float(work.at[2]), work.depth)
+    least = math.inf
+    for j in range(work.depth.shape[0]):
+        for side in range(2):
+            least = min(least, abs(work.depth[j, side]))
+    state_scale(problem.shooting, work.z, float(work.at[2]), work.move)
+    return max(SMALLEST, min(DIFFERENCE, OF_DEPTH * least / float(work.move[0])))
+
+
+@kernel
+def set_moves(problem: Varied, work: VariedWork, n: int, share: float) -> None:
     """Steps of the difference quotients about the n + 1 unknowns in work.z."""
     size = work.r.shape[0]
     omega = frequency(problem, work.z[:n])
     state_scale(problem.shooting, work.z, omega, work.move)
     for k in range(size):
-        work.move[k] *= DIFFERENCE
+        work.move[k] *= share
     if n > size:
-        work.move[size] = DIFFERENCE * omega
-    work.move[n] = DIFFERENCE * value_size(problem, float(work.z[n]))
+        work.move[size] = share * size_beside(problem, float(work.z[size]))
+    work.move[n] = share * value_size(problem, float(work.z[n]))
 
 
 @kernel
@@ -168,69 +232,108 @@ def value_size(problem: Varied, value: float) -> float:
 
 
 @kernel
-def add_value_slope(
-    problem: Varied, work: VariedWork, n: int, value: float, weight: float, J: Real
-) -> int:
-    """Add one side's share of the difference quotient in the value to the last column of J."""
-    size, flow = work.r.shape[0], work.shooting.flow
-    omega = frequency(problem, work.z[:n])
-    if not omega > 0.0 or not stand_at(problem, work, value):
-        return status.NO_CONVERGENCE
-    for k in range(size):
-        flow.z[k] = work.z[k]
-    begin = work.shooting.section[0] / omega
-    duration = problem.shooting.fraction * 2.0 * math.pi / omega
-    machine = problem.shooting.machine
-    code = run_flow(machine, flow, omega, begin, duration, work.shooting.rate)
-    for k in range(size):
-        J[k, n] += weight * problem.shooting.sign * flow.z[k]
-    return code
+def size_beside(problem: Varied, value: float) -> float:
+    """Size of the unknown beside the state: of omega its value."""
+    if problem.omega == 0.0:
+        return value
+    width, own = problem.series.beside_high - problem.series.beside_low, abs(problem.beside)
+    return min(width, max(abs(value), own)) if own != 0.0 else width
 
 
 @kernel
-def fold_row(problem: Varied, work: VariedWork, r: Real, J: Real) -> int:
-    """The determinant and its derivatives, in the last row."""
-    size, n = work.r.shape[0], r.shape[0]
-    for k in range(n + 1):
-        here = work.z[k]
-        ahead, behind = here + work.move[k], here - work.move[k]
-        if k == n:
-            ahead, behind = min(ahead, problem.series.high), max(behind, problem.series.low)
-        work.z[k] = ahead
-        code, after = determinant(problem, work, n)
-        work.z[k] = behind
-        if code == status.OK:
-            code, before = determinant(problem, work, n)
+def add_differences(problem: Varied, work: VariedWork, n: int, k: int, J: Real) -> int:
+    """What of column k of J are central differences: of a field all of it, else the last row.
+
+    At an end of an interval of a field they are one-sided: beyond it may lie another law.
+    """
+    size, here, step = work.r.shape[0], float(work.z[k]), float(work.move[k])
+    field = k == n or (k == size and problem.omega > 0.0)
+    if not field and n == size:
+        return status.OK
+    behind, ahead = here - step, here + step
+    if field:
+        series = problem.series
+        low, high = (series.low, series.high) if k == n else (series.beside_low, series.beside_high)
+        behind, ahead = max(behind, low), min(ahead, high)
+    work.z[k] = ahead
+    code, after = evaluate(problem, work, n)
+    for i in range(size):
+        work.ahead[i] = work.r[i]
+    work.z[k] = behind
+    if code == status.OK:
+        code, before = evaluate(problem, work, n)
+        if n > size:
             J[size, k] = (after - before) / (ahead - behind)
-        work.z[k] = here
-        if code != status.OK:
-            return code
-    code, r[size] = determinant(problem, work, n)
+        if field:
+            for i in range(size):
+                J[i, k] = (work.ahead[i] - work.r[i]) / (ahead - behind)
+    work.z[k] = here
     return code
 
 
 @kernel
-def determinant(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
-    """Status, and det(dr/dz) at the unknowns in work.z."""
-    size = work.r.shape[0]
-    omega = float(work.z[n - 1])
-    if not stand_at(problem, work, float(work.z[n])):
+def evaluate(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
+    """Status, and the test function, at the unknowns in work.z; the motion's are left in work."""
+    omega = frequency(problem, work.z[:n])
+    if not stand_at(problem, work, float(work.z[n]), value_beside(problem, work.z[:n])):
         return status.NO_CONVERGENCE, math.nan
+    work.at[2] = omega
     code = shooting_residual(problem.shooting, work.shooting, work.z, omega, work.r, work.J)
-    if code != status.OK:
-        return code, math.nan
-    product, total = 1.0, 0.0
+    if code != status.OK or problem.test == MOTION:
+        return code, 0.0
+    if problem.test == GRAZING:
+        varied_depths(problem, work, 0.0, work.depth)
+        return code, float(work.depth[problem.gap // 2, problem.gap % 2])
+    return critical(problem, work)
+
+
+@kernel
+def critical(problem: Varied, work: VariedWork) -> tuple[int, float]:
+    """Status, and the determinant that is zero where multipliers of work.J + I are critical.
+
+    With one at +1 it is that of map - I, with one at -1 that of map + I, and with a product of two
+    of 1 that of the second compound matrix of the map, whose eigenvalues these products are, - I.
+    """
+    size, J = work.r.shape[0], work.J
+    total = 0.0
     for i in range(size):
         for k in range(size):
-            work.square[i, k] = work.J[i, k]
-            total += abs(work.J[i, k])
+            total += abs(J[i, k])
     if not math.isfinite(total):
         return status.NOT_FINITE, math.nan
+    if problem.test == PAIR:
+        set_compound(work)
+    else:
+        for i in range(size):
+            for k in range(size):
+                work.square[i, k] = J[i, k]
+            if problem.test == FLIP:
+                work.square[i, i] += 2.0
     if not lu_factor(work.square, work.pivot):
-        return status.OK, 0.0  # singular to the last digit: a fold
-    for k in range(size):
+        return status.OK, 0.0  # singular to the last digit
+    product = 1.0
+    for k in range(work.square.shape[0]):
         product *= work.square[k, k] if work.pivot[k] == k else -work.square[k, k]
-    return code, product
+    return status.OK, product
+
+
+@kernel
+def set_compound(work: VariedWork) -> None:
+    """C - I into work.square, C the second compound matrix of the map: its minors of two rows."""
+    size, J, row = work.r.shape[0], work.J, 0
+    for i in range(size):
+        J[i, i] += 1.0
+    for p in range(size):
+        for q in range(p + 1, size):
+            column = 0
+            for s in range(size):
+                for t in range(s + 1, size):
+                    work.square[row, column] = J[p, s] * J[q, t] - J[p, t] * J[q, s]
+                    column += 1
+            work.square[row, row] -= 1.0
+            row += 1
+    for i in range(size):
+        J[i, i] -= 1.0
 
 
 @kernel
@@ -242,7 +345,10 @@ def varied_crossings(problem: Varied, work: VariedWork) -> int:
 @kernel
 def varied_depths(problem: Varied, work: VariedWork, value: float, depth: Real) -> None:
     """The shooting's depths, (m, 2); the machine stands at the value already."""
-    flow_depths(problem.shooting, work.shooting, float(work.at[1]), depth)
+    show_gap(problem, work)
+    flow_depths(problem.shooting, work.shooting, float(work.at[2]), depth)
+    if problem.test == GRAZING:
+        open_gap(problem)
 
 
 @kernel
@@ -250,17 +356,20 @@ def varied_scale(problem: Varied, u: Real, value: float, scale: Real) -> None:
     """Size of each unknown, and the longest step in the value."""
     size = 2 * problem.shooting.machine.direction.shape[1]
     n = scale.shape[0] - 1
-    omega = frequency(problem, u[:n])
-    state_scale(problem.shooting, u, omega, scale)
+    state_scale(problem.shooting, u, frequency(problem, u[:n]), scale)
     if n > size:
-        scale[size] = SPEED_SHARE * omega
+        scale[size] = BESIDE_SHARE * size_beside(problem, float(u[size]))
     scale[n] = VALUE_SHARE * value_size(problem, value)
 
 
 @kernel
 def varied_better(problem: Varied, work: VariedWork, value: float) -> float:
     """The shooting's better section."""
-    return section.better_section(problem.shooting, work.shooting, float(work.at[1]))
+    show_gap(problem, work)
+    phase = section.better_section(problem.shooting, work.shooting, float(work.at[2]))
+    if problem.test == GRAZING:
+        open_gap(problem)
+    return float(phase)
 
 
 @kernel
@@ -273,7 +382,9 @@ def varied_section(problem: Varied, work: VariedWork, phase: float, anew: bool) 
 def varied_mirrored(problem: Varied) -> Varied:
     """The problem of motions that are their own mirror image."""
     half = mirrored_shooting(problem.shooting)
-    return Varied(half, problem.series, problem.omega, problem.own)
+    return Varied(
+        half, problem.series, problem.omega, problem.own, problem.beside, problem.test, problem.gap
+    )
 
 
 @kernel
@@ -284,7 +395,7 @@ def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, en
         return status.OK
     for k in range(n + 1):
         work.z[k] = w[k]
-    set_moves(problem, work, n)
+    set_moves(problem, work, n, DIFFERENCE)
     share = 0.0
     for k in range(n + 1):
         share = max(share, abs(tangent[k]) / work.move[k])
@@ -327,7 +438,8 @@ def arrive(problem: Varied, work: VariedWork, n: int, end: float) -> int:
     """Carry the state in work.z to a section ahead, with the problem's sign in the next turn."""
     size, flow, shooting = work.r.shape[0], work.shooting.flow, problem.shooting
     omega = frequency(problem, work.z[:n])
-    if not omega > 0.0 or not stand_at(problem, work, float(work.z[n])):
+    beside = value_beside(problem, work.z[:n])
+    if not omega > 0.0 or not stand_at(problem, work, float(work.z[n]), beside):
         return status.NO_CONVERGENCE
     sign, angle = 1.0, end - work.shooting.section[0]
     if angle < 0.0:

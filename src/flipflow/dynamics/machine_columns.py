@@ -133,7 +133,7 @@ def _slopes(
                 quadratic = _quadratic_slope(at, own, one.value, width)
                 if quadratic is not None:
                     return quadratic
-            series = machine_series(at, one.value + low, one.value + high)
+            series = machine_series(lambda v, _: at(v), one.value + low, one.value + high)
         except (ArithmeticError, ValueError):  # the machine does not take a value on that side
             continue
         if series is not None:
@@ -182,8 +182,8 @@ def _slope_of(series: MachineSeries, value: float) -> dict[str, Real]:
     width = series.high - series.low
     x = (2.0 * value - series.low - series.high) / width
     found = {}
-    for name in MachineSeries._fields[2:]:
-        terms = getattr(series, name)
+    for name in MachineSeries._fields[4:]:
+        terms = getattr(series, name)[:, 0]
         slope = chebyshev.chebder(terms, scl=2.0 / width, axis=0)
         found[name] = np.asarray(chebyshev.chebval(x, slope))
     return found

@@ -4,27 +4,28 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
-from flipflow.io.labelled import Arrays, Variable
+from flipflow.io.labelled import Arrays, Variable, column, each, labels, unit_of, units_of
 from flipflow.model.quantities import QUANTITIES
-from flipflow.model.screen import is_screen
-from flipflow.model.system import Coordinate, Machine, MechanicalSystem
+from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import (
     DIRECTIONS,
     CaseLoads,
@@ -45,16 +46,7 @@ from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
 
-SI = {
-    "length": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N", "torque": "N m",
-    "time": "s", "frequency": "rad/s", "rate": "1/s", "impulse": "kg m/s", "mass": "kg",
-}  # fmt: skip
 PASSES: tuple[Direction, ...] = ("up", "down")
-
-
-def units_of(machine: Machine | None) -> Mapping[str, str]:
-    """SI for a screen; a machine of its user has units of its own, which nobody told."""
-    return SI if machine is None or is_screen(machine) else dict.fromkeys(SI, "")
 
 
 @singledispatch
@@ -70,22 +62,6 @@ def arrays_of(result: object) -> Arrays:
     raise InputError("result", type(result).__name__, f"arrays are known of {known}")
 
 
-def _labels(names: Iterable[Coordinate]) -> Variable:
-    return Variable(("coordinate",), np.array([str(name) for name in names]))
-
-
-def _each(
-    dim: str, system: MechanicalSystem, read: Callable[[Coordinate], ArrayLike], unit: str
-) -> Variable:
-    """A value of every coordinate along a dimension."""
-    values = np.stack([np.asarray(read(name)) for name in system.named], axis=-1)
-    return Variable((dim, "coordinate"), values, unit)
-
-
-def _column(dim: str, values: ArrayLike, unit: str = "") -> Variable:
-    return Variable((dim,), np.asarray(values), unit)
-
-
 def _specials(
     points: Sequence[Any], system: MechanicalSystem, units: Mapping[str, str]
 ) -> dict[str, Variable]:
@@ -93,9 +69,9 @@ def _specials(
     omega = np.array([point.omega for point in points], float)
     amplitudes = [[point.amplitude(name) for name in system.named] for point in points]
     return {
-        "special_kind": _column("special", np.array([point.kind for point in points], str)),
-        "special_omega": _column("special", omega, units["frequency"]),
-        "special_position": _column("special", np.array([p.position for p in points], float)),
+        "special_kind": column("special", np.array([point.kind for point in points], str)),
+        "special_omega": column("special", omega, units["frequency"]),
+        "special_position": column("special", np.array([p.position for p in points], float)),
         "special_amplitude": Variable(
             ("special", "coordinate"),
             np.reshape(amplitudes, (len(points), len(system.named))),
@@ -116,15 +92,15 @@ def _(branch: Branch) -> Arrays:
         "Periodic motions over frequency",
         "point",
         {
-            "omega": _column("point", branch.omega, units["frequency"]),
-            "coordinate": _labels(system.named),
+            "omega": column("point", branch.omega, units["frequency"]),
+            "coordinate": labels(system.named),
         },
         {
-            "amplitude": _each("point", system, branch.amplitude, units["length"]),
-            "phase": _each("point", system, branch.phase, "rad"),
-            "stability": _column("point", np.asarray(branch.stability, str)),
-            "stable": _column("point", branch.stable),
-            "error": _column("point", branch.error, units["length"]),
+            "amplitude": each("point", system, branch.amplitude, units["length"]),
+            "phase": each("point", system, branch.phase, "rad"),
+            "stability": column("point", np.asarray(branch.stability, str)),
+            "stable": column("point", branch.stable),
+            "error": column("point", branch.error, units["length"]),
             "multipliers": Variable(("point", "multiplier"), branch.multipliers),
             **_specials(branch.special_points, system, units),
         },
@@ -140,18 +116,47 @@ def _(branch: FieldBranch) -> Arrays:
     return Arrays(
         f"Periodic motions over {branch.field}",
         "point",
-        {"value": _column("point", branch.values), "coordinate": _labels(system.named)},
+        {"value": column("point", branch.values), "coordinate": labels(system.named)},
         {
-            "omega": _column("point", branch.omega, units["frequency"]),
-            "amplitude": _each("point", system, branch.amplitude, units["length"]),
-            "phase": _each("point", system, branch.phase, "rad"),
-            "stability": _column("point", np.asarray(branch.stability, str)),
-            "stable": _column("point", branch.stable),
+            "omega": column("point", branch.omega, units["frequency"]),
+            "amplitude": each("point", system, branch.amplitude, units["length"]),
+            "phase": each("point", system, branch.phase, "rad"),
+            "stability": column("point", np.asarray(branch.stability, str)),
+            "stable": column("point", branch.stable),
             "multipliers": Variable(("point", "multiplier"), branch.multipliers),
-            "special_value": _column("special", values),
+            "special_value": column("special", values),
             **specials,
         },
         _attributes(branch, field=branch.field, status=branch.status.value),
+    )
+
+
+@arrays_of.register
+def _(curve: BifurcationCurve) -> Arrays:
+    units, system = units_of(curve.machine), curve.machine.system()
+    values = np.reshape([point.values for point in curve.special_points], (-1, 2))
+    columns = {
+        name: column("point", curve.values[:, k], unit_of(name))
+        for k, name in enumerate(curve.parameters)
+    }
+    specials = {
+        f"special_{name}": column("special", values[:, k], unit_of(name))
+        for k, name in enumerate(curve.parameters)
+    }
+    return Arrays(
+        f"{curve.kind} over {' and '.join(curve.parameters)}",
+        "point",
+        {"coordinate": labels(system.named)},
+        {
+            "omega": column("point", curve.omega, units["frequency"]),
+            **columns,
+            "amplitude": each("point", system, curve.amplitude, units["length"]),
+            "phase": each("point", system, curve.phase, "rad"),
+            "multipliers": Variable(("point", "multiplier"), curve.multipliers),
+            **_specials(curve.special_points, system, units),
+            **specials,
+        },
+        _attributes(curve, kind=curve.kind, status=curve.status.value),
     )
 
 
@@ -163,11 +168,11 @@ def _(orbit: Orbit) -> Arrays:
     return Arrays(
         "Periodic motion",
         "time",
-        {"time": _column("time", orbit.t, units["time"]), "coordinate": _labels(system.named)},
+        {"time": column("time", orbit.t, units["time"]), "coordinate": labels(system.named)},
         {
-            "displacement": _each("time", system, orbit.displacement, units["length"]),
-            "velocity": _each("time", system, orbit.velocity, units["velocity"]),
-            "acceleration": _each("time", system, orbit.acceleration, units["acceleration"]),
+            "displacement": each("time", system, orbit.displacement, units["length"]),
+            "velocity": each("time", system, orbit.velocity, units["velocity"]),
+            "acceleration": each("time", system, orbit.acceleration, units["acceleration"]),
             "stop_force": Variable(
                 ("time", "stop"), np.reshape(forces, (len(springs), orbit.t.size)).T, units["force"]
             ),
@@ -186,13 +191,13 @@ def _(orbits: tuple) -> Arrays:  # type: ignore[type-arg]
     return Arrays(
         "Coexisting motions",
         "motion",
-        {"coordinate": _labels(system.named)},
+        {"coordinate": labels(system.named)},
         {
-            "omega": _column("motion", [orbit.omega for orbit in orbits], units["frequency"]),
-            "amplitude": _each("motion", system, _of_all(orbits, Orbit.amplitude), units["length"]),
-            "mean": _each("motion", system, _of_all(orbits, Orbit.mean), units["length"]),
-            "periods": _column("motion", [orbit.periods for orbit in orbits]),
-            "stability": _column("motion", np.array([orbit.stability for orbit in orbits], str)),
+            "omega": column("motion", [orbit.omega for orbit in orbits], units["frequency"]),
+            "amplitude": each("motion", system, _of_all(orbits, Orbit.amplitude), units["length"]),
+            "mean": each("motion", system, _of_all(orbits, Orbit.mean), units["length"]),
+            "periods": column("motion", [orbit.periods for orbit in orbits]),
+            "stability": column("motion", np.array([orbit.stability for orbit in orbits], str)),
             "multipliers": Variable(
                 ("motion", "multiplier"), np.array([orbit.multipliers for orbit in orbits])
             ),
@@ -221,11 +226,11 @@ def _(basins: Basins) -> Arrays:
     return Arrays(
         "Basins",
         "motion",
-        {**axes, "coordinate": _labels(system.named)},
+        {**axes, "coordinate": labels(system.named)},
         {
             "label": Variable(dims, basins.labels),
             "turns": Variable(dims, basins.turns),
-            "share": _column("motion", basins.shares),
+            "share": column("motion", basins.shares),
             "amplitude": Variable(
                 ("motion", "coordinate"), np.reshape(amplitude, shape), units["length"]
             ),
@@ -243,18 +248,18 @@ def _(risk: JumpRisk) -> Arrays:
         "Least blows that make the motion jump",
         "throw",
         {
-            "frame": _column("frame", np.array(frames, str)),
-            "way": _column("way", [1, -1]),
-            "phase": _column("phase", risk.phases, "rad"),
+            "frame": column("frame", np.array(frames, str)),
+            "way": column("way", [1, -1]),
+            "phase": column("phase", risk.phases, "rad"),
         },
         {
             "threshold": Variable(("frame", "way", "phase"), thresholds, units["impulse"]),
-            "throw_frame": _column("throw", np.array([str(one.frame) for one in throws], str)),
-            "throw_impulse": _column("throw", [one.impulse for one in throws], units["impulse"]),
-            "throw_lump": _column(
+            "throw_frame": column("throw", np.array([str(one.frame) for one in throws], str)),
+            "throw_impulse": column("throw", [one.impulse for one in throws], units["impulse"]),
+            "throw_lump": column(
                 "throw", [number_or_nan(one.lump) for one in throws], units["mass"]
             ),
-            "throw_phase": _column("throw", [one.phase for one in throws], "rad"),
+            "throw_phase": column("throw", [one.phase for one in throws], "rad"),
         },
         _attributes(risk, omega=risk.omega),
     )
@@ -272,14 +277,14 @@ def _(history: History) -> Arrays:
     return Arrays(
         "Motion over time",
         "time",
-        {"time": _column("time", history.t, units["time"]), "coordinate": _labels(system.named)},
+        {"time": column("time", history.t, units["time"]), "coordinate": labels(system.named)},
         {
-            "displacement": _each("time", system, history.displacement, units["length"]),
-            "velocity": _each("time", system, history.velocity, units["velocity"]),
-            "acceleration": _each("time", system, history.acceleration, units["acceleration"]),
+            "displacement": each("time", system, history.displacement, units["length"]),
+            "velocity": each("time", system, history.velocity, units["velocity"]),
+            "acceleration": each("time", system, history.acceleration, units["acceleration"]),
             "stop_force": Variable(("time", "stop"), history.force, units["force"]),
-            "omega": _column("time", history.omega, units["frequency"]),
-            "angle": _column("time", history.angle, "rad"),
+            "omega": column("time", history.omega, units["frequency"]),
+            "angle": column("time", history.angle, "rad"),
             **more,
         },
         _attributes(history, status=history.status, method=history.method),
@@ -312,19 +317,19 @@ def _(sweep: Sweep) -> Arrays:
         "Settled motions over speed",
         "step",
         {
-            "omega": _column("step", sweep.omega, units["frequency"]),
-            "coordinate": _labels(system.named),
+            "omega": column("step", sweep.omega, units["frequency"]),
+            "coordinate": labels(system.named),
         },
         {
-            "amplitude": _each("step", system, sweep.amplitude, units["length"]),
-            "least": _each("step", system, lambda which: sweep.extremes(which)[0], units["length"]),
-            "greatest": _each(
+            "amplitude": each("step", system, sweep.amplitude, units["length"]),
+            "least": each("step", system, lambda which: sweep.extremes(which)[0], units["length"]),
+            "greatest": each(
                 "step", system, lambda which: sweep.extremes(which)[1], units["length"]
             ),
-            "periods": _column("step", sweep.periods),
-            "word": _column("step", np.array(sweep.words, str)),
-            "turns": _column("step", sweep.turns),
-            "distance": _column("step", sweep.distance, units["length"]),
+            "periods": column("step", sweep.periods),
+            "word": column("step", np.array(sweep.words, str)),
+            "turns": column("step", sweep.turns),
+            "distance": column("step", sweep.distance, units["length"]),
         },
         _attributes(sweep),
     )
@@ -337,12 +342,12 @@ def _(section: Section) -> Arrays:
         "Poincare section",
         "turn",
         {
-            "turn": _column("turn", np.arange(1, section.states.shape[0] + 1)),
-            "coordinate": _labels(system.named),
+            "turn": column("turn", np.arange(1, section.states.shape[0] + 1)),
+            "coordinate": labels(system.named),
         },
         {
-            "displacement": _each("turn", system, section.displacement, units["length"]),
-            "velocity": _each("turn", system, section.velocity, units["velocity"]),
+            "displacement": each("turn", system, section.displacement, units["length"]),
+            "velocity": each("turn", system, section.velocity, units["velocity"]),
         },
         _attributes(section, omega=section.omega, word=section.word, periods=section.periods),
     )
@@ -354,8 +359,8 @@ def _(spectrum: Spectrum) -> Arrays:
     return Arrays(
         "Spectrum",
         "frequency",
-        {"frequency": _column("frequency", spectrum.frequencies, units["frequency"])},
-        {"amplitude": _column("frequency", spectrum.amplitudes, units["length"])},
+        {"frequency": column("frequency", spectrum.frequencies, units["frequency"])},
+        {"amplitude": column("frequency", spectrum.amplitudes, units["length"])},
         _attributes(spectrum, omega=spectrum.omega, which=str(spectrum.which)),
     )
 
@@ -368,10 +373,10 @@ def _(found: LyapunovExponents) -> Arrays:
         "exponent",
         {},
         {
-            "exponents": _column("exponent", found.exponents, rate),
-            "standard_error": _column("exponent", found.standard_error, rate),
+            "exponents": column("exponent", found.exponents, rate),
+            "standard_error": column("exponent", found.standard_error, rate),
             "batches": Variable(("batch", "exponent"), found.batches, rate),
-            "contact_share": _column("stop", found.contact_share),
+            "contact_share": column("stop", found.contact_share),
         },
         _attributes(found, omega=found.omega, word=found.word, periods=found.periods),
     )
@@ -392,11 +397,11 @@ def _(diagram: BifurcationDiagram) -> Arrays:
     return Arrays(
         f"Bifurcation diagram over {diagram.parameter}",
         "sample",
-        {"coordinate": _labels(system.named)},
+        {"coordinate": labels(system.named)},
         {
-            "value": _column("sample", np.array(values, float)),
-            "direction": _column("sample", np.array(ways, str)),
-            "displacement": _each("sample", system, lambda c: x @ system.coordinate(c), unit),
+            "value": column("sample", np.array(values, float)),
+            "direction": column("sample", np.array(ways, str)),
+            "displacement": each("sample", system, lambda c: x @ system.coordinate(c), unit),
         },
         _attributes(diagram, parameter=diagram.parameter),
     )
@@ -409,16 +414,16 @@ def _(response: LinearResponse) -> Arrays:
         "Response without contact",
         "point",
         {
-            "omega": _column("point", response.omega, units["frequency"]),
-            "coordinate": _labels(system.named),
+            "omega": column("point", response.omega, units["frequency"]),
+            "coordinate": labels(system.named),
         },
         {
-            "amplitude": _each("point", system, response.amplitude, units["length"]),
-            "phase": _each("point", system, response.phase, "rad"),
+            "amplitude": each("point", system, response.amplitude, units["length"]),
+            "phase": each("point", system, response.phase, "rad"),
             "complex_amplitude": Variable(
                 ("point", "freedom"), response.complex_amplitudes, units["length"]
             ),
-            "natural_frequency": _column("mode", response.natural_frequencies, units["frequency"]),
+            "natural_frequency": column("mode", response.natural_frequencies, units["frequency"]),
         },
         _attributes(response),
     )
@@ -435,12 +440,25 @@ def _(region: OperatingRegion) -> Arrays:
         "interval",
         {},
         {
-            "feasible_from": _column("interval", feasible[:, 0], "rad/s"),
-            "feasible_to": _column("interval", feasible[:, 1], "rad/s"),
+            "feasible_from": column("interval", feasible[:, 0], "rad/s"),
+            "feasible_to": column("interval", feasible[:, 1], "rad/s"),
             **{word: Variable((), np.asarray(mark), "rad/s") for word, mark in known.items()},
         },
         _attributes(region, cases="; ".join(case.name or "empty" for case in region.cases)),
     )
+
+
+@arrays_of.register
+def _(found: DesignMap) -> Arrays:
+    dims = "stop_stiffness", "clearance"
+    units = {
+        "omega_cs": "rad/s", "omega_lb": "rad/s", "omega_ub": "rad/s", "width": "rad/s",
+        "amplitude": "m", "steadiness": "",
+    }  # fmt: skip
+    axes = {name: column(name, getattr(found, name), unit_of(name)) for name in dims}
+    values = {name: Variable(dims, getattr(found, name), unit) for name, unit in units.items()}
+    said = _attributes(found, omega=found.omega)
+    return Arrays("Gap and stop stiffness", "clearance", axes, values, said)
 
 
 @arrays_of.register
@@ -454,12 +472,12 @@ def _(loading: Loading) -> Arrays:
     return Arrays(
         "Empty against loaded machine",
         "row",
-        {"machine": _column("row", np.array(names, str))},
+        {"machine": column("row", np.array(names, str))},
         {
-            "omega": _column("row", np.concatenate([one.omega for one in parts]), "rad/s"),
-            "unloaded": _column("row", np.concatenate([one.unloaded for one in parts]), "m"),
-            "loaded": _column("row", np.concatenate([one.loaded for one in parts]), "m"),
-            "change": _column("row", np.concatenate([one.change for one in parts]), "m"),
+            "omega": column("row", np.concatenate([one.omega for one in parts]), "rad/s"),
+            "unloaded": column("row", np.concatenate([one.unloaded for one in parts]), "m"),
+            "loaded": column("row", np.concatenate([one.loaded for one in parts]), "m"),
+            "change": column("row", np.concatenate([one.change for one in parts]), "m"),
         },
         _attributes(loading, load=loading.load.name or "load"),
     )
@@ -479,19 +497,19 @@ def _(family: ResponseFamily) -> Arrays:
         return np.concatenate([member.branch.amplitude(which) for member in family.members])
 
     columns = {
-        name: _column("member", [math.nan if v is None else v for v in values])
+        name: column("member", [math.nan if v is None else v for v in values])
         for name, values in table.items()
     }
     return Arrays(
         f"Responses over {family.field}",
         "member",
-        {"value": _column("member", family.values), "coordinate": _labels(system.named)},
+        {"value": column("member", family.values), "coordinate": labels(system.named)},
         {
             **columns,
-            "failure": _column("member", np.array(failure, str)),
-            "member": _column("point", owner),
-            "omega": _column("point", omega, units["frequency"]),
-            "amplitude": _each("point", system, amplitude, units["length"]),
+            "failure": column("member", np.array(failure, str)),
+            "member": column("point", owner),
+            "omega": column("point", omega, units["frequency"]),
+            "amplitude": each("point", system, amplitude, units["length"]),
         },
         _attributes(family, field=family.field),
     )
@@ -508,8 +526,8 @@ def _(found: Sensitivity) -> Arrays:
         f"Sobol indices of {found.quantity}",
         "field",
         {
-            "field": _column("field", np.array(found.names, str)),
-            **({"omega": _column("frequency", omega, "rad/s")} if over else {}),
+            "field": column("field", np.array(found.names, str)),
+            **({"omega": column("frequency", omega, "rad/s")} if over else {}),
         },
         {
             **{name: Variable(dims, getattr(found, name)) for name in names},
@@ -525,7 +543,7 @@ def _(assessment: Assessment) -> Arrays:
     names = [case.name for case in assessment.cases]
     words = list(dict.fromkeys(name for case in assessment.cases for name in case.values))
     values = {
-        word: _column(
+        word: column(
             "case",
             [number_or_nan(case.values.get(word)) for case in assessment.cases],
             QUANTITIES[word].unit,
@@ -537,16 +555,16 @@ def _(assessment: Assessment) -> Arrays:
         "Every load case at working speed",
         "case",
         {
-            "case": _column("case", np.array(names, str)),
-            "limit": _column("limit", np.array([row.name for row in rows], str)),
+            "case": column("case", np.array(names, str)),
+            "limit": column("limit", np.array([row.name for row in rows], str)),
         },
         {
             **values,
-            "limit_least": _column("limit", [row.limit[0] for row in rows]),
-            "limit_most": _column("limit", [row.limit[1] for row in rows]),
-            "limit_worst": _column("limit", [number_or_nan(row.worst) for row in rows]),
-            "limit_margin": _column("limit", [number_or_nan(row.margin) for row in rows]),
-            "limit_state": _column("limit", np.array([row.state for row in rows], str)),
+            "limit_least": column("limit", [row.limit[0] for row in rows]),
+            "limit_most": column("limit", [row.limit[1] for row in rows]),
+            "limit_worst": column("limit", [number_or_nan(row.worst) for row in rows]),
+            "limit_margin": column("limit", [number_or_nan(row.margin) for row in rows]),
+            "limit_state": column("limit", np.array([row.state for row in rows], str)),
         },
         _attributes(assessment, verdict=assessment.verdict, omega=number_or_nan(assessment.omega)),
     )
@@ -562,12 +580,12 @@ def _(found: Comparison) -> Arrays:
         "Machines compared",
         "result",
         {
-            "result": _column("result", np.array([row.name for row in rows], str)),
-            "machine": _column("machine", np.array(found.names, str)),
+            "result": column("result", np.array([row.name for row in rows], str)),
+            "machine": column("machine", np.array(found.names, str)),
         },
         {
-            "case": _column("result", np.array([row.case for row in rows], str)),
-            "unit": _column("result", np.array([row.unit for row in rows], str)),
+            "case": column("result", np.array([row.case for row in rows], str)),
+            "unit": column("result", np.array([row.unit for row in rows], str)),
             "value": Variable(("result", "machine"), values.astype(float)),
         },
         _attributes(found),
@@ -588,13 +606,13 @@ def _(loads: FoundationLoads) -> Arrays:
         "Loads on the foundation, all supports together",
         "load",
         {
-            "load": _column("load", np.array([one.name for one in every], str)),
-            "direction": _column("direction", np.array(DIRECTIONS)),
+            "load": column("load", np.array([one.name for one in every], str)),
+            "direction": column("direction", np.array(DIRECTIONS)),
         },
         {
             "static": ways(static),
             "dynamic": ways(peaks),
-            "static_share": _column("support", np.array(loads.static_shares, float)),
+            "static_share": column("support", np.array(loads.static_shares, float)),
         },
         _attributes(loads, position=loads.position, supports=float(len(loads.supports))),
     )

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import singledispatch
 from typing import Any
 
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -26,6 +27,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
@@ -45,6 +47,7 @@ ORBITS = "flipflow/orbits/1"
 SCHEMAS: dict[type, str] = {
     Branch: "flipflow/branch/1",
     FieldBranch: "flipflow/field-branch/1",
+    BifurcationCurve: "flipflow/bifurcation-curve/1",
     Orbit: "flipflow/orbit/1",
     Basins: "flipflow/basins/1",
     JumpRisk: "flipflow/jump-risk/1",
@@ -58,6 +61,7 @@ SCHEMAS: dict[type, str] = {
     LyapunovExponents: "flipflow/lyapunov-exponents/1",
     BifurcationDiagram: "flipflow/bifurcation-diagram/1",
     LinearResponse: "flipflow/linear-response/1",
+    DesignMap: "flipflow/design-map/1",
     OperatingRegion: "flipflow/operating-region/1",
     Loading: "flipflow/loading/1",
     ResponseFamily: "flipflow/response-family/1",

@@ -26,6 +26,7 @@ OF_SPRING = ("stiffness", "damping", "clearance", "clearance_minus")
 PATH = re.compile(rf"springs\[([0-9]+)\]\.({'|'.join(OF_SPRING)})")
 FORCING = "forcing"
 FINITE = "give the machine a finite value of it first"
+OF_WEIGHT = ("deck_angle",)  # fields of a screen that move its gaps by what hangs on the springs
 COUNTS = (int, "int")  # fields of this type are counted, and have no values between
 
 
@@ -98,7 +99,7 @@ def parameter_names(machine: Machine) -> tuple[str, ...]:
         springs = range(len(machine.springs))
         return (FORCING, *(f"springs[{j}].{part}" for j in springs for part in OF_SPRING))
     if isinstance(machine, FlipFlowScreen):
-        return MOTION_FIELDS
+        return (*MOTION_FIELDS, *OF_WEIGHT)
     if not dataclasses.is_dataclass(machine):
         return ()
     return tuple(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -15,8 +16,10 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.bifurcation import bifurcation_figure
+from flipflow.plotting.bifurcation_curves import curves_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.compare import comparison_figure
+from flipflow.plotting.design_map import design_map_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.foundation_bars import foundation_figure
@@ -38,6 +41,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -74,6 +78,8 @@ OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
     LyapunovExponents: lyapunov_figure,
     JumpRisk: jump_risk_figure,
     Comparison: comparison_figure,
+    BifurcationCurve: curves_figure,
+    DesignMap: design_map_figure,
     FoundationLoads: foundation_figure,
 }
 
@@ -92,7 +98,7 @@ def figure(
     ----------
     result
         What an analysis returns: a branch, an orbit, a sweep, an assessment, ...; a list of
-        branches, or the motions of ``periodic_orbits``.
+        branches or of bifurcation curves, or the motions of ``periodic_orbits``.
     coordinate
         What is drawn of the motion, a name or an index; None: what matters most, or all.
     units
@@ -149,4 +155,6 @@ def _builder(result: object, which: Coordinate | None) -> Callable[[], Figure]:
 def _of_several(result: Sequence[object], which: Coordinate | None) -> Figure:
     if result and all(isinstance(one, Orbit) for one in result):
         return orbits_in_time_figure(result, which)  # type: ignore[arg-type]
+    if result and all(isinstance(one, BifurcationCurve) for one in result):
+        return curves_figure(*result)  # type: ignore[arg-type]
     return branches_figure(result, which)  # type: ignore[arg-type]

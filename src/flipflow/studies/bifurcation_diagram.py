@@ -347,7 +347,7 @@ class _OverField(_Passing):
         ends = float(self.values[0]), float(self.values[-1])
         try:
             return FieldSolver(
-                lambda value: system_of(self.parameter.at(value)), ends, self.parameter.value,
+                lambda value, _: system_of(self.parameter.at(value)), ends, self.parameter.value,
                 self.speed, half_turn=False, turns=periods,
             )  # fmt: skip
         except IncompleteError:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.continuation import correction
+from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
@@ -32,7 +33,7 @@ from flipflow.model.arguments import (
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import Excitation, HarmonicForce, MovingBase, Unbalance
-from flipflow.model.parameters import parameter_of, value_of
+from flipflow.model.parameters import parameter_of, value_of, with_values
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -87,6 +88,10 @@ BRANCH = CODEC.table(
     **{name: f"traced.{name}" for name in TRIED},
 )  # fmt: skip
 FIELD_BRANCH = CODEC.table({**FOLLOWED, "field": str, "values": Real})
+BIFURCATION_CURVE = CODEC.table(
+    {**FOLLOWED, "bifurcation": str, "parameters": tuple[str, str], "values": Real},
+    bifurcation="kind",
+)
 SWEEP = CODEC.table(
     {
         "machine": Machine, "version": str, "omega": Real, "settled": NDArray[np.bool_],
@@ -212,16 +217,49 @@ def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:
 
 def field_branch_document(branch: FieldBranch) -> dict[str, Any]:
     """A branch over a field of the machine."""
-    if not isinstance(branch.machine, (FlipFlowScreen, MechanicalSystem)):
+    return {**_row_document(branch), **FIELD_BRANCH.write(branch)}
+
+
+def bifurcation_curve_document(curve: BifurcationCurve) -> dict[str, Any]:
+    """A curve in two parameters of the machine."""
+    return {**_row_document(curve), **BIFURCATION_CURVE.write(curve)}
+
+
+def _row_document(row: FieldBranch | BifurcationCurve) -> dict[str, Any]:
+    """Motions, each of a machine that differs in its parameters alone."""
+    if not isinstance(row.machine, (FlipFlowScreen, MechanicalSystem)):
         remedy = "only branches of a FlipFlowScreen or a MechanicalSystem can be saved"
-        raise InputError("result", type(branch.machine).__name__, remedy)
-    points = [POINT.write(orbit.point) for orbit in branch.orbits]
+        raise InputError("result", type(row.machine).__name__, remedy)
     return {
-        **_read_off(branch, branch.machine.system()),
-        "machine": machine_document(branch.machine),
-        **FIELD_BRANCH.write(branch),
-        "points": points,
+        **_read_off(row, row.machine.system()),
+        "machine": machine_document(row.machine),
+        "points": [POINT.write(orbit.point) for orbit in row.orbits],
     }
+
+
+def bifurcation_curve_from(document: Document) -> BifurcationCurve:
+    """The curve of a document."""
+    read = BIFURCATION_CURVE.read(document)
+    machine, names = MACHINES.read(document["machine"]), read["parameters"]
+    values = read["values"].reshape(-1, 2)
+
+    def orbit_at(at: tuple[float, float], one: Document) -> Orbit:
+        fields = {name: value for name, value in zip(names, at, strict=True) if name != "omega"}
+        return Motions(with_values(machine, fields), PiecewiseExact()).orbit(one, Point)
+
+    def special_point(one: Document) -> CurvePoint:
+        at = CODEC.form(tuple[float, float]).read(one["values"])
+        return CurvePoint(orbit=orbit_at(at, one), values=at, **PLACE.read(one))
+
+    points = zip(values.tolist(), document["points"], document["stability"], strict=True)
+    return BifurcationCurve(
+        orbits=tuple(orbit_at(at, {**one, "stability": word}) for at, one, word in points),
+        special_points=tuple(map(special_point, document["special_points"])),
+        machine=machine,
+        kind=read["bifurcation"],
+        values=values,
+        **{name: read[name] for name in ("parameters", *ENDED)},
+    )
 
 
 def field_branch_from(document: Document) -> FieldBranch:
@@ -246,7 +284,9 @@ def field_branch_from(document: Document) -> FieldBranch:
     )
 
 
-def _read_off(branch: Branch | FieldBranch, system: MechanicalSystem) -> dict[str, Any]:
+def _read_off(
+    branch: Branch | FieldBranch | BifurcationCurve, system: MechanicalSystem
+) -> dict[str, Any]:
     """What every branch tells other readers, and its special points."""
     return {
         "status_sentence": branch.status.value,
@@ -256,7 +296,7 @@ def _read_off(branch: Branch | FieldBranch, system: MechanicalSystem) -> dict[st
         "error": plain(branch.error),
         "special_points": [
             {
-                **({"value": point.value} if isinstance(point, FieldSpecialPoint) else {}),
+                **_place_of(point),
                 "amplitude": _named(point.orbit.system, point.amplitude),
                 **PLACE.write(point),
                 **WORD.write(point.orbit),
@@ -265,6 +305,13 @@ def _read_off(branch: Branch | FieldBranch, system: MechanicalSystem) -> dict[st
             for point in branch.special_points
         ],
     }
+
+
+def _place_of(point: SpecialPoint) -> dict[str, Any]:
+    """Where a special point stands, besides its speed."""
+    if isinstance(point, FieldSpecialPoint):
+        return {"value": point.value}
+    return {"values": list(point.values)} if isinstance(point, CurvePoint) else {}
 
 
 def _named(system: MechanicalSystem, value: Callable[[Coordinate], object]) -> dict[str, Any]:
@@ -384,6 +431,7 @@ CODEC.learn(
         Orbit: Form(orbit_document, orbit_from),
         Branch: Form(branch_document, branch_from),
         FieldBranch: Form(field_branch_document, field_branch_from),
+        BifurcationCurve: Form(bifurcation_curve_document, bifurcation_curve_from),
         Sweep: Form(sweep_document, sweep_from),
         Sensitivity: Form(sensitivity_document, sensitivity_from),
         OneAtATime: of_screens(OneAtATime, _with_own),

@@ -1,0 +1,67 @@
+"""A design map: jump speeds, amplitude and steadiness over the gap, a line for each stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.plotting.branches import field_axis
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.palette import case_colour, case_symbol
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
+from flipflow.plotting.scales import MM, RPM
+from flipflow.studies.design_map import DesignMap
+
+Real = NDArray[np.float64]
+MN = 1e-6
+
+
+def design_map_figure(found: DesignMap) -> Figure:
+    """Speeds of contact and of jumps, amplitude at working speed, its share under load."""
+    axis, _ = field_axis("clearance", found.clearance)
+    x = found.clearance * MM
+    words = [f"k3 = {k * MN:.4g} MN/m" for k in found.stop_stiffness]
+    colour = {float(k): case_colour(j) for j, k in enumerate(found.stop_stiffness)}
+    traces, cusps = [], []
+    for curve in found.curves:
+        stiffness = float(curve.machine.stop_stiffness)  # type: ignore[attr-defined]
+        grazing = curve.kind == "grazing"
+        traces.append(
+            Trace(
+                "contact begins" if grazing else "jump speeds", curve.along("clearance") * MM,
+                curve.omega * RPM, colour="gap" if grazing else colour[stiffness],
+                legend=grazing, dash="dot" if grazing else "",
+            )
+        )  # fmt: skip
+        cusps += [(point.values[0] * MM, point.omega * RPM) for point in curve.points_of("cusp")]
+    if cusps:
+        at = np.array(cusps)
+        traces.append(
+            Trace("folds are born (cusp)", at[:, 0], at[:, 1], "point", "jump",
+                  symbol="diamond-open")
+        )  # fmt: skip
+    speed = Line("y", found.omega * RPM, f"working speed {found.omega * RPM:.4g} rpm", "speed")
+    panels = [
+        Panel(axis, Axis("shaft speed", "rpm"), traces=tuple(traces), lines=(speed,)),
+        Panel(axis, Axis("amplitude (|x2|)", "mm"), _lines(x, found.amplitude * MM, words, True)),
+    ]
+    under = ""
+    if np.isfinite(found.steadiness).any():
+        share = Axis("amplitude, loaded / empty")
+        panels.append(Panel(axis, share, _lines(x, found.steadiness, words, False)))
+        under = " Below: what is left of it under load."
+    caption = (
+        "Above: the speeds at which the machine jumps, a line for each stop in the colours of the "
+        "panel below; where both speeds meet, in the cusp, the jump is gone. In the middle: the "
+        f"relative amplitude at working speed as it is reached from below.{under}"
+    )
+    return Figure("Gap and stop stiffness", caption, tuple(panels), height=220 * len(panels))
+
+
+def _lines(x: Real, rows: Real, words: Sequence[str], legend: bool) -> tuple[Trace, ...]:
+    return tuple(
+        Trace(word, x, row, "stable", case_colour(j), case_symbol(j), legend=legend)
+        for j, (word, row) in enumerate(zip(words, rows, strict=True))
+    )

@@ -1,0 +1,184 @@
+"""Which gap and which stop: operating region, amplitude and steadiness over both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flipflow import __version__
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
+from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.continue_bifurcation import continue_bifurcation
+from flipflow.continuation.special_points import CONTACT_BEGIN
+from flipflow.errors import InputError
+from flipflow.model.arguments import (
+    checked_kind,
+    checked_monitor,
+    checked_numbers,
+    checked_speed,
+)
+from flipflow.model.monitor import Monitor
+from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result
+from flipflow.studies.landmarks import Landmarks, Response, analysed_range, landmarks
+from flipflow.studies.loading import amplitude_from_below
+
+Real = NDArray[np.float64]
+GAP, STIFFNESS, OMEGA = "clearance", "stop_stiffness", "omega"
+CURVES_SHARE = 0.8  # of the work is done where the curves are followed
+
+
+@dataclass(frozen=True, eq=False)
+class DesignMap(Frozen, Result):
+    """Gap against stop stiffness: what a screen does with each pair, returned by ``design_map``.
+
+    Arrays (m, n) have a row for each stiffness and a column for each gap; NaN where there is none.
+
+    Parameters
+    ----------
+    screen
+        The machine whose gap and stop are varied.
+    omega
+        Working speed in rad/s.
+    load
+        The load under which steadiness is told; None without one.
+    clearance, stop_stiffness
+        Gaps in m, (n,), and stiffnesses in N/m, (m,), rising.
+    omega_cs, omega_lb, omega_ub
+        Where contact begins, and both folds, in rad/s, (m, n).
+    width
+        Width of the operating region in rad/s, (m, n).
+    amplitude
+        Relative amplitude in m at working speed, as the speed rises slowly, (m, n).
+    steadiness
+        The same of the loaded machine as a share of it, (m, n): 1 where the load changes nothing.
+    curves
+        Where contact begins over gap and speed, once for all stiffnesses; and for each stiffness
+        that has folds, the folds over gap and speed, through the cusp where they are born.
+    version
+        Version of flipflow.
+    """
+
+    screen: FlipFlowScreen
+    omega: float
+    load: Load | None
+    clearance: Real
+    stop_stiffness: Real
+    omega_cs: Real
+    omega_lb: Real
+    omega_ub: Real
+    width: Real
+    amplitude: Real
+    steadiness: Real
+    curves: tuple[BifurcationCurve, ...]
+    version: str
+
+    def __repr__(self) -> str:
+        m, n = self.omega_cs.shape
+        cusps = sum(len(curve.points_of("cusp")) for curve in self.curves)
+        return f"DesignMap({n} gaps, {m} stiffnesses, {self.omega:.6g} rad/s, {cusps} cusps)"
+
+
+def design_map(
+    screen: FlipFlowScreen,
+    omega: float,
+    clearance: ArrayLike,
+    stop_stiffness: ArrayLike,
+    *,
+    load: Load | None = None,
+    monitor: Monitor | None = None,
+) -> DesignMap:
+    """Operating region, amplitude and steadiness of a screen over gap and stop stiffness.
+
+    Every pair is analysed by its own response; where contact begins and where the machine jumps is
+    also followed over the gap as curves.
+
+    Parameters
+    ----------
+    screen
+        The machine.
+    omega
+        Working speed in rad/s.
+    clearance, stop_stiffness
+        Gaps in m and stiffnesses in N/m, at least two each.
+    load
+        Load under which the amplitude is compared with that of the empty machine.
+    monitor
+        Called with a sentence and the share done; raise from it to cancel.
+
+    Returns
+    -------
+    DesignMap
+        Its figure draws the curves, the amplitude and its share under load.
+
+    Raises
+    ------
+    InputError
+        For values that are not above zero, and a machine without a finite gap.
+    """
+    checked_kind("screen", screen, FlipFlowScreen, "give a screen, such as ff.load(...)")
+    omega, say = checked_speed(omega), checked_monitor(monitor)
+    if load is not None:
+        checked_kind("load", load, Load, "give a flipflow.Load, or None")
+    gaps, stops = _values(GAP, clearance), _values(STIFFNESS, stop_stiffness)
+    rows: list[list[tuple[float, ...]]] = []
+    starts: list[SpecialPoint] = []
+    begins: SpecialPoint | None = None
+    for j, stiffness in enumerate(stops):
+        say(f"stop of {stiffness:.4g} N/m", CURVES_SHARE * j / stops.size)
+        row, fold = [], None
+        for gap in gaps:
+            one = screen.replace(clearance=float(gap), stop_stiffness=float(stiffness))
+            branch = Response(one, analysed_range(one, omega)).branch
+            marks = landmarks(one, branch)
+            row.append(_cell(one, branch, marks, omega, load))
+            fold = fold or _at(branch.folds, marks.omega_lb)
+            begins = begins or _at(branch.points_of(CONTACT_BEGIN), marks.omega_cs)
+        rows.append(row)
+        starts += [fold] if fold else []
+    starts = [begins, *starts] if begins else starts
+    cs, lb, ub, width, amplitude, steadiness = np.moveaxis(np.array(rows), 2, 0).copy()
+    return DesignMap(
+        screen, omega, load, gaps, stops, cs, lb, ub, width, amplitude, steadiness,
+        curves=tuple(_curve(point, gaps, say, k / len(starts)) for k, point in enumerate(starts)),
+        version=__version__,
+    )  # fmt: skip
+
+
+def _values(name: str, given: ArrayLike) -> Real:
+    remedy = "give at least two different values above 0"
+    row = np.unique(checked_numbers(name, given, remedy))
+    if row.size < 2 or row[0] <= 0.0:
+        raise InputError(name, given, remedy)
+    return row
+
+
+def _at(points: tuple[SpecialPoint, ...], omega: float | None) -> SpecialPoint | None:
+    """The point at a landmark."""
+    return next((point for point in points if point.omega == omega), None)
+
+
+def _cell(
+    one: FlipFlowScreen, branch: Branch, marks: Landmarks, omega: float, load: Load | None
+) -> tuple[float, ...]:
+    amplitude, share = amplitude_from_below(branch, omega, "relative"), math.nan
+    if load is not None:
+        loaded = one.loaded(load)
+        under = Response(loaded, analysed_range(loaded, omega)).branch
+        share = amplitude_from_below(under, omega, "relative") / amplitude
+    known = (marks.omega_cs, marks.omega_lb, marks.omega_ub)
+    speeds = (math.nan if speed is None else speed for speed in known)
+    return (*speeds, marks.upper - marks.lower, amplitude, share)
+
+
+def _curve(point: SpecialPoint, gaps: Real, say: Monitor, share: float) -> BifurcationCurve:
+    """The curve of a point over gap and speed."""
+    machine = point.orbit.machine
+    say("curves over the gap", CURVES_SHARE + (1.0 - CURVES_SHARE) * share)
+    low, high = analysed_range(machine)
+    limits = (float(gaps[0]), float(gaps[-1])), (low, high)
+    return continue_bifurcation(point, (GAP, OMEGA), limits)

@@ -1,0 +1,302 @@
+"""Curves of special points in two parameters, each against another route to the same point.
+
+benchmarks/curves.py compares every point of these curves, here some of them are.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
+from judge import close
+from reference import two_event
+
+pytestmark = pytest.mark.numerical
+RPM = 30.0 / math.pi
+K2 = 2.7e6
+SPEEDS = (120.0, 260.0)
+OVER = {
+    "clearance": (2e-3, 9e-3),
+    "stop_stiffness": (K2, 5.0 * K2),
+    "shear_stiffness": (1.8e6, 4.5e6),
+}
+CUSPS = {"clearance": (5.3021e-3, 210.416), "stop_stiffness": (5.8231e6, 185.618)}
+STIFFNESS, K_BOUNDS = "springs[0].stiffness", (10.0, 200.0)
+ANGLES = math.radians(4.0), math.radians(25.0)
+K = np.array([[1.0, -1.0], [-1.0, 2.0]])
+
+
+def chain(stiffness: float = 100.0) -> ff.MechanicalSystem:
+    """The public case of row 24."""
+    stop = ff.ClearanceSpring([1.0, 0.0], stiffness, 0.0, 1.0, np.inf)
+    return ff.MechanicalSystem(np.eye(2), 0.03 * K, K, (stop,), ff.HarmonicForce([0.0, 0.1]))
+
+
+def spread(curve: BifurcationCurve, count: int) -> list[int]:
+    """Points all along a curve, without its ends."""
+    return np.linspace(0, len(curve.orbits) - 1, count + 2).astype(int)[1:-1].tolist()
+
+
+def nearest(points, omega: float) -> float:
+    return min((point.omega for point in points), key=lambda found: abs(found - omega))
+
+
+@pytest.fixture(scope="module")
+def folds(exact) -> dict[str, BifurcationCurve]:
+    return {
+        field: ff.continue_bifurcation(exact.folds[0], (field, "omega"), (bounds, SPEEDS))
+        for field, bounds in OVER.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def of_chain() -> ff.Branch:
+    return ff.frequency_response(chain(), (0.5, 0.8))
+
+
+@pytest.fixture(scope="module")
+def doubling(of_chain) -> BifurcationCurve:
+    first = of_chain.points_of("period doubling")[0]
+    return ff.continue_bifurcation(first, (STIFFNESS, "omega"), (K_BOUNDS, (0.5, 0.9)))
+
+
+@pytest.fixture(scope="module")
+def drawn() -> ff.FlipFlowScreen:
+    return ff.load("ffs0827").replace(clearance_measured="drawn")
+
+
+@pytest.fixture(scope="module")
+def of_weight(drawn) -> BifurcationCurve:
+    branch = ff.frequency_response(drawn, (60.0, 100.0))
+    first = branch.points_of("period doubling")[0]
+    return ff.continue_bifurcation(first, ("deck_angle", "omega"), (ANGLES, (60.0, 100.0)))
+
+
+@pytest.mark.parametrize("field", ["clearance", "stop_stiffness"])
+def test_fold_curves_are_folds_of_single_curves(screen, folds, field: str) -> None:
+    """Both folds of the nominal machine lie on one curve; 1e-6 rad/s against branches."""
+    curve = folds[field]
+    assert curve.complete
+    for i in [0, *spread(curve, 4), -1]:
+        machine = screen.replace(**{field: float(curve.along(field)[i])})
+        over_omega = ff.frequency_response(machine, (5.0, 300.0)).folds
+        close(f"{field} {i}", curve.omega[i], nearest(over_omega, curve.omega[i]), abs=1e-6)
+
+
+@pytest.mark.parametrize("field", OVER)
+def test_cusps_by_two_routes(screen, folds, field: str) -> None:
+    """On the curve, and where f = f_s = f_ss = 0 of the scalar problem; rows of known values."""
+    (cusp,) = folds[field].points_of("cusp")
+    value, omega = cusp.values
+    if field in CUSPS:
+        close("value and speed", [value, omega], CUSPS[field], rel=1e-3)
+    share = round(cusp.orbit.contact_share(), 2)
+    found = two_event.cusp(screen, field, 1.001 * value, share, 1.001 * omega)
+    close("by the other route", [value, omega], found, rel=1e-5)
+
+
+def test_period_doublings_of_the_chain(doubling) -> None:
+    """Ten stiffnesses, each against the branch over frequency; row 30 at 100."""
+    assert doubling.complete
+    first = ff.continue_bifurcation(
+        ff.frequency_response(chain(), (0.5, 0.8)).points_of("period doubling")[0],
+        (STIFFNESS, "omega"), ((100.0, 200.0), (0.5, 0.9)),
+    )  # fmt: skip
+    ends = sorted(first.omega[first.along(STIFFNESS) == 100.0])
+    close("row 30", ends[0], 0.738783030, abs=1e-7)
+    for i in spread(doubling, 10):
+        stiffness, omega = doubling.values[i]
+        alone = ff.frequency_response(chain(stiffness), (0.5, 0.9)).points_of("period doubling")
+        close(f"at {stiffness}", omega, nearest(alone, omega), abs=1e-7)
+
+
+def test_neimark_sacker_points_of_the_chain(of_chain) -> None:
+    """The same of a pair of multipliers; the pair passes a quarter of a turn on the way."""
+    second = of_chain.points_of("Neimark-Sacker")[1]
+    close("row 30", second.omega, 0.618606873, abs=2e-9)
+    curve = ff.continue_bifurcation(second, (STIFFNESS, "omega"), (K_BOUNDS, (0.5, 0.9)))
+    assert curve.complete
+    for i in spread(curve, 10):
+        stiffness, omega = curve.values[i]
+        alone = ff.frequency_response(chain(stiffness), (0.5, 0.9)).points_of("Neimark-Sacker")
+        close(f"at {stiffness}", omega, nearest(alone, omega), abs=1e-7)
+        pair = curve.multipliers[i][np.abs(np.abs(curve.multipliers[i]) - 1.0).argsort()[:2]]
+        close("pair", np.abs(pair), [1.0, 1.0], abs=1e-9)
+    (quarter,) = curve.points_of("1:4 resonance")
+    angle = np.abs(np.angle(quarter.orbit.multipliers[0]))
+    close("angle", angle, math.pi / 2.0, abs=1e-6)
+
+
+def test_where_two_curves_meet(of_chain, doubling) -> None:
+    """A fold that is a period doubling: the same point on either curve."""
+    (fold,) = (point for point in of_chain.folds if point.omega > 0.7)
+    curve = ff.continue_bifurcation(fold, (STIFFNESS, "omega"), (K_BOUNDS, (0.5, 0.9)))
+    (on_fold,), (on_doubling,) = (
+        one.points_of("fold and period doubling") for one in (curve, doubling)
+    )
+    close("where", on_fold.values, on_doubling.values, rel=1e-6)
+    for critical in (1.0, -1.0):
+        off = np.abs(on_fold.orbit.multipliers - critical).min()
+        close("multiplier", off, 0.0, abs=1e-5)
+
+
+def test_the_doubling_by_weight_over_the_deck_angle(drawn, of_weight) -> None:
+    """Row 34 at 15 degrees; no steeper than the turning point no doubling."""
+    assert of_weight.complete
+    for i in spread(of_weight, 5):
+        angle, omega = of_weight.values[i]
+        branch = ff.frequency_response(drawn.replace(deck_angle=float(angle)), (60.0, 100.0))
+        alone = branch.points_of("period doubling")
+        close(f"at {math.degrees(angle)}", omega, nearest(alone, omega), abs=1e-6)
+    narrow = ff.continue_bifurcation(
+        ff.frequency_response(drawn, (60.0, 100.0)).points_of("period doubling")[1],
+        ("deck_angle", "omega"), ((ANGLES[0], math.radians(15.0)), (60.0, 100.0)),
+    )  # fmt: skip
+    ends = np.sort(narrow.omega[[0, -1]]) * RPM
+    close("row 34", ends, [774.14, 787.90], abs=0.01)
+    least = min(point.values[0] for point in of_weight.points_of("turning point"))
+    for share, count in ((0.999, 0), (1.001, 2)):
+        tilted = drawn.replace(deck_angle=share * least)
+        branch = ff.frequency_response(tilted, (60.0, 100.0))
+        assert len(branch.points_of("period doubling")) == count
+
+
+def hard(forcing: float, stiffness: float) -> ff.MechanicalSystem:
+    """One mass before a stop without damping."""
+    stop = ff.ClearanceSpring([1.0], stiffness, 0.0, 1.0, math.inf)
+    return ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], (stop,), ff.HarmonicForce([forcing]))
+
+
+def free_motion(stiffness: float, omega: float) -> ff.Orbit:
+    """Its motion without contact."""
+    found = ff.periodic_orbits(hard(0.5, stiffness), omega)
+    return min(found, key=lambda orbit: orbit.amplitude(0))
+
+
+@pytest.mark.parametrize(("omega", "limit"), [(1.3, 0.68), (1.6, 7.6)])
+def test_depth_at_the_fold_of_a_hard_stop(omega: float, limit: float) -> None:
+    """In the limit of stiffness the depth times k^2 is m^2 a / (8 G^2); two fields vary.
+
+    Just beyond grazing the kick of the stop throws the mass back before it is deep: G < 0.
+    """
+    over_forcing = ff.continue_orbit(free_motion(100.0, omega), "forcing", (0.5, 8.0))
+    fold = over_forcing.folds[0]
+    names = STIFFNESS, "forcing"
+    curve = ff.continue_bifurcation(fold, names, ((100.0, 1e4), (0.5, 8.0)))
+    assert curve.complete
+    A = np.array([[0.0, 1.0], [-1.0, -0.06]])
+    values, vectors = np.linalg.eig(A * 2.0 * math.pi / omega)
+    M0 = (vectors * np.exp(values) @ np.linalg.inv(vectors)).real
+    G = np.linalg.inv(np.eye(2) - M0)[0, 1]
+    assert G < 0.0
+    law = omega**2 / (8.0 * G**2)
+    end = int(np.argmax(curve.along(STIFFNESS)))
+    stiffness = curve.along(STIFFNESS)[end]
+    assert stiffness == 1e4
+    depth = curve.orbit(end).stop_force_peak() / stiffness
+    close("the law", depth * stiffness**2, law, rel=0.01)
+    close("its value", law, limit, rel=0.01)
+    factor = curve.along("forcing") * fold.value  # the curve counts from the fold's own machine
+    for hardness in (150.0, 250.0, 350.0):
+        i = int(np.abs(curve.along(STIFFNESS) - hardness).argmin())
+        alone = ff.continue_orbit(free_motion(float(curve.along(STIFFNESS)[i]), omega),
+                                  "forcing", (0.5, 8.0)).folds[0]  # fmt: skip
+        close("fold over the forcing", factor[i], alone.value, rel=1e-7)
+
+
+def test_grazing_is_where_the_linear_motion_meets_the_gap(screen, exact) -> None:
+    """Contact begins where the amplitude without contact is the gap."""
+    begin = exact.points_of("contact begin")[0]
+    curve = ff.continue_bifurcation(begin, ("clearance", "omega"), ((2e-3, 9e-3), (40.0, 120.0)))
+    assert curve.kind == "grazing"
+    assert curve.complete
+    linear = ff.linear_response(screen, curve.omega)
+    close("amplitude", linear.amplitude("relative"), curve.along("clearance"), rel=1e-9)
+
+
+def test_the_loss_of_symmetry_over_the_gap(response) -> None:
+    """Rows 25 and 28: windows at gaps of 2 and 3 mm; none from 4 mm on."""
+    point = response(None, (50.0, 65.0), clearance=2e-3).points_of("symmetry breaking")[0]
+    curve = ff.continue_bifurcation(point, ("clearance", "omega"), ((2e-3, 5e-3), (40.0, 110.0)))
+    assert curve.complete
+    close("at 2 mm", np.sort(curve.omega[[0, -1]]), [56.9837, 58.4409], abs=1e-3)
+    close("both ends", curve.along("clearance")[[0, -1]], [2e-3, 2e-3], abs=0.0)
+    widest = max(point.values[0] for point in curve.points_of("turning point"))
+    assert 3e-3 < widest < 4e-3
+    for i in spread(curve, 3):
+        gap, omega = curve.values[i]
+        alone = response(None, (40.0, 110.0), clearance=float(gap))
+        close(f"at {gap}", omega, nearest(alone.points_of("symmetry breaking"), omega), abs=1e-6)
+
+
+def test_a_fold_hardly_beyond_a_grazing_is_followed(of_chain) -> None:
+    """The chain's lower fold, a ten-thousandth of a percent of the gap deep; 1e-10 rad/s.
+
+    At a stiffness of 100 its branch passes fold and grazing in one step and takes one for the
+    other; at 30 and 60 both stand apart.
+    """
+    fold = min(of_chain.folds, key=lambda point: point.omega)
+    for bounds in ((30.0, 100.0), (60.0, 100.0)):
+        curve = ff.continue_bifurcation(fold, (STIFFNESS, "omega"), (bounds, (0.5, 0.9)))
+        assert curve.complete
+        assert curve.notes == ()
+        close("multiplier", np.abs(curve.multipliers - 1.0).min(axis=1),
+              np.zeros(len(curve.orbits)), abs=1e-5)  # fmt: skip
+        alone = ff.frequency_response(chain(bounds[0]), (0.5, 0.8)).folds
+        (end,) = curve.omega[curve.along(STIFFNESS) == bounds[0]]
+        close("fold", end, min(point.omega for point in alone), abs=1e-10)
+    branch = ff.continue_fold(fold, STIFFNESS, (60.0, 100.0))
+    close("over the field", branch.omega[branch.values == 60.0], [end], abs=1e-12)
+
+
+def test_a_fold_at_a_corner_is_a_grazing() -> None:
+    """Under a law that pushes at once the branch turns back where contact begins.
+
+    The curve is that of the linear motion which just reaches the gap, whatever the stiffness.
+    """
+    stop = ff.ClearanceSpring([1.0], 20.0, 2.0, 1.0, math.inf, law="compression-only")
+    machine = ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], (stop,), ff.HarmonicForce([0.5]))
+    (free,) = (o for o in ff.periodic_orbits(machine, 1.3) if o.amplitude(0) < 1.0)
+    fold = ff.continue_orbit(free, "forcing", (0.5, 3.0)).folds[0]
+    curve = ff.continue_bifurcation(fold, (STIFFNESS, "forcing"), ((10.0, 40.0), (0.5, 3.0)))
+    assert curve.complete
+    assert "grazing" in curve.notes[0]
+    reach = ff.linear_response(machine, 1.3).amplitude(0)[0]
+    factor = curve.along("forcing") * fold.value
+    close("forcing", factor, np.full(len(curve.orbits), 1.0 / reach), rel=1e-9)
+
+
+def test_bounds_of_both_parameters_are_met(exact) -> None:
+    """The curve ends on whichever is met first, to the last digit, in either order of names."""
+    bounds = {"clearance": (5.5e-3, 7e-3), "omega": (190.0, 207.5)}
+    ends = []
+    for names in (("clearance", "omega"), ("omega", "clearance")):
+        limits = tuple(bounds[name] for name in names)
+        curve = ff.continue_bifurcation(exact.folds[0], names, limits)
+        assert curve.complete
+        ends.append(sorted(zip(curve.omega[[0, -1]], curve.along("clearance")[[0, -1]],
+                               strict=True)))  # fmt: skip
+        for omega, gap in ends[-1]:
+            assert omega in bounds["omega"] or gap in bounds["clearance"]
+        assert any(omega in bounds["omega"] for omega, _ in ends[-1])
+        close("omega", curve.along("omega"), curve.omega, abs=0.0)
+    close("the same curve", ends[0], ends[1], rel=1e-12)
+
+
+def test_bad_input(exact, of_chain) -> None:
+    fold, bounds = exact.folds[0], ((5e-3, 7e-3), (150.0, 250.0))
+    for point, names, limits in (
+        (fold, ("clearance", "clearance"), bounds), (fold, ("clearance",), bounds),
+        (fold, ("clearance", "colour"), bounds), (fold, ("clearance", "omega"), bounds[:1]),
+        (fold, ("clearance", "omega"), ((7e-3, 8e-3), bounds[1])),
+        (fold, ("clearance", "omega"), (bounds[0], (-1.0, 250.0))),
+        (fold, ("clearance_minus", "omega"), bounds), (exact.peak("main"), ("clearance", "omega"),
+        bounds), (of_chain.folds[0], ("clearance", "omega"), bounds), (fold.orbit,
+        ("clearance", "omega"), bounds),
+    ):  # fmt: skip
+        with pytest.raises(ff.InputError):
+            ff.continue_bifurcation(point, names, limits)

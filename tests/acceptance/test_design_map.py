@@ -1,0 +1,53 @@
+"""The design map: each cell is the machine's own region, each curve holds the cells' folds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from judge import close
+
+pytestmark = pytest.mark.numerical
+GAPS, STOPS, OMEGA = (4e-3, 6e-3, 8e-3), (6e6, 9e6), 120.0
+
+
+@pytest.fixture(scope="module")
+def found(screen) -> ff.DesignMap:
+    return ff.design_map(screen, OMEGA, GAPS, STOPS, load=ff.Load(stiffness_factor=1.3))
+
+
+def test_cells_are_machines(screen, found) -> None:
+    """Speeds and amplitude of a cell as the machine of that gap and stop has them by itself."""
+    for j, i in ((0, 0), (1, 2)):
+        machine = screen.replace(clearance=GAPS[i], stop_stiffness=STOPS[j])
+        region = ff.operating_region(machine)
+        close("contact", found.omega_cs[j, i], region.omega_cs, rel=1e-9)
+        close("width", found.width[j, i], region.upper - region.lower, rel=1e-6)
+        empty, loaded = (
+            ff.frequency_response(one, (5.0, 250.0)).orbit_from_below(OMEGA)
+            for one in (machine, machine.loaded(ff.Load(stiffness_factor=1.3)))
+        )
+        close("amplitude", found.amplitude[j, i], empty.amplitude("relative"), rel=1e-9)
+        share = loaded.amplitude("relative") / empty.amplitude("relative")
+        close("share", found.steadiness[j, i], share, rel=1e-9)
+    assert math.isnan(found.omega_lb[0, 0])
+
+
+def test_curves_pass_through_the_cells(found) -> None:
+    """At the widest gap the fold curve of a stop ends on both of the cell's folds."""
+    grazing, *folds = found.curves
+    assert grazing.kind == "grazing"
+    assert len(folds) == len(STOPS)
+    for j, curve in enumerate(folds):
+        ends = np.sort(curve.omega[curve.along("clearance") == GAPS[-1]])
+        close("folds", ends, [found.omega_lb[j, -1], found.omega_ub[j, -1]], abs=1e-6)
+        assert len(curve.points_of("cusp")) == 1
+
+
+def test_bad_input(screen) -> None:
+    for gaps, stops in (((6e-3,), STOPS), (GAPS, (-1.0, 2.0)), (GAPS, "many")):
+        with pytest.raises(ff.InputError):
+            ff.design_map(screen, OMEGA, gaps, stops)
