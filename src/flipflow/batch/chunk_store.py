@@ -32,6 +32,7 @@ from flipflow.results.store import because, refused, sync_folder, write_file
 Array = NDArray[Any]
 META = "zarr.json"
 CHECKSUM = "checksum"
+FLAT = {"name": "default", "separator": "."}  # all chunks of an array in one folder
 BYTES = 32  # of a SHA-256
 FIELD = "store"
 PART = ".part"
@@ -220,6 +221,9 @@ class ChunkStore:
             for left in self.folder.glob(f"**/.*{PART}"):
                 left.unlink(missing_ok=True)
             yield self
+            # Names that a power cut takes back are those of chunks that are computed again.
+            for name in (*self.growing, CHECKSUM):
+                sync_folder(self.folder / name)
         finally:
             os.close(self._lock)
             self._lock = -1
@@ -302,7 +306,7 @@ class ChunkStore:
         )
 
     def _path(self, name: str, index: int) -> str:
-        return "/".join([name, "c", str(index), *["0"] * (self._dims[name] - 1)])
+        return f"{name}/{'.'.join(['c', str(index), *['0'] * (self._dims[name] - 1)])}"
 
     def _file(self, name: str, index: int) -> Path:
         return self.folder / self._path(name, index)
@@ -335,7 +339,7 @@ def _create(group: Any, name: str, one: Variable, layout: Layout) -> None:
         name, shape=shape, chunks=shape if fixed else (rows, *shape[1:]),
         dtype=str if words else one.data.dtype, dimension_names=one.dims,
         fill_value="" if words else one.data.dtype.type(0) if fixed else one.data.item(),
-        compressors=(Crc32cCodec(),), config={"write_empty_chunks": True},
+        compressors=(Crc32cCodec(),), chunk_key_encoding=FLAT, config={"write_empty_chunks": True},
         attributes={"units": one.units} if one.units else {},
     )  # fmt: skip
     if fixed:
@@ -364,13 +368,7 @@ def _synced_store() -> Any:
         async def set(self, key: str, value: Any) -> None:
             """Write a whole file, or nothing."""
             content = value.to_bytes()
-            target = self.root / key
-            try:
-                target.parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise refused(FIELD, self.root, because(error, "a folder")) from None
-            write_file(target, content, FIELD)
-            sync_folder(target.parent)
+            write_file(self.root / key, content, FIELD)
             self.digests[key] = hashlib.sha256(content).digest()
 
     return SyncedStore

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.batch.chunk_store import DAMAGED, FINISHED, ChunkState, ChunkStore, create_store
+from flipflow.batch.chunk_store import (
+    DAMAGED,
+    FINISHED,
+    MISSING,
+    ChunkState,
+    ChunkStore,
+    create_store,
+)
 from flipflow.batch.run_chunks import executor_or_threads, run_chunks
 from flipflow.errors import InputError, StoreError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_path
@@ -284,11 +291,12 @@ def open_study(path: str | os.PathLike[str]) -> Study:
     """
     kept = ChunkStore(checked_path("path", path))
     plan = plan_from(kept)
-    damaged = [state for state in kept.states() if state.word == DAMAGED]
+    states = list(kept.states())
+    damaged = [state for state in states if state.word == DAMAGED]
     if damaged:
         told = f"resume the study, and {'it is' if len(damaged) == 1 else 'they are'} redone"
         raise StoreError(f"{kept.folder} is damaged: {_named(damaged)}; {told}.")
-    return _opened(kept, plan, ())
+    return _opened(kept, plan, [state.index for state in states if state.word == MISSING], ())
 
 
 def processors() -> int:
@@ -329,7 +337,7 @@ def _filled(kept: ChunkStore, plan: Plan, pool: Executor, tell: Monitor) -> Stud
             kept.write(index, arrays)
             progress.done()
         notes = (f"Damaged, and computed again: {_named(damaged)}.",) if damaged else ()
-        return _opened(kept, plan, notes)
+        return _opened(kept, plan, [], notes)
 
 
 class _Progress:
@@ -363,8 +371,12 @@ def _named(damaged: list[ChunkState]) -> str:
     return ", ".join(map(str, damaged[:MOST_NAMED])) + more
 
 
-def _opened(kept: ChunkStore, plan: Plan, notes: tuple[str, ...]) -> Study:
+def _opened(kept: ChunkStore, plan: Plan, missing: list[int], notes: tuple[str, ...]) -> Study:
     values = {name: kept.read(name) for name in (*plan.quantities, REASON)}
+    for index in missing:  # some of its files may be there already
+        rows = slice(index * kept.rows, (index + 1) * kept.rows)
+        for name, table in values.items():
+            table[rows] = NOT_COMPUTED if name == REASON else np.nan
     kinds = [f"{what}_{name}" for what in (NOMINAL, LOW, HIGH) for name in plan.quantities]
     return _study(plan, values, {name: kept.read(name) for name in kinds}, notes)
 
