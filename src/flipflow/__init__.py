@@ -40,6 +40,7 @@ _HOME = {
     "sensitivity": "flipflow.studies.sensitivity",
     "study": "flipflow.studies.study",
     "open_study": "flipflow.studies.study",
+    "tolerance": "flipflow.studies.tolerance",
     "Sample": "flipflow.model.sampling",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
@@ -94,6 +95,7 @@ _HOME = {
     "Spectrum": "flipflow.studies.poincare",
     "Study": "flipflow.studies.study",
     "Sweep": "flipflow.transient.sweep",
+    "Tolerance": "flipflow.studies.tolerance",
     "Cancelled": "flipflow.errors",
     "IncompleteError": "flipflow.errors",
     "MissingExtra": "flipflow.errors",
@@ -187,6 +189,8 @@ if TYPE_CHECKING:
     from flipflow.studies.study import Study as Study
     from flipflow.studies.study import open_study as open_study
     from flipflow.studies.study import study as study
+    from flipflow.studies.tolerance import Tolerance as Tolerance
+    from flipflow.studies.tolerance import tolerance as tolerance
     from flipflow.transient.history import History as History
     from flipflow.transient.simulate import simulate as simulate
     from flipflow.transient.startup import RunUp as RunUp

@@ -1,4 +1,4 @@
-"""The store of a study: damaged, full, read-only, held by another, of other inputs, half finished."""
+"""The store of a study: damaged, on a full disk, read-only, held by another, of other inputs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def copy(whole, tmp_path):
 
 
 class Stop(Exception):  # noqa: N818
-    pass
+    """Ends a study from its monitor."""
 
 
 def stopping(after):
@@ -147,8 +147,14 @@ def test_a_chunk_without_its_checksum_is_not_finished(copy, whole):
 
 
 @pytest.mark.parametrize(
-    "name", ["zarr.json", "relative_amplitude/zarr.json", "main_mass/c.0", "nominal_relative_amplitude/c.0.0"]
-)  # fmt: skip
+    "name",
+    [
+        "zarr.json",
+        "relative_amplitude/zarr.json",
+        "main_mass/c.0",
+        "nominal_relative_amplitude/c.0.0",
+    ],
+)
 @pytest.mark.parametrize("harm", [truncate, flip])
 def test_a_damaged_beginning_is_named(copy, name, harm):
     harm(copy / name)

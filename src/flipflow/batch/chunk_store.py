@@ -173,6 +173,7 @@ class ChunkStore:
             raise InputError(FIELD, str(folder), "there is no such folder; give one of ff.study")
         kept = self._read_attributes()
         self.manifest: Mapping[str, Any] = kept["manifest"]
+        self.digest = _digest_of(self.manifest)
         self.growing: tuple[str, ...] = tuple(kept["growing"])
         self.rows, self.chunks = int(kept["rows"]), int(kept["chunks"])
         for path, digest in kept["files"].items():

@@ -43,6 +43,7 @@ from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
 from flipflow.studies.study_plan import unit_of
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -530,6 +531,38 @@ def _(found: Study) -> Arrays:
             },
         },
         _attributes(found, sampling=found.sampling, branch=found.branch),
+    )
+
+
+@arrays_of.register
+def _(found: Tolerance) -> Arrays:
+    ends = ("frequency", "end")
+    return Arrays(
+        "Machines that meet every limit",
+        "frequency",
+        {
+            "omega": _column("frequency", found.omega, "rad/s"),
+            "end": _column("end", np.array(["low", "high"])),
+            "limit": _column("limit", np.array(found.checked, str)),
+            "case": _column("case", np.array(found.cases, str)),
+            "field": _column("field", np.array(found.names, str)),
+            "factor": _column("factor", found.factors),
+        },
+        {
+            "share": _column("frequency", found.share),
+            "share_interval": Variable(ends, found.share_interval),
+            "unknown": _column("frequency", found.unknown),
+            "jump_share": _column("frequency", found.jump_share),
+            "jump_interval": Variable(ends, found.jump_interval),
+            "coexisting": _column("frequency", found.coexisting),
+            "by_limit": Variable(("frequency", "limit"), found.by_limit.T),
+            "by_case": Variable(("frequency", "case"), found.by_case.T),
+            "halved": Variable(("frequency", "field"), found.halved.T),
+            "scaled": Variable(("frequency", "factor"), found.scaled.T),
+            "passing": Variable(("machine", "frequency"), found.passing),
+            "jumped": Variable(("machine", "frequency"), found.jumped),
+        },
+        _attributes(found, machines=found.size),
     )
 
 
