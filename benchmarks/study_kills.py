@@ -57,7 +57,7 @@ def on_cluster(make, folder, told=None):
 
     with (
         LocalCluster(
-            n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=None,
+            n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=":0",
             silence_logs=50,
         ) as cluster,
         Client(cluster) as client,
@@ -123,7 +123,7 @@ def kill_workers(make, folder, kills, rng):
 
     with (
         LocalCluster(
-            n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=None,
+            n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=":0",
             silence_logs=50,
         ) as cluster,
         Client(cluster) as client,

@@ -39,7 +39,7 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
             yield client.get_executor()
         return
     cluster = distributed.LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None,
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0",
         silence_logs=QUIET,
     )  # fmt: skip
     with cluster, distributed.Client(cluster) as client:

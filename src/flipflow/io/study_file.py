@@ -91,7 +91,7 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
     refuse_unknown(table, STUDY, place="study.")
     vary = {
         name: given
-        for key, written in _section(source.tables, "vary").items()
+        for key, written in _flat(_section(source.tables, "vary")).items()
         for name, given in _varied(key, written, project).items()
     }
     if not vary:
@@ -123,6 +123,15 @@ def _section(tables: Table, name: str) -> Mapping[str, Any]:
     if not isinstance(table, dict):
         raise InputError(name, table, f"write it as a section, [{name}] on a line of its own")
     return table
+
+
+def _flat(table: Mapping[str, Any], within: str = "") -> dict[str, Any]:
+    """Keys as they are written; TOML reads ``stops.clearance`` as a table in a table."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        nested = isinstance(value, dict) and not set(RANGE) & set(value)
+        flat |= _flat(value, f"{within}{key}.") if nested else {f"{within}{key}": value}
+    return flat
 
 
 def _varied(key: str, written: object, project: Project) -> dict[str, object]:

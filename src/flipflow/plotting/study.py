@@ -107,7 +107,7 @@ def map_figure(
     jumps = (
         " Dashed: beyond this line the machine has jumped, and no contour leads across. Dotted: "
         "from this line on two motions are possible."
-        if _has_folds(study)
+        if any(trace.dash and trace.x.size for trace in traces)
         else ""
     )
     caption = f"Contours of the {one.label} in {one.shown_unit or 'plain numbers'}.{shaded}{jumps}"
