@@ -126,6 +126,9 @@ def create_store(folder: Path, layout: Layout) -> None:
     aside, lock = folder.parent / f".{folder.name}-{uuid.uuid4().hex}{PART}", -1
     try:
         aside.mkdir()
+    except (OSError, ValueError) as error:
+        raise refused(FIELD, folder, because(error, "a folder")) from None
+    try:
         lock = held(aside)
         group = zarr.create_group(store=aside, zarr_format=3)
         growing = [name for name in layout.growing if name != CHECKSUM]
