@@ -98,7 +98,7 @@ def _submitted(
 ) -> Future[Any]:
     try:
         return executor.submit(_attempt, lost, work, *task[1])
-    except RuntimeError as error:  # so a broken executor says, too
+    except (RuntimeError, *_closed()) as error:  # the first is a broken executor's, too
         raise IncompleteError(f"The workers are gone ({error}).") from None
 
 
@@ -126,6 +126,14 @@ def _is_lost(future: Future[Any], index: int, lost: dict[int, int]) -> bool:
 
 def _killed() -> tuple[type[BaseException], ...]:
     """What dask raises of a task whose workers ended; none where dask is not loaded."""
-    distributed = sys.modules.get("distributed")
-    known: Mapping[str, Any] = vars(distributed) if distributed is not None else {}
-    return (known["KilledWorker"],) if "KilledWorker" in known else ()
+    return _loaded("distributed", "KilledWorker")
+
+
+def _closed() -> tuple[type[BaseException], ...]:
+    """What a client of dask raises once it is closed."""
+    return _loaded("distributed.client", "ClosedClientError")
+
+
+def _loaded(module: str, name: str) -> tuple[type[BaseException], ...]:
+    known: Mapping[str, Any] = vars(sys.modules[module]) if module in sys.modules else {}
+    return (known[name],) if name in known else ()
