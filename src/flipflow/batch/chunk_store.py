@@ -299,9 +299,10 @@ class ChunkStore:
     @cached_property
     def _written(self) -> Any:
         """The group with arrays whose chunks are written even where all is fill."""
-        group = _zarr().open_group(store=self._writer, mode="r+", zarr_format=3)
-        names = (*self.growing, CHECKSUM)
-        return {name: group[name].with_config({"write_empty_chunks": True}) for name in names}
+        zarr = _zarr()
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            group = zarr.open_group(store=self._writer, mode="r+", zarr_format=3)
+            return {name: group[name] for name in (*self.growing, CHECKSUM)}
 
     @cached_property
     def _group(self) -> Any:
