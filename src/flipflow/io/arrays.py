@@ -11,13 +11,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow import __version__
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
-from flipflow.io.labelled import Arrays, Variable, column, each, labels, unit_of, units_of
+from flipflow.io.judged_arrays import assessment_arrays, comparison_arrays, foundation_arrays
+from flipflow.io.labelled import (
+    Arrays,
+    Variable,
+    attributes,
+    column,
+    each,
+    labels,
+    unit_of,
+    units_of,
+)
+from flipflow.io.study_arrays import study_arrays, tolerance_arrays
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.orbit import Orbit
@@ -27,11 +37,7 @@ from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
 from flipflow.studies.compare import Comparison
 from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import (
-    DIRECTIONS,
-    CaseLoads,
-    Components,
     FoundationLoads,
-    RunLoads,
 )
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import LoadedMachine, Loading
@@ -42,6 +48,8 @@ from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -80,11 +88,6 @@ def _specials(
     }
 
 
-def _attributes(result: Any, **more: str | float) -> dict[str, str | float]:
-    """What is said of every result, and more."""
-    return {"flipflow_version": getattr(result, "version", __version__), **more}
-
-
 @arrays_of.register
 def _(branch: Branch) -> Arrays:
     units, system = units_of(branch.machine), branch.system
@@ -104,7 +107,7 @@ def _(branch: Branch) -> Arrays:
             "multipliers": Variable(("point", "multiplier"), branch.multipliers),
             **_specials(branch.special_points, system, units),
         },
-        _attributes(branch, method=repr(branch.method), status=branch.status.value),
+        attributes(branch, method=repr(branch.method), status=branch.status.value),
     )
 
 
@@ -127,7 +130,7 @@ def _(branch: FieldBranch) -> Arrays:
             "special_value": column("special", values),
             **specials,
         },
-        _attributes(branch, field=branch.field, status=branch.status.value),
+        attributes(branch, field=branch.field, status=branch.status.value),
     )
 
 
@@ -156,7 +159,7 @@ def _(curve: BifurcationCurve) -> Arrays:
             **_specials(curve.special_points, system, units),
             **specials,
         },
-        _attributes(curve, kind=curve.kind, status=curve.status.value),
+        attributes(curve, kind=curve.kind, status=curve.status.value),
     )
 
 
@@ -178,7 +181,7 @@ def _(orbit: Orbit) -> Arrays:
             ),
             "multipliers": Variable(("multiplier",), orbit.multipliers),
         },
-        _attributes(orbit, omega=orbit.omega, periods=orbit.periods, stability=orbit.stability),
+        attributes(orbit, omega=orbit.omega, periods=orbit.periods, stability=orbit.stability),
     )
 
 
@@ -202,7 +205,7 @@ def _(orbits: tuple) -> Arrays:  # type: ignore[type-arg]
                 ("motion", "multiplier"), np.array([orbit.multipliers for orbit in orbits])
             ),
         },
-        _attributes(first),
+        attributes(first),
     )
 
 
@@ -235,7 +238,7 @@ def _(basins: Basins) -> Arrays:
                 ("motion", "coordinate"), np.reshape(amplitude, shape), units["length"]
             ),
         },
-        _attributes(basins, omega=basins.omega, unsettled=basins.unsettled),
+        attributes(basins, omega=basins.omega, unsettled=basins.unsettled),
     )
 
 
@@ -261,7 +264,7 @@ def _(risk: JumpRisk) -> Arrays:
             ),
             "throw_phase": column("throw", [one.phase for one in throws], "rad"),
         },
-        _attributes(risk, omega=risk.omega),
+        attributes(risk, omega=risk.omega),
     )
 
 
@@ -287,7 +290,7 @@ def _(history: History) -> Arrays:
             "angle": column("time", history.angle, "rad"),
             **more,
         },
-        _attributes(history, status=history.status, method=history.method),
+        attributes(history, status=history.status, method=history.method),
     )
 
 
@@ -331,7 +334,7 @@ def _(sweep: Sweep) -> Arrays:
             "turns": column("step", sweep.turns),
             "distance": column("step", sweep.distance, units["length"]),
         },
-        _attributes(sweep),
+        attributes(sweep),
     )
 
 
@@ -349,7 +352,7 @@ def _(section: Section) -> Arrays:
             "displacement": each("turn", system, section.displacement, units["length"]),
             "velocity": each("turn", system, section.velocity, units["velocity"]),
         },
-        _attributes(section, omega=section.omega, word=section.word, periods=section.periods),
+        attributes(section, omega=section.omega, word=section.word, periods=section.periods),
     )
 
 
@@ -361,7 +364,7 @@ def _(spectrum: Spectrum) -> Arrays:
         "frequency",
         {"frequency": column("frequency", spectrum.frequencies, units["frequency"])},
         {"amplitude": column("frequency", spectrum.amplitudes, units["length"])},
-        _attributes(spectrum, omega=spectrum.omega, which=str(spectrum.which)),
+        attributes(spectrum, omega=spectrum.omega, which=str(spectrum.which)),
     )
 
 
@@ -378,7 +381,7 @@ def _(found: LyapunovExponents) -> Arrays:
             "batches": Variable(("batch", "exponent"), found.batches, rate),
             "contact_share": column("stop", found.contact_share),
         },
-        _attributes(found, omega=found.omega, word=found.word, periods=found.periods),
+        attributes(found, omega=found.omega, word=found.word, periods=found.periods),
     )
 
 
@@ -403,7 +406,7 @@ def _(diagram: BifurcationDiagram) -> Arrays:
             "direction": column("sample", np.array(ways, str)),
             "displacement": each("sample", system, lambda c: x @ system.coordinate(c), unit),
         },
-        _attributes(diagram, parameter=diagram.parameter),
+        attributes(diagram, parameter=diagram.parameter),
     )
 
 
@@ -425,7 +428,7 @@ def _(response: LinearResponse) -> Arrays:
             ),
             "natural_frequency": column("mode", response.natural_frequencies, units["frequency"]),
         },
-        _attributes(response),
+        attributes(response),
     )
 
 
@@ -444,7 +447,7 @@ def _(region: OperatingRegion) -> Arrays:
             "feasible_to": column("interval", feasible[:, 1], "rad/s"),
             **{word: Variable((), np.asarray(mark), "rad/s") for word, mark in known.items()},
         },
-        _attributes(region, cases="; ".join(case.name or "empty" for case in region.cases)),
+        attributes(region, cases="; ".join(case.name or "empty" for case in region.cases)),
     )
 
 
@@ -457,7 +460,7 @@ def _(found: DesignMap) -> Arrays:
     }  # fmt: skip
     axes = {name: column(name, getattr(found, name), unit_of(name)) for name in dims}
     values = {name: Variable(dims, getattr(found, name), unit) for name, unit in units.items()}
-    said = _attributes(found, omega=found.omega)
+    said = attributes(found, omega=found.omega)
     return Arrays("Gap and stop stiffness", "clearance", axes, values, said)
 
 
@@ -479,7 +482,7 @@ def _(loading: Loading) -> Arrays:
             "loaded": column("row", np.concatenate([one.loaded for one in parts]), "m"),
             "change": column("row", np.concatenate([one.change for one in parts]), "m"),
         },
-        _attributes(loading, load=loading.load.name or "load"),
+        attributes(loading, load=loading.load.name or "load"),
     )
 
 
@@ -511,7 +514,7 @@ def _(family: ResponseFamily) -> Arrays:
             "omega": column("point", omega, units["frequency"]),
             "amplitude": each("point", system, amplitude, units["length"]),
         },
-        _attributes(family, field=family.field),
+        attributes(family, field=family.field),
     )
 
 
@@ -534,85 +537,12 @@ def _(found: Sensitivity) -> Arrays:
             "mean": Variable(dims[:-1], np.asarray(found.mean), unit),
             "variance": Variable(dims[:-1], np.asarray(found.variance)),
         },
-        _attributes(found, quantity=found.quantity, groups=found.n),
+        attributes(found, quantity=found.quantity, groups=found.n),
     )
 
 
-@arrays_of.register
-def _(assessment: Assessment) -> Arrays:
-    names = [case.name for case in assessment.cases]
-    words = list(dict.fromkeys(name for case in assessment.cases for name in case.values))
-    values = {
-        word: column(
-            "case",
-            [number_or_nan(case.values.get(word)) for case in assessment.cases],
-            QUANTITIES[word].unit,
-        )
-        for word in words
-    }
-    rows = assessment.limits_table
-    return Arrays(
-        "Every load case at working speed",
-        "case",
-        {
-            "case": column("case", np.array(names, str)),
-            "limit": column("limit", np.array([row.name for row in rows], str)),
-        },
-        {
-            **values,
-            "limit_least": column("limit", [row.limit[0] for row in rows]),
-            "limit_most": column("limit", [row.limit[1] for row in rows]),
-            "limit_worst": column("limit", [number_or_nan(row.worst) for row in rows]),
-            "limit_margin": column("limit", [number_or_nan(row.margin) for row in rows]),
-            "limit_state": column("limit", np.array([row.state for row in rows], str)),
-        },
-        _attributes(assessment, verdict=assessment.verdict, omega=number_or_nan(assessment.omega)),
-    )
-
-
-@arrays_of.register
-def _(found: Comparison) -> Arrays:
-    rows = found.results
-    values = np.reshape(
-        [[number_or_nan(one) for one in row.values] for row in rows], (len(rows), -1)
-    )
-    return Arrays(
-        "Machines compared",
-        "result",
-        {
-            "result": column("result", np.array([row.name for row in rows], str)),
-            "machine": column("machine", np.array(found.names, str)),
-        },
-        {
-            "case": column("result", np.array([row.case for row in rows], str)),
-            "unit": column("result", np.array([row.unit for row in rows], str)),
-            "value": Variable(("result", "machine"), values.astype(float)),
-        },
-        _attributes(found),
-    )
-
-
-@arrays_of.register
-def _(loads: FoundationLoads) -> Arrays:
-    every: tuple[CaseLoads | RunLoads, ...] = (*loads.cases, *loads.runs)
-    peaks = [one.running if isinstance(one, CaseLoads) else one.peaks for one in every]
-    static = [one.static if isinstance(one, CaseLoads) else Components() for one in every]
-
-    def ways(parts: Sequence[Components]) -> Variable:
-        forces = [[number_or_nan(getattr(part, way)) for way in DIRECTIONS] for part in parts]
-        return Variable(("load", "direction"), np.reshape(forces, (len(parts), -1)), "N")
-
-    return Arrays(
-        "Loads on the foundation, all supports together",
-        "load",
-        {
-            "load": column("load", np.array([one.name for one in every], str)),
-            "direction": column("direction", np.array(DIRECTIONS)),
-        },
-        {
-            "static": ways(static),
-            "dynamic": ways(peaks),
-            "static_share": column("support", np.array(loads.static_shares, float)),
-        },
-        _attributes(loads, position=loads.position, supports=float(len(loads.supports))),
-    )
+arrays_of.register(Study)(study_arrays)
+arrays_of.register(Tolerance)(tolerance_arrays)
+arrays_of.register(Assessment)(assessment_arrays)
+arrays_of.register(Comparison)(comparison_arrays)
+arrays_of.register(FoundationLoads)(foundation_arrays)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow import __version__
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import is_screen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -79,3 +80,8 @@ def column(dim: str, values: ArrayLike, unit: str = "") -> Variable:
 def unit_of(parameter: str) -> str:
     """The unit of a parameter in SI; none of a field of a user's machine."""
     return "rad/s" if parameter == "omega" else FIELD[parameter].unit if parameter in FIELD else ""
+
+
+def attributes(result: Any, **more: str | float) -> dict[str, str | float]:
+    """What is said of every result, and more."""
+    return {"flipflow_version": getattr(result, "version", __version__), **more}

@@ -1,0 +1,79 @@
+"""Studies and their tolerances as labelled arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flipflow.io.labelled import Arrays, Variable, column
+from flipflow.model.quantities import quantity_named
+from flipflow.studies.study import Study
+from flipflow.studies.study_plan import unit_of
+from flipflow.studies.tolerance import Tolerance
+
+
+def study_arrays(found: Study) -> Arrays:
+    """Quantities by machine, load case and frequency."""
+    dims = ("sample", "case", "omega")
+    asked = {name: quantity_named(name, found.machine) for name in found.quantities}
+    whole = {name for name, one in asked.items() if one.of == "response"}
+    own = {name: dims[:2] if name in whole else dims for name in asked}
+    ends = {"low": found.at_low, "high": found.at_high}
+    return Arrays(
+        "Quantities of many machines",
+        "sample",
+        {
+            "case": column("case", np.array(found.cases, str)),
+            "omega": column("omega", found.omega, "rad/s"),
+            "field": column("field", np.array(found.names, str)),
+        },
+        {
+            **{
+                name: column("sample", values, unit_of(found.machine, name))
+                for name, values in found.columns.items()
+            },
+            **{name: Variable(own[name], found.values[name], asked[name].unit) for name in asked},
+            "reason": Variable(dims, found.reason),
+            **{
+                f"nominal_{name}": Variable(own[name][1:], found.nominal[name], asked[name].unit)
+                for name in asked
+            },
+            **{
+                f"{end}_{name}": Variable(("field", *own[name][1:]), table[name], asked[name].unit)
+                for end, table in ends.items()
+                for name in asked
+            },
+        },
+        {"flipflow_version": found.version, "sampling": found.sampling, "branch": found.branch},
+    )
+
+
+def tolerance_arrays(found: Tolerance) -> Arrays:
+    """Shares by frequency."""
+    ends = ("frequency", "end")
+    return Arrays(
+        "Machines that meet every limit",
+        "frequency",
+        {
+            "omega": column("frequency", found.omega, "rad/s"),
+            "end": column("end", np.array(["low", "high"])),
+            "limit": column("limit", np.array(found.checked, str)),
+            "case": column("case", np.array(found.cases, str)),
+            "field": column("field", np.array(found.names, str)),
+            "factor": column("factor", found.factors),
+        },
+        {
+            "share": column("frequency", found.share),
+            "share_interval": Variable(ends, found.share_interval),
+            "unknown": column("frequency", found.unknown),
+            "jump_share": column("frequency", found.jump_share),
+            "jump_interval": Variable(ends, found.jump_interval),
+            "coexisting": column("frequency", found.coexisting),
+            "by_limit": Variable(("frequency", "limit"), found.by_limit.T),
+            "by_case": Variable(("frequency", "case"), found.by_case.T),
+            "halved": Variable(("frequency", "field"), found.halved.T),
+            "scaled": Variable(("frequency", "factor"), found.scaled.T),
+            "passing": Variable(("machine", "frequency"), found.passing),
+            "jumped": Variable(("machine", "frequency"), found.jumped),
+        },
+        {"flipflow_version": found.version, "machines": found.size},
+    )

@@ -1,0 +1,118 @@
+"""Workers that are lost: others compute their chunks; a study says when none is left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import pytest
+
+import flipflow as ff
+from flipflow.batch.run_chunks import MOST_LOST, run_chunks
+
+distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+
+
+def deadly(folder, index, deaths):
+    """Ends its worker some times before it returns; how often it did stands in the folder."""
+    if len(list(Path(folder).glob(f"{index}-*"))) < deaths:
+        Path(folder, f"{index}-{os.getpid()}").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 10 * index
+
+
+@pytest.fixture(scope="module")
+def client():
+    """A cluster that gives a task up as soon as its worker ends."""
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
+            silence_logs=50,
+        ) as cluster,
+        distributed.Client(cluster) as found,
+    ):  # fmt: skip
+        cluster.scheduler.allowed_failures = 0
+        yield found
+
+
+def test_a_chunk_whose_worker_is_lost_is_handed_out_again(client, tmp_path):
+    tasks = [(index, (str(tmp_path), index, 2 * (index == 1))) for index in range(4)]
+    found = dict(run_chunks(client.get_executor(), deadly, tasks))
+    assert found == {0: 0, 1: 10, 2: 20, 3: 30}
+    assert len(list(tmp_path.glob("1-*"))) == 2
+
+
+def test_a_chunk_that_ends_every_worker_ends_the_study(client, tmp_path, monkeypatch):
+    monkeypatch.setattr("flipflow.batch.run_chunks.MOST_LOST", 1)
+    tasks = [(0, (str(tmp_path), 0, 99))]
+    with pytest.raises(ff.IncompleteError, match="Chunk 0 ended its worker 1 times"):
+        list(run_chunks(client.get_executor(), deadly, tasks))
+    assert MOST_LOST > 1
+
+
+def test_processes_that_are_gone_leave_what_is_finished(tmp_path):
+    """A pool of the standard library does not begin anew: the study ends, and goes on elsewhere."""
+    pytest.importorskip("zarr")
+    screen, vary = ff.load("ffs0827-linear"), {"main_mass": (900.0, 930.0)}
+    store = tmp_path / "study.zarr"
+
+    def study(executor, monitor=None):
+        return ff.study(screen, vary, "stroke", 89.0, sampling=ff.Sample(n=64 * 300), store=store,
+                        executor=executor, monitor=monitor)  # fmt: skip
+
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+
+        def kill(sentence, _share):
+            if sentence.startswith("study: 3 of"):
+                for process in pool._processes.values():
+                    process.kill()
+
+        with pytest.raises(ff.IncompleteError, match="The workers are gone"):
+            study(pool, kill)
+    half = ff.open_study(store)
+    assert 3 * 64 <= (half.reason != -1).sum() < 300 * 64
+    assert study(None).complete
+
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("how", ["killed", "closed"])
+def test_a_scheduler_that_is_gone_ends_the_study(tmp_path, how):
+    """What was finished is in the store."""
+    pytest.importorskip("zarr")
+    screen, vary = ff.load("ffs0827-linear"), {"main_mass": (900.0, 930.0)}
+    script = tmp_path / "cluster.py"
+    script.write_text(CLUSTER)
+    cluster = subprocess.Popen([sys.executable, script], stdin=subprocess.PIPE,
+                               stdout=subprocess.PIPE, text=True)  # fmt: skip
+    client = distributed.Client(cluster.stdout.readline().strip(), timeout=60)
+
+    def gone(sentence, _share):
+        if sentence.startswith("study: 3 of"):
+            cluster.kill() if how == "killed" else client.close()
+
+    try:
+        with pytest.raises(ff.IncompleteError, match="gone"):
+            ff.study(
+                screen, vary, "stroke", 89.0, sampling=ff.Sample(n=64 * 300),
+                store=tmp_path / "s", executor=client.get_executor(), monitor=gone,
+            )  # fmt: skip
+    finally:
+        cluster.kill()
+        cluster.communicate()
+        client.close()
+    assert (ff.open_study(tmp_path / "s").reason != -1).sum() >= 3 * 64
