@@ -110,7 +110,7 @@ def printed(assessed, tmp_path_factory):
         subprocess.run(
             [CHROMIUM, *PRINTING, f"--user-data-dir={folder / 'profile'}",
              f"--print-to-pdf={sheet}", (folder / "report.html").as_uri()],
-            capture_output=True, timeout=120, check=True,
+            capture_output=True, timeout=900, check=True,
         )  # fmt: skip
         return sheet
 
