@@ -10,9 +10,9 @@ import pytest
 
 import flipflow as ff
 from flipflow.model.load_case import case_words
-from flipflow.report.first_page import allowed_range
 from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
+from flipflow.studies.allowed_range import allowed_range
 
 DATE = r"20\d\d-[01]\d-[0-3]\d"
 FULL = "full, stiffening"
@@ -84,7 +84,7 @@ def test_without_a_case_the_empty_machine_is_named(command, tmp_path):
 
 def test_the_ends_of_the_allowed_range_name_their_case(project):
     unlimited = dataclasses.replace(project, limits=ff.Limits(), load_cases=project.load_cases[1:2])
-    words = allowed_range(ff.assess(unlimited))
+    words = allowed_range(ff.assess(unlimited).region)
     assert "from contact begins (w_cs, empty machine) to jump when" in words
     assert words.endswith("(w_lb, empty machine).")
 

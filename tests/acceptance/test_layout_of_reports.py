@@ -66,7 +66,7 @@ def printed_pages(assessment, folder):
         [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000",
          f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer",
          f"--print-to-pdf={sheet}", report.as_uri()],
-        capture_output=True, timeout=120, check=True,
+        capture_output=True, timeout=900, check=True,
     )  # fmt: skip
     text = subprocess.run([READER, "-layout", sheet, "-"], capture_output=True, check=True).stdout
     return text.decode().split("\f")[:-1]

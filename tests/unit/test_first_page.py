@@ -13,6 +13,7 @@ import flipflow as ff
 from flipflow.report import first_page, summary
 from flipflow.report.blocks import Note, Table
 from flipflow.report.registry import blocks_of
+from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import assess
 
 RPM = 30.0 / math.pi
@@ -60,10 +61,10 @@ def test_equal_gaps_have_one_contact_speed(many):
 
 def test_the_end_of_the_region_is_named_in_plain_words(lopsided):
     assert lopsided.region.ends == ("contact begins (w_cs)", "jump when the speed falls (w_lb)")
-    words = first_page.allowed_range(lopsided)
+    words = allowed_range(lopsided.region)
     assert "from contact begins (w_cs, empty machine) to the limit on " in words
     free = dataclasses.replace(lopsided.project, limits=ff.Limits())
-    ends = first_page.allowed_range(assess(free))
+    ends = allowed_range(assess(free).region)
     assert "from contact begins (w_cs, empty machine) to jump when the speed falls (w_lb, " in ends
     for text in (ends, printed(lopsided)):
         assert "bound of the" not in text

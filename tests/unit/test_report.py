@@ -31,6 +31,7 @@ from flipflow.report.numbers import (
     speed,
 )
 from flipflow.report.registry import Part, blocks_of, section
+from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import assess
 
 LARGEST = 6e6
@@ -140,7 +141,7 @@ def test_a_machine_without_stops_says_so():
     linear = assess(ff.load_project("ffs0827-linear"))
     assert first_page.stop_sentence(linear) == "the machine has none."
     assert first_page.verdict_state(linear) == "fail"
-    assert "none; no speed meets all limits" in first_page.allowed_range(linear)
+    assert "none; no speed meets all limits" in allowed_range(linear.region)
     assert "fail" in printed(linear)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.codec import exact, plain
+from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.compare import Comparison
@@ -117,6 +118,7 @@ def assessment_summary(assessment: Assessment) -> dict[str, Any]:
         "name": assessment.project.document.name or assessment.project.name,
         "verdict": assessment.verdict,
         "state": assessment.state,
+        "allowed_speed_range": allowed_range(region),
         "does_it_start": does_it_start(assessment.transients),
         "omega": assessment.omega,
         "limits": [plain(vars(row)) for row in assessment.limits_table],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from flipflow.model.constants import RPM
+
 
 def digits(value: float, count: int = 3) -> str:
     """``count`` significant digits without zeros at the end; large numbers are whole.
@@ -13,3 +15,18 @@ def digits(value: float, count: int = 3) -> str:
     if math.isfinite(value) and abs(value) >= 10.0**count - 0.5:
         return f"{value:.0f}"
     return f"{value:.{count}g}"
+
+
+def rpm(omega: float) -> str:
+    """A speed in rpm, four significant digits."""
+    value = omega * RPM
+    return f"{value:.0f}" if value >= 999.95 else f"{value:.4g}"
+
+
+def span(low: float, high: float) -> str:
+    """A range of speeds in rpm, Hz and rad/s."""
+    hertz = [f"{omega / (2.0 * math.pi):.4g}" for omega in (low, high)]
+    return (
+        f"{rpm(low)} to {rpm(high)} rpm ({hertz[0]} to {hertz[1]} Hz, "
+        f"{low:.4g} to {high:.4g} rad/s)"
+    )

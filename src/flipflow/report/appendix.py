@@ -8,10 +8,11 @@ import numpy as np
 
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.io.units import in_unit
+from flipflow.model.numerals import rpm
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.palette import STABILITY_WORDS
 from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Values, cells
-from flipflow.report.numbers import four_digits, multiplier, number, quantity, rpm
+from flipflow.report.numbers import four_digits, multiplier, number, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
 

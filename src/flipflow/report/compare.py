@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit, shown
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.compare import comparison_figure
 from flipflow.report.blocks import (
@@ -22,9 +23,10 @@ from flipflow.report.blocks import (
     Verdict,
     cells,
 )
-from flipflow.report.first_page import allowed_range, verdict_state
-from flipflow.report.numbers import NOTHING, number, percent, quantity, rpm
+from flipflow.report.first_page import verdict_state
+from flipflow.report.numbers import NOTHING, number, percent, quantity
 from flipflow.report.registry import Part, section
+from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.compare import EMPTY, Comparison, Given, InputDifference, ResultChange
 
@@ -48,7 +50,7 @@ def verdicts(found: Comparison) -> Iterator[Block]:
     """Each machine's verdict and allowed range."""
     for k, (name, one) in enumerate(zip(found.names, found.assessments, strict=True)):
         yield Verdict(f"{letter(k)}, {name}: {one.verdict}", verdict_state(one))
-        yield Text(allowed_range(one), "Allowed speed range:")
+        yield Text(allowed_range(one.region), "Allowed speed range:")
 
 
 @section(Comparison, Part.FIRST_PAGE, 30, brief=True)

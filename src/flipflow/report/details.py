@@ -9,6 +9,7 @@ from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.model.quantities import quantities_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.bars import energy_figure, region_figure
@@ -29,7 +30,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.first_page import OVERLEAF_TITLE, overleaf, packed
-from flipflow.report.numbers import four_digits, named, rpm
+from flipflow.report.numbers import four_digits, named
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 from flipflow.model.limits import PASSAGES
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
@@ -25,14 +26,14 @@ from flipflow.report.blocks import (
     Values,
     Verdict,
 )
-from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, rpm, span, speed
+from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, speed
 from flipflow.report.registry import Part, section
+from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import (
     Assessment,
     CaseAssessment,
     LimitRow,
 )
-from flipflow.studies.feasible import REGION, STABILITY, Bound
 from flipflow.studies.operating_region import OperatingRegion
 from flipflow.studies.start_sentence import does_it_start
 
@@ -88,7 +89,7 @@ def _title_block(assessment: Assessment) -> TitleBlock:
 def verdict(assessment: Assessment) -> Iterator[Block]:
     """The verdict, and what it rests on."""
     yield Verdict(assessment.verdict, verdict_state(assessment))
-    yield Text(allowed_range(assessment), "Allowed speed range:")
+    yield Text(allowed_range(assessment.region), "Allowed speed range:")
     for lead, text in (
         ("Contact begins:", contact_sentence(assessment.region)),
         ("Stop:", stop_sentence(assessment)),
@@ -298,18 +299,6 @@ def verdict_state(assessment: Assessment) -> str:
     return assessment.state
 
 
-def allowed_range(assessment: Assessment) -> str:
-    """The allowed speed range and what ends it."""
-    region = assessment.region
-    if not region.feasible:
-        return "none; no speed meets all limits in all load cases."
-    parts = []
-    for (low, high), (lower, upper) in zip(region.feasible, region.binding, strict=True):
-        first, last = _bound(lower, region.ends[0]), _bound(upper, region.ends[1])
-        parts.append(f"{span(low, high)}, from {first} to {last}")
-    return "; ".join(parts) + "."
-
-
 def stop_sentence(assessment: Assessment) -> str:
     """Whether the stops are reached, case by case."""
     if assessment.omega is None:
@@ -330,20 +319,6 @@ def _reached(omega: float, cases: tuple[CaseAssessment, ...]) -> str:
     if len(free) > MOST_NAMED:
         return f"not reached in {len(free)} of {len(cases)} load cases."
     return f"not reached in {'; '.join(free)}; reached in the other cases."
-
-
-def _bound(bound: Bound, region_end: str) -> str:
-    """What ends the allowed range; ``region_end`` says what ends the operating region there."""
-    if bound.limit == REGION:
-        words = region_end.removesuffix(")")
-        return f"{words}{', ' if words != region_end else ' ('}empty machine)"
-    if bound.limit == "speed":
-        return "the limit on speed"
-    if bound.limit == STABILITY:
-        return (
-            f"where the motion is not sure to return after a disturbance ({case_words(bound.case)})"
-        )
-    return f"the limit on {QUANTITIES[bound.limit].label} ({case_words(bound.case)})"
 
 
 def _limit_row(row: LimitRow) -> tuple[Cell, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.plotting.foundation import foundation_drawing
 from flipflow.report.blocks import (
     Block,
@@ -19,7 +20,7 @@ from flipflow.report.blocks import (
     Text,
     cells,
 )
-from flipflow.report.numbers import NOTHING, quantity, rpm
+from flipflow.report.numbers import NOTHING, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, PASS, Assessment
 from flipflow.studies.foundation_loads import (

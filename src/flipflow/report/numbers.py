@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from flipflow.io.units import in_unit
-from flipflow.model.numerals import digits
+from flipflow.model.numerals import digits, rpm
 from flipflow.model.quantities import QUANTITIES
 
 NOTHING = "-"
@@ -45,24 +45,9 @@ def named(name: str, value: float | None, *, with_unit: bool = True) -> str:
     return quantity(value, one.shown_unit, one.unit, with_unit=with_unit)
 
 
-def rpm(omega: float) -> str:
-    """A speed in rpm, four significant digits."""
-    value = in_unit(omega, "rpm", "rad/s")
-    return f"{value:.0f}" if value >= 999.95 else f"{value:.4g}"
-
-
 def speed(omega: float) -> str:
     """A speed in rpm, Hz and rad/s."""
     return f"{rpm(omega)} rpm ({in_unit(omega, 'Hz', 'rad/s'):.4g} Hz, {omega:.4g} rad/s)"
-
-
-def span(low: float, high: float) -> str:
-    """A range of speeds in rpm, Hz and rad/s."""
-    hertz = [f"{in_unit(w, 'Hz', 'rad/s'):.4g}" for w in (low, high)]
-    return (
-        f"{rpm(low)} to {rpm(high)} rpm ({hertz[0]} to {hertz[1]} Hz, "
-        f"{low:.4g} to {high:.4g} rad/s)"
-    )
 
 
 def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:

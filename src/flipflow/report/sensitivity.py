@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flipflow.model.fields import FIELD
+from flipflow.model.numerals import rpm
 from flipflow.model.quantities import quantity_named
 from flipflow.plotting.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
 from flipflow.report.blocks import (
@@ -20,7 +21,7 @@ from flipflow.report.blocks import (
     Values,
     cells,
 )
-from flipflow.report.numbers import NOTHING, number, quantity, rpm
+from flipflow.report.numbers import NOTHING, number, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.sensitivity import Sensitivity

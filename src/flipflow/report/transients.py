@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.plotting.transient import run_ups_figure
 from flipflow.report.blocks import (
     Block,
@@ -18,7 +19,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.jump_risk import millimetres, moment_words
-from flipflow.report.numbers import NOTHING, bounds, number, percent, quantity, rpm
+from flipflow.report.numbers import NOTHING, bounds, number, percent, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_limit
 from flipflow.studies.jump_risk import JumpRisk

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from flipflow.model.numerals import rpm
 from flipflow.report.blocks import Block, Column, Note, Table, Text, cells
-from flipflow.report.numbers import NOTHING, quantity, rpm
+from flipflow.report.numbers import NOTHING, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
 from flipflow.studies.gaps_under_weight import GapsUnderWeight
