@@ -15,7 +15,7 @@ import numpy as np
 from scipy_flow import carried
 
 import flipflow as ff
-from flipflow.batch.lane_path import FOUND
+from flipflow.batch.reasons import FOUND
 from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
 from flipflow.batch.variants import batches
 
@@ -71,6 +71,8 @@ def main():
             label = f"{name}, {threads} thread{'s' if threads > 1 else ''}"
             print(f"{label:34s}{of_processor:14,.0f}{of_wall:14,.0f}{failed:12d}")
     few = 20
+    ff.periodic_orbits(machine, omega=120.0)  # compiled beforehand
+    ff.frequency_response(machine, omega=(5.0, 250.0))
     clock = time.process_time()
     for row in range(few):
         alone = machine.replace(**{name: column[row] for name, column in columns.items()})
