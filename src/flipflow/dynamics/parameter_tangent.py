@@ -30,7 +30,6 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
     add_driven_slope,
-    carry_free,
     saltation,
     segment_state,
 )
@@ -52,6 +51,7 @@ class Columns(NamedTuple):
     stop_stiffness: Real  # (P, m)
     stop_damping: Real  # (P, m)
     gap: Real  # (P, m, 2)
+    touches: Int  # (P, 7) 1 where M, C, K, f_0, an excitation, a stop, a direction changes, else 0
 
 
 class ColumnWork(NamedTuple):
@@ -61,7 +61,6 @@ class ColumnWork(NamedTuple):
     equal: Complex  # (R, R) phi of rates i and j
     conjugate: Complex  # (R, R) phi of rate i and the conjugate of rate j
     still: Complex  # (R,) phi of rate i and 0
-    drifting: Complex  # (R,) the same for what grows as t
     ahead: Complex  # (R, W) half of phi of rate i and i n omega, turned to the segment's start
     behind: Complex  # (R, W) the same for -i n omega
     place: Complex  # (R, N) W of the displacements
@@ -69,7 +68,8 @@ class ColumnWork(NamedTuple):
     acceleration: Complex  # (R, N) W of the accelerations
     amplitude: Complex  # (R,) modal amplitudes of a tangent
     gain: Complex  # (R, P) what the modes gain over a segment
-    pairs: Complex  # (R, 2 N + P + 1) scratch of the columns carried freely
+    free: Real  # (2 N, 2 N) exp(A t)
+    moved: Real  # (2 N, 2 N + P + 1) columns on their way
     slope: Real  # (2 N, 2 N) rate of the tangent map
     z: Real  # (2 N,)
     rate: Real  # (2 N,)
@@ -84,7 +84,6 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
         equal=np.zeros((R, R), np.complex128),
         conjugate=np.zeros((R, R), np.complex128),
         still=np.zeros(R, np.complex128),
-        drifting=np.zeros(R, np.complex128),
         ahead=np.zeros((R, waves), np.complex128),
         behind=np.zeros((R, waves), np.complex128),
         place=np.zeros((R, n), np.complex128),
@@ -92,7 +91,8 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
         acceleration=np.zeros((R, n), np.complex128),
         amplitude=np.zeros(R, np.complex128),
         gain=np.zeros((R, parameters), np.complex128),
-        pairs=np.zeros((R, R + parameters + 1), np.complex128),
+        free=np.zeros((R, R)),
+        moved=np.zeros((R, R + parameters + 1)),
         slope=np.zeros((R, R)),
         z=np.zeros(R),
         rate=np.zeros(R),
@@ -102,6 +102,8 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
 @kernel(inline=True)
 def divided_difference(a: complex, b: complex, e_a: complex, e_b: complex, t: float) -> complex:
     """(exp(a t) - exp(b t)) / (a - b), given both exponentials; t exp(a t) where a = b."""
+    if a == b:
+        return t * e_a
     x = 0.5 * t * (a - b)
     square = x * x
     if x.real * x.real + x.imag * x.imag > CLOSE * CLOSE:
@@ -139,7 +141,6 @@ def _prepare(
     for i in range(count):
         a, e_a = modes.rate[slot, i], work.factor[i]
         work.still[i] = divided_difference(a, 0j, e_a, 1.0 + 0j, t)
-        work.drifting[i] = drift_integral(a, e_a, t)
         for j in range(count):
             b, e_b = modes.rate[slot, j], work.factor[j]
             work.equal[i, j] = divided_difference(a, b, e_a, e_b, t)
@@ -152,6 +153,39 @@ def _prepare(
             work.ahead[i, w] = turn * divided_difference(a, turning, e_a, after, t)
             back = divided_difference(a, -turning, e_a, after.conjugate(), t)
             work.behind[i, w] = turn.conjugate() * back
+    _prepare_free(flow, slot, work)
+
+
+@kernel(inline=True)
+def _prepare_free(flow: Flow, slot: int, work: ColumnWork) -> None:
+    """exp(A t) from the modes and their factors."""
+    modes, size = flow.modes, work.free.shape[0]
+    for k in range(size):
+        for s in range(size):
+            work.free[k, s] = 0.0
+    for i in range(modes.mode_count[slot]):
+        factor = modes.weight[slot, i] * work.factor[i]
+        for k in range(size):
+            one = factor * modes.right[slot, k, i]
+            for s in range(size):
+                left = modes.left[slot, i, s]
+                work.free[k, s] += one.real * left.real - one.imag * left.imag
+
+
+@kernel
+def _carry_freely(U: Real, work: ColumnWork) -> None:
+    """U = exp(A t) U."""
+    size, columns = U.shape
+    for k in range(size):
+        for c in range(columns):
+            work.moved[k, c] = 0.0
+        for s in range(size):
+            entry = work.free[k, s]
+            for c in range(columns):
+                work.moved[k, c] += entry * U[s, c]
+    for k in range(size):
+        for c in range(columns):
+            U[k, c] = work.moved[k, c]
 
 
 @kernel
@@ -180,16 +214,19 @@ def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
 
 @kernel
 def _spread_steady(
-    machine: MachineArrays, flow: Flow, e: int, omega: float, work: ColumnWork
+    machine: MachineArrays, flow: Flow, e: int, omega: float, elapsed: float, work: ColumnWork
 ) -> None:
-    """Add W of the drive and of the rest of segment e."""
+    """Add W of the drive and of the rest of segment e after a time."""
     modes, slot = flow.modes, flow.slot[e]
     n = work.place.shape[1]
     for i in range(modes.mode_count[slot]):
         for k in range(n):
+            work.place[i, k] += flow.rest[e, k] * work.still[i]
             drift = modes.drift[slot, k]
-            work.place[i, k] += flow.rest[e, k] * work.still[i] + drift * work.drifting[i]
-            work.speed[i, k] += drift * work.still[i]
+            if drift != 0.0:
+                by = drift_integral(modes.rate[slot, i], work.factor[i], elapsed)
+                work.place[i, k] += drift * by
+                work.speed[i, k] += drift * work.still[i]
         for w in range(machine.order.shape[0]):
             turning = 1j * (machine.order[w] * omega)
             ahead, behind = work.ahead[i, w], work.behind[i, w]
@@ -214,26 +251,58 @@ def _gain(
     work: ColumnWork,
 ) -> complex:
     """What mode i gains by parameter p: of the motion itself (driven 1) or of a tangent (0)."""
-    n, slot, left = work.place.shape[1], flow.slot[e], flow.modes.left
+    n, slot = work.place.shape[1], flow.slot[e]
+    left, touches = flow.modes.left, columns.touches
     total = 0j
+    if touches[p, 0] != 0:
+        total -= _pressed(left, slot, i, columns.inertia, p, work.acceleration)
+    if touches[p, 1] != 0:
+        total -= _pressed(left, slot, i, columns.damping, p, work.speed)
+    if touches[p, 2] != 0:
+        total -= _pressed(left, slot, i, columns.stiffness, p, work.place)
+    if driven != 0.0 and touches[p, 3] != 0:
+        for r in range(n):
+            total += left[slot, i, n + r] * columns.static[p, r] * work.still[i]
+    if driven != 0.0 and touches[p, 4] != 0:
+        total += _driven_gain(machine, flow, e, omega, columns, i, p, work)
+    if touches[p, 5] != 0:
+        for j in range(machine.direction.shape[0]):
+            total -= _stop_gain(machine, flow, e, columns, i, j, p, driven, work)
+    return total
+
+
+@kernel(inline=True)
+def _driven_gain(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    i: int,
+    p: int,
+    work: ColumnWork,
+) -> complex:
+    """The share of the excitation in ``_gain``."""
+    n, slot, total = work.place.shape[1], flow.slot[e], 0j
+    for x in range(machine.power.shape[0]):
+        w, scale = machine.wave[x], omega ** machine.power[x]
+        for r in range(n):
+            one = columns.push[p, x, r]
+            push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
+            total += flow.modes.left[slot, i, n + r] * push * scale
+    return total
+
+
+@kernel(inline=True)
+def _pressed(left: Complex, slot: int, i: int, change: Real, p: int, spread: Complex) -> complex:
+    """l_i (0, A_p W_i) of a matrix that changes by A_p."""
+    n, total = spread.shape[1], 0j
     for r in range(n):
-        push = columns.static[p, r] * driven * work.still[i]
+        push = 0j
         for s in range(n):
-            push -= (
-                columns.inertia[p, r, s] * work.acceleration[i, s]
-                + columns.damping[p, r, s] * work.speed[i, s]
-                + columns.stiffness[p, r, s] * work.place[i, s]
-            )
+            one, by = spread[i, s], change[p, r, s]
+            push += complex(by * one.real, by * one.imag)
         total += left[slot, i, n + r] * push
-    if driven != 0.0:
-        for x in range(machine.power.shape[0]):
-            w, scale = machine.wave[x], omega ** machine.power[x]
-            for r in range(n):
-                one = columns.push[p, x, r]
-                push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
-                total += left[slot, i, n + r] * push * scale
-    for j in range(machine.direction.shape[0]):
-        total -= _stop_gain(machine, flow, e, columns, i, j, p, driven, work)
     return total
 
 
@@ -311,13 +380,13 @@ def advance_columns(
     _prepare(machine, flow, e, omega, elapsed, work)
     if parameters > 0:
         _spread_free(flow, slot, flow.q[e], work)
-        _spread_steady(machine, flow, e, omega, work)
+        _spread_steady(machine, flow, e, omega, elapsed, work)
     for i in range(flow.modes.mode_count[slot]):
         for p in range(parameters):
             work.gain[i, p] = _gain(machine, flow, e, omega, columns, i, p, 1.0, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e], -1.0, U)
-    carry_free(flow, slot, elapsed, U, work.pairs)
+    _carry_freely(U, work)
     _add_gains(flow, slot, U, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e] + elapsed, 1.0, U)
@@ -354,8 +423,11 @@ def _moved(
     for k in range(n):
         place += machine.direction[j, k] * U[k, p]
         rate += machine.direction[j, k] * U[n + k, p]
-    if p < columns.static.shape[0]:
+    if p == columns.static.shape[0]:
+        return place, rate
+    if columns.touches[p, 5] != 0:
         place -= gap_slope(columns, j, side, p)
+    if columns.touches[p, 6] != 0:
         for k in range(n):
             place += columns.direction[p, j, k] * work.z[k]
             rate += columns.direction[p, j, k] * work.z[n + k]
@@ -367,11 +439,15 @@ def carry_columns(
     machine: MachineArrays, flow: Flow, omega: float, columns: Columns, U: Real, work: ColumnWork
 ) -> None:
     """Carry columns of U, (2 N, P) or (2 N, P + 1), over the recorded flow, at fixed times."""
+    turns = 0
+    for p in range(columns.touches.shape[0]):
+        turns += columns.touches[p, 6]
     for e in range(flow.segments[0]):
         length = flow.length[e]
         advance_columns(machine, flow, e, omega, columns, length, U, work)
         if flow.kick[e] != 0.0:
-            segment_state(machine, flow, e, omega, length, work.z, work.rate)
+            if turns != 0:
+                segment_state(machine, flow, e, omega, length, work.z, work.rate)
             kick_columns(machine, flow, e, columns, U, work)
 
 
@@ -430,9 +506,9 @@ def _vary_map(
 
     ``longer`` and ``before`` tell how its end and its start move.
     """
-    slot, size = flow.slot[e], T.shape[0]
+    size = T.shape[0]
     for p in range(slopes.shape[0]):
-        carry_free(flow, slot, flow.length[e], slopes[p], work.pairs)
+        _carry_freely(slopes[p], work)
     for c in range(size):
         _vary_column(machine, flow, e, omega, columns, c, T, slopes, work)
     for p in range(slopes.shape[0]):
@@ -440,7 +516,7 @@ def _vary_map(
         for k in range(size):
             for c in range(size):
                 slopes[p, k, c] += more * work.slope[k, c]
-    carry_free(flow, slot, flow.length[e], T, work.pairs)
+    _carry_freely(T, work)
 
 
 @kernel
@@ -486,6 +562,8 @@ def _kick_map(
     for p in range(slopes.shape[0]):
         saltation(machine, j, sign, slopes[p], size)
     for p in range(columns.static.shape[0]):
+        if columns.touches[p, 5] == 0 and columns.touches[p, 0] == 0:
+            continue
         for column in range(size):
             gap, turned = 0.0, 0.0
             for k in range(n):
