@@ -120,8 +120,9 @@ class MotionDerivatives:
     @cached_property
     def _along(self) -> tuple[Real, Real]:
         """Derivatives at the segments' starts and of the segments' limits, both at fixed time."""
+        state = self.state  # over half a turn it may fly that half
         self._fly(self.solver.whole)
-        starts, shift, _, _ = self._vary(self.state, with_map=False)
+        starts, shift, _, _ = self._vary(state, with_map=False)
         return starts, shift
 
     @cached_property
@@ -138,7 +139,7 @@ class MotionDerivatives:
 
         The last column is the derivative in time.
         """
-        starts, _ = self._along
+        starts = self._along[0]
         out = np.zeros((t.size, *self.state.shape))
         machine, flow = self.solver.machine, self.solver.flow
         self._fly(self.solver.whole)
