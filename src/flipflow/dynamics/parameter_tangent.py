@@ -1,4 +1,4 @@
-r"""How a recorded flow moves with the machine's parameters: exact first and second derivatives.
+r"""How a recorded flow moves with the machine's parameters: exact derivatives.
 
 With M x'' + C x' + K x + sum_j d_j H_j = f, the derivative x_p at fixed time follows the equation
 of the machine itself under the force
@@ -12,9 +12,6 @@ drive and of the rest among them. Mode i answers to each of them with the divide
 
 so that W_i = sum_k phi_ik u_k is worked out once for all parameters. Where a stop's force jumps the
 velocity is kicked by c M^-1 d times d x_p + d_p x - e_p, the shift of the state against the gap.
-
-The tangent map is a product of exponentials and saltations. Its derivative needs the same W of
-its columns, and how the times of contact move: h_p dt = -(h_z z_p + h_p) / h', with each law's h.
 """
 
 from __future__ import annotations
@@ -30,10 +27,9 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
     add_driven_slope,
-    saltation,
     segment_state,
 )
-from flipflow.dynamics.law import damping_share, exit_between, signed_gap, stiffness_share
+from flipflow.dynamics.law import damping_share, signed_gap, stiffness_share
 
 CLOSE = 0.3  # half the difference of two exponents below which their quotient is a series
 
@@ -173,7 +169,7 @@ def _prepare_free(flow: Flow, slot: int, work: ColumnWork) -> None:
 
 
 @kernel
-def _carry_freely(U: Real, work: ColumnWork) -> None:
+def carry_freely(U: Real, work: ColumnWork) -> None:
     """U = exp(A t) U."""
     size, columns = U.shape
     for k in range(size):
@@ -189,7 +185,7 @@ def _carry_freely(U: Real, work: ColumnWork) -> None:
 
 
 @kernel
-def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
+def spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
     """W of a free motion with modal amplitudes q (R,)."""
     modes = flow.modes
     n, count = work.place.shape[1], modes.mode_count[slot]
@@ -239,7 +235,7 @@ def _spread_steady(
 
 
 @kernel
-def _gain(
+def mode_gain(
     machine: MachineArrays,
     flow: Flow,
     e: int,
@@ -379,21 +375,21 @@ def advance_columns(
     in_omega = U.shape[1] > parameters
     _prepare(machine, flow, e, omega, elapsed, work)
     if parameters > 0:
-        _spread_free(flow, slot, flow.q[e], work)
+        spread_free(flow, slot, flow.q[e], work)
         _spread_steady(machine, flow, e, omega, elapsed, work)
     for i in range(flow.modes.mode_count[slot]):
         for p in range(parameters):
-            work.gain[i, p] = _gain(machine, flow, e, omega, columns, i, p, 1.0, work)
+            work.gain[i, p] = mode_gain(machine, flow, e, omega, columns, i, p, 1.0, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e], -1.0, U)
-    _carry_freely(U, work)
+    carry_freely(U, work)
     _add_gains(flow, slot, U, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e] + elapsed, 1.0, U)
 
 
 @kernel(inline=True)
-def _side(flow: Flow, e: int) -> int:
+def side_of_change(flow: Flow, e: int) -> int:
     """The regime that tells the side of the stop that changed at the end of segment e."""
     j = flow.spring[e]
     before = flow.regimes[e, j]
@@ -405,16 +401,16 @@ def kick_columns(
     machine: MachineArrays, flow: Flow, e: int, columns: Columns, U: Real, work: ColumnWork
 ) -> None:
     """Saltation of the columns at the end of segment e, at the state in work.z."""
-    j, side, n = flow.spring[e], _side(flow, e), U.shape[0] // 2
+    j, side, n = flow.spring[e], side_of_change(flow, e), U.shape[0] // 2
     kick = flow.kick[e] * machine.stops.damping[j]
     for p in range(U.shape[1]):
-        moved, _ = _moved(machine, columns, j, side, U, p, work)
+        moved, _ = moved_against_gap(machine, columns, j, side, U, p, work)
         for k in range(n):
             U[n + k, p] += kick * machine.reach[j, k] * moved
 
 
 @kernel(inline=True)
-def _moved(
+def moved_against_gap(
     machine: MachineArrays, columns: Columns, j: int, side: int, U: Real, p: int, work: ColumnWork
 ) -> tuple[float, float]:
     """d x_p + d_p x - e_p and its rate at the state in work.z; p = P stands for omega."""
@@ -449,209 +445,3 @@ def carry_columns(
             if turns != 0:
                 segment_state(machine, flow, e, omega, length, work.z, work.rate)
             kick_columns(machine, flow, e, columns, U, work)
-
-
-@kernel
-def _set_shifts(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    shift: Real,
-    work: ColumnWork,
-) -> None:
-    """How the end of segment e moves in time, (P + 1,); the state there is in work.z.
-
-    The flow's own end stands at a phase of the force and moves with omega alone.
-    """
-    j, n, parameters = flow.spring[e], U.shape[0] // 2, columns.static.shape[0]
-    if j < 0:
-        for p in range(parameters):
-            shift[p] = 0.0
-        shift[parameters] = -(flow.start[e] + flow.length[e]) / omega
-        return
-    side, stops = _side(flow, e), machine.stops
-    before, after = flow.regimes[e, j], flow.regimes[e + 1, j]
-    alpha, beta, alpha_k, beta_c = exit_between(stops, j, before, after)
-    depth, rate, bend = -signed_gap(stops, j, side), 0.0, 0.0
-    for k in range(n):
-        depth += machine.direction[j, k] * work.z[k]
-        rate += machine.direction[j, k] * work.rate[k]
-        bend += machine.direction[j, k] * work.rate[n + k]
-    for p in range(parameters + 1):
-        moved, moved_rate = _moved(machine, columns, j, side, U, p, work)
-        change = alpha * moved + beta * moved_rate
-        if p < parameters:
-            change += alpha_k * columns.stop_stiffness[p, j] * depth
-            change += beta_c * columns.stop_damping[p, j] * rate
-        shift[p] = -change / (alpha * rate + beta * bend)
-
-
-@kernel
-def _vary_map(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    longer: Real,
-    before: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """Carry T and its derivatives over segment e, which ``_prepare`` has prepared.
-
-    ``longer`` and ``before`` tell how its end and its start move.
-    """
-    size = T.shape[0]
-    for p in range(slopes.shape[0]):
-        _carry_freely(slopes[p], work)
-    for c in range(size):
-        _vary_column(machine, flow, e, omega, columns, c, T, slopes, work)
-    for p in range(slopes.shape[0]):
-        more = longer[p] - before[p]
-        for k in range(size):
-            for c in range(size):
-                slopes[p, k, c] += more * work.slope[k, c]
-    _carry_freely(T, work)
-
-
-@kernel
-def _vary_column(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    c: int,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """What the parameters bring into column c of the map, and its rate at the segment's end."""
-    modes, slot, size = flow.modes, flow.slot[e], T.shape[0]
-    count = modes.mode_count[slot]
-    for i in range(count):
-        work.amplitude[i] = 0j
-        for k in range(size):
-            work.amplitude[i] += modes.left[slot, i, k] * T[k, c]
-    _spread_free(flow, slot, work.amplitude, work)
-    for k in range(size):
-        work.slope[k, c] = 0.0
-    for i in range(count):
-        weight = modes.weight[slot, i]
-        after = weight * modes.rate[slot, i] * work.factor[i] * work.amplitude[i]
-        for k in range(size):
-            work.slope[k, c] += (modes.right[slot, k, i] * after).real
-        for p in range(columns.static.shape[0]):
-            gain = weight * _gain(machine, flow, e, omega, columns, i, p, 0.0, work)
-            for k in range(size):
-                slopes[p, k, c] += (modes.right[slot, k, i] * gain).real
-
-
-@kernel
-def _kick_map(
-    machine: MachineArrays, flow: Flow, e: int, columns: Columns, T: Real, slopes: Real
-) -> None:
-    """Saltation S of the map at the end of segment e: S T_p + S_p T, and S T."""
-    j, sign, size = flow.spring[e], flow.kick[e], T.shape[0]
-    n, c = size // 2, machine.stops.damping[j]
-    for p in range(slopes.shape[0]):
-        saltation(machine, j, sign, slopes[p], size)
-    for p in range(columns.static.shape[0]):
-        if columns.touches[p, 5] == 0 and columns.touches[p, 0] == 0:
-            continue
-        for column in range(size):
-            gap, turned = 0.0, 0.0
-            for k in range(n):
-                gap += machine.direction[j, k] * T[k, column]
-                turned += columns.direction[p, j, k] * T[k, column]
-            for k in range(n):
-                reach = columns.reach[p, j, k]
-                for s in range(n):
-                    reach -= columns.inertia[p, k, s] * machine.reach[j, s]
-                slope = columns.stop_damping[p, j] * machine.reach[j, k] + c * reach
-                slopes[p, n + k, column] += sign * (slope * gap + c * machine.reach[j, k] * turned)
-    saltation(machine, j, sign, T, size)
-
-
-@kernel(shared=True)
-def carry_variation(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    starts: Real,
-    shift: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """Carry columns, the tangent map and the map's derivatives over the recorded flow.
-
-    U (2 N, P + 1) holds the derivatives of the state at its start, omega last, at fixed time;
-    ``starts`` (E, 2 N, P + 1) keeps them at the start of each segment, and ``shift`` (E + 1, P + 1)
-    how the segments' limits move in time. T (2 N, 2 N) is the map, I at first, and ``slopes``
-    (P + 1, 2 N, 2 N) its derivatives, 0 at first; with P + 1 = 0 of them T stays as it is.
-    """
-    parameters = columns.static.shape[0]
-    for p in range(parameters):
-        shift[0, p] = 0.0
-    shift[0, parameters] = -flow.start[0] / omega
-    for e in range(flow.segments[0]):
-        length = flow.length[e]
-        for k in range(U.shape[0]):
-            for p in range(U.shape[1]):
-                starts[e, k, p] = U[k, p]
-        advance_columns(machine, flow, e, omega, columns, length, U, work)
-        segment_state(machine, flow, e, omega, length, work.z, work.rate)
-        _set_shifts(machine, flow, e, omega, columns, U, shift[e + 1], work)
-        if slopes.shape[0] > 0:
-            _vary_map(machine, flow, e, omega, columns, shift[e + 1], shift[e], T, slopes, work)
-        if flow.kick[e] != 0.0:
-            kick_columns(machine, flow, e, columns, U, work)
-            if slopes.shape[0] > 0:
-                _kick_map(machine, flow, e, columns, T, slopes)
-
-
-@kernel(entry=True)
-def vary_flow(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    starts: Real,
-    shift: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """``carry_variation`` for callers outside the kernels."""
-    carry_variation(machine, flow, omega, columns, U, starts, shift, T, slopes, work)
-
-
-@kernel(entry=True)
-def columns_at(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    starts: Real,
-    t: Real,
-    piece: Int,
-    out: Real,
-    work: ColumnWork,
-) -> None:
-    """Derivatives of the state (K, 2 N, P + 1) at times t (K,) in given segments (K,)."""
-    for s in range(t.shape[0]):
-        e = piece[s]
-        for k in range(out.shape[1]):
-            for p in range(out.shape[2]):
-                out[s, k, p] = starts[e, k, p]
-        elapsed = t[s] - flow.start[e]
-        advance_columns(machine, flow, e, omega, columns, elapsed, out[s], work)

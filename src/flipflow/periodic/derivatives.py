@@ -21,7 +21,8 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import MachineColumns
 from flipflow.dynamics.motion import Motion, motion_of_flow
-from flipflow.dynamics.parameter_tangent import columns_at, new_column_work, vary_flow
+from flipflow.dynamics.parameter_tangent import new_column_work
+from flipflow.dynamics.parameter_variation import columns_at, vary_flow
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.contact_law import shares, signed_gap
 from flipflow.periodic.exact_solver import ExactSolver
