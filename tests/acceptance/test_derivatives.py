@@ -267,6 +267,21 @@ def test_every_quantity(leaning, law, omega) -> None:
         assert np.all(off <= SHARE * np.abs(slope) + floor), f"{what}: {got * sizes} {slope}"
 
 
+def test_quantities_of_a_motion_solved_over_half_a_turn(screen) -> None:
+    """They are read over the whole of it."""
+    orbit = symmetric(screen, 120.0)
+    names = ["main_mass", "clearance", "stop_damping", "omega"]
+    reads = {
+        "main_amplitude": lambda one: one.amplitude("main"),
+        "relative_phase": lambda one: one.phase("relative"),
+        "stop_force": Orbit.stop_force_peak,
+        ("contact_share", 0): Orbit.contact_share,
+    }
+    slopes = differences(orbit, names, list(reads.values()))
+    for what, slope in zip(reads, slopes, strict=True):
+        judge(str(what), orbit, names, orbit.sensitivity(what, names), slope)
+
+
 def test_quantities_of_any_machine() -> None:
     """Names of the table for a plain machine, and a stop without gap."""
     machine = Rotor()

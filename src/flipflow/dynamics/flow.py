@@ -339,7 +339,7 @@ def carry_tangent(
         length = flow.length[e]
         if slope != 0.0:
             add_driven_slope(machine, flow, slot, omega, flow.start[e], -slope, U)
-        carry_free(flow, slot, length, U, work)
+        _carry_free(flow, slot, length, U, work)
         if slope != 0.0:
             add_driven_slope(machine, flow, slot, omega, flow.start[e] + length, slope, U)
         if flow.kick[e] != 0.0:
@@ -361,7 +361,7 @@ def add_driven_slope(
 
 
 @kernel(inline=True)
-def carry_free(flow: Flow, slot: int, length: float, U: Real, work: Complex) -> None:
+def _carry_free(flow: Flow, slot: int, length: float, U: Real, work: Complex) -> None:
     """U = exp(A length) U by the modes of the contact state."""
     modes = flow.modes
     size, columns = U.shape

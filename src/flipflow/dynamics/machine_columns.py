@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_parts, with_springs
 from flipflow.dynamics.machine_series import EXACT, MachineSeries, machine_series
 from flipflow.dynamics.parameter_tangent import Columns
@@ -101,7 +101,21 @@ def _solved(M: Real, parts: Mapping[str, Real]) -> Columns:
         stop_stiffness=kernel_ready(parts["stop"][:, 0]),
         stop_damping=kernel_ready(parts["stop"][:, 1]),
         gap=parts["gap"],
+        touches=_touches(parts),
     )
+
+
+def _touches(parts: Mapping[str, Real]) -> Int:
+    """Which of M, C, K, f_0, excitation, stops, directions each parameter changes, (P, 7)."""
+    groups = (
+        ("inertia",), ("damping",), ("stiffness",), ("static",), ("force",),
+        ("stop", "gap", "direction"), ("direction",),
+    )  # fmt: skip
+    changes = [
+        np.any([parts[name].any(axis=tuple(range(1, parts[name].ndim))) for name in names], axis=0)
+        for names in groups
+    ]
+    return np.stack(changes, axis=1).astype(np.int64)
 
 
 def stop_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> dict[str, Real]:

@@ -1,4 +1,4 @@
-r"""How a recorded flow moves with the machine's parameters: exact first and second derivatives.
+r"""How a recorded flow moves with the machine's parameters: exact derivatives.
 
 With M x'' + C x' + K x + sum_j d_j H_j = f, the derivative x_p at fixed time follows the equation
 of the machine itself under the force
@@ -12,9 +12,6 @@ drive and of the rest among them. Mode i answers to each of them with the divide
 
 so that W_i = sum_k phi_ik u_k is worked out once for all parameters. Where a stop's force jumps the
 velocity is kicked by c M^-1 d times d x_p + d_p x - e_p, the shift of the state against the gap.
-
-The tangent map is a product of exponentials and saltations. Its derivative needs the same W of
-its columns, and how the times of contact move: h_p dt = -(h_z z_p + h_p) / h', with each law's h.
 """
 
 from __future__ import annotations
@@ -30,11 +27,9 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
     add_driven_slope,
-    carry_free,
-    saltation,
     segment_state,
 )
-from flipflow.dynamics.law import damping_share, exit_between, signed_gap, stiffness_share
+from flipflow.dynamics.law import damping_share, signed_gap, stiffness_share
 
 CLOSE = 0.3  # half the difference of two exponents below which their quotient is a series
 
@@ -52,6 +47,7 @@ class Columns(NamedTuple):
     stop_stiffness: Real  # (P, m)
     stop_damping: Real  # (P, m)
     gap: Real  # (P, m, 2)
+    touches: Int  # (P, 7) 1 where M, C, K, f_0, an excitation, a stop, a direction changes, else 0
 
 
 class ColumnWork(NamedTuple):
@@ -61,7 +57,6 @@ class ColumnWork(NamedTuple):
     equal: Complex  # (R, R) phi of rates i and j
     conjugate: Complex  # (R, R) phi of rate i and the conjugate of rate j
     still: Complex  # (R,) phi of rate i and 0
-    drifting: Complex  # (R,) the same for what grows as t
     ahead: Complex  # (R, W) half of phi of rate i and i n omega, turned to the segment's start
     behind: Complex  # (R, W) the same for -i n omega
     place: Complex  # (R, N) W of the displacements
@@ -69,7 +64,8 @@ class ColumnWork(NamedTuple):
     acceleration: Complex  # (R, N) W of the accelerations
     amplitude: Complex  # (R,) modal amplitudes of a tangent
     gain: Complex  # (R, P) what the modes gain over a segment
-    pairs: Complex  # (R, 2 N + P + 1) scratch of the columns carried freely
+    free: Real  # (2 N, 2 N) exp(A t)
+    moved: Real  # (2 N, 2 N + P + 1) columns on their way
     slope: Real  # (2 N, 2 N) rate of the tangent map
     z: Real  # (2 N,)
     rate: Real  # (2 N,)
@@ -84,7 +80,6 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
         equal=np.zeros((R, R), np.complex128),
         conjugate=np.zeros((R, R), np.complex128),
         still=np.zeros(R, np.complex128),
-        drifting=np.zeros(R, np.complex128),
         ahead=np.zeros((R, waves), np.complex128),
         behind=np.zeros((R, waves), np.complex128),
         place=np.zeros((R, n), np.complex128),
@@ -92,7 +87,8 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
         acceleration=np.zeros((R, n), np.complex128),
         amplitude=np.zeros(R, np.complex128),
         gain=np.zeros((R, parameters), np.complex128),
-        pairs=np.zeros((R, R + parameters + 1), np.complex128),
+        free=np.zeros((R, R)),
+        moved=np.zeros((R, R + parameters + 1)),
         slope=np.zeros((R, R)),
         z=np.zeros(R),
         rate=np.zeros(R),
@@ -102,6 +98,8 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
 @kernel(inline=True)
 def divided_difference(a: complex, b: complex, e_a: complex, e_b: complex, t: float) -> complex:
     """(exp(a t) - exp(b t)) / (a - b), given both exponentials; t exp(a t) where a = b."""
+    if a == b:
+        return t * e_a
     x = 0.5 * t * (a - b)
     square = x * x
     if x.real * x.real + x.imag * x.imag > CLOSE * CLOSE:
@@ -139,7 +137,6 @@ def _prepare(
     for i in range(count):
         a, e_a = modes.rate[slot, i], work.factor[i]
         work.still[i] = divided_difference(a, 0j, e_a, 1.0 + 0j, t)
-        work.drifting[i] = drift_integral(a, e_a, t)
         for j in range(count):
             b, e_b = modes.rate[slot, j], work.factor[j]
             work.equal[i, j] = divided_difference(a, b, e_a, e_b, t)
@@ -152,10 +149,43 @@ def _prepare(
             work.ahead[i, w] = turn * divided_difference(a, turning, e_a, after, t)
             back = divided_difference(a, -turning, e_a, after.conjugate(), t)
             work.behind[i, w] = turn.conjugate() * back
+    _prepare_free(flow, slot, work)
+
+
+@kernel(inline=True)
+def _prepare_free(flow: Flow, slot: int, work: ColumnWork) -> None:
+    """exp(A t) from the modes and their factors."""
+    modes, size = flow.modes, work.free.shape[0]
+    for k in range(size):
+        for s in range(size):
+            work.free[k, s] = 0.0
+    for i in range(modes.mode_count[slot]):
+        factor = modes.weight[slot, i] * work.factor[i]
+        for k in range(size):
+            one = factor * modes.right[slot, k, i]
+            for s in range(size):
+                left = modes.left[slot, i, s]
+                work.free[k, s] += one.real * left.real - one.imag * left.imag
 
 
 @kernel
-def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
+def carry_freely(U: Real, work: ColumnWork) -> None:
+    """U = exp(A t) U."""
+    size, columns = U.shape
+    for k in range(size):
+        for c in range(columns):
+            work.moved[k, c] = 0.0
+        for s in range(size):
+            entry = work.free[k, s]
+            for c in range(columns):
+                work.moved[k, c] += entry * U[s, c]
+    for k in range(size):
+        for c in range(columns):
+            U[k, c] = work.moved[k, c]
+
+
+@kernel
+def spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
     """W of a free motion with modal amplitudes q (R,)."""
     modes = flow.modes
     n, count = work.place.shape[1], modes.mode_count[slot]
@@ -180,16 +210,19 @@ def _spread_free(flow: Flow, slot: int, q: Complex, work: ColumnWork) -> None:
 
 @kernel
 def _spread_steady(
-    machine: MachineArrays, flow: Flow, e: int, omega: float, work: ColumnWork
+    machine: MachineArrays, flow: Flow, e: int, omega: float, elapsed: float, work: ColumnWork
 ) -> None:
-    """Add W of the drive and of the rest of segment e."""
+    """Add W of the drive and of the rest of segment e after a time."""
     modes, slot = flow.modes, flow.slot[e]
     n = work.place.shape[1]
     for i in range(modes.mode_count[slot]):
         for k in range(n):
+            work.place[i, k] += flow.rest[e, k] * work.still[i]
             drift = modes.drift[slot, k]
-            work.place[i, k] += flow.rest[e, k] * work.still[i] + drift * work.drifting[i]
-            work.speed[i, k] += drift * work.still[i]
+            if drift != 0.0:
+                by = drift_integral(modes.rate[slot, i], work.factor[i], elapsed)
+                work.place[i, k] += drift * by
+                work.speed[i, k] += drift * work.still[i]
         for w in range(machine.order.shape[0]):
             turning = 1j * (machine.order[w] * omega)
             ahead, behind = work.ahead[i, w], work.behind[i, w]
@@ -202,7 +235,7 @@ def _spread_steady(
 
 
 @kernel
-def _gain(
+def mode_gain(
     machine: MachineArrays,
     flow: Flow,
     e: int,
@@ -214,26 +247,58 @@ def _gain(
     work: ColumnWork,
 ) -> complex:
     """What mode i gains by parameter p: of the motion itself (driven 1) or of a tangent (0)."""
-    n, slot, left = work.place.shape[1], flow.slot[e], flow.modes.left
+    n, slot = work.place.shape[1], flow.slot[e]
+    left, touches = flow.modes.left, columns.touches
     total = 0j
+    if touches[p, 0] != 0:
+        total -= _pressed(left, slot, i, columns.inertia, p, work.acceleration)
+    if touches[p, 1] != 0:
+        total -= _pressed(left, slot, i, columns.damping, p, work.speed)
+    if touches[p, 2] != 0:
+        total -= _pressed(left, slot, i, columns.stiffness, p, work.place)
+    if driven != 0.0 and touches[p, 3] != 0:
+        for r in range(n):
+            total += left[slot, i, n + r] * columns.static[p, r] * work.still[i]
+    if driven != 0.0 and touches[p, 4] != 0:
+        total += _driven_gain(machine, flow, e, omega, columns, i, p, work)
+    if touches[p, 5] != 0:
+        for j in range(machine.direction.shape[0]):
+            total -= _stop_gain(machine, flow, e, columns, i, j, p, driven, work)
+    return total
+
+
+@kernel(inline=True)
+def _driven_gain(
+    machine: MachineArrays,
+    flow: Flow,
+    e: int,
+    omega: float,
+    columns: Columns,
+    i: int,
+    p: int,
+    work: ColumnWork,
+) -> complex:
+    """The share of the excitation in ``_gain``."""
+    n, slot, total = work.place.shape[1], flow.slot[e], 0j
+    for x in range(machine.power.shape[0]):
+        w, scale = machine.wave[x], omega ** machine.power[x]
+        for r in range(n):
+            one = columns.push[p, x, r]
+            push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
+            total += flow.modes.left[slot, i, n + r] * push * scale
+    return total
+
+
+@kernel(inline=True)
+def _pressed(left: Complex, slot: int, i: int, change: Real, p: int, spread: Complex) -> complex:
+    """l_i (0, A_p W_i) of a matrix that changes by A_p."""
+    n, total = spread.shape[1], 0j
     for r in range(n):
-        push = columns.static[p, r] * driven * work.still[i]
+        push = 0j
         for s in range(n):
-            push -= (
-                columns.inertia[p, r, s] * work.acceleration[i, s]
-                + columns.damping[p, r, s] * work.speed[i, s]
-                + columns.stiffness[p, r, s] * work.place[i, s]
-            )
+            one, by = spread[i, s], change[p, r, s]
+            push += complex(by * one.real, by * one.imag)
         total += left[slot, i, n + r] * push
-    if driven != 0.0:
-        for x in range(machine.power.shape[0]):
-            w, scale = machine.wave[x], omega ** machine.power[x]
-            for r in range(n):
-                one = columns.push[p, x, r]
-                push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
-                total += left[slot, i, n + r] * push * scale
-    for j in range(machine.direction.shape[0]):
-        total -= _stop_gain(machine, flow, e, columns, i, j, p, driven, work)
     return total
 
 
@@ -310,21 +375,21 @@ def advance_columns(
     in_omega = U.shape[1] > parameters
     _prepare(machine, flow, e, omega, elapsed, work)
     if parameters > 0:
-        _spread_free(flow, slot, flow.q[e], work)
-        _spread_steady(machine, flow, e, omega, work)
+        spread_free(flow, slot, flow.q[e], work)
+        _spread_steady(machine, flow, e, omega, elapsed, work)
     for i in range(flow.modes.mode_count[slot]):
         for p in range(parameters):
-            work.gain[i, p] = _gain(machine, flow, e, omega, columns, i, p, 1.0, work)
+            work.gain[i, p] = mode_gain(machine, flow, e, omega, columns, i, p, 1.0, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e], -1.0, U)
-    carry_free(flow, slot, elapsed, U, work.pairs)
+    carry_freely(U, work)
     _add_gains(flow, slot, U, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e] + elapsed, 1.0, U)
 
 
 @kernel(inline=True)
-def _side(flow: Flow, e: int) -> int:
+def side_of_change(flow: Flow, e: int) -> int:
     """The regime that tells the side of the stop that changed at the end of segment e."""
     j = flow.spring[e]
     before = flow.regimes[e, j]
@@ -336,16 +401,16 @@ def kick_columns(
     machine: MachineArrays, flow: Flow, e: int, columns: Columns, U: Real, work: ColumnWork
 ) -> None:
     """Saltation of the columns at the end of segment e, at the state in work.z."""
-    j, side, n = flow.spring[e], _side(flow, e), U.shape[0] // 2
+    j, side, n = flow.spring[e], side_of_change(flow, e), U.shape[0] // 2
     kick = flow.kick[e] * machine.stops.damping[j]
     for p in range(U.shape[1]):
-        moved, _ = _moved(machine, columns, j, side, U, p, work)
+        moved, _ = moved_against_gap(machine, columns, j, side, U, p, work)
         for k in range(n):
             U[n + k, p] += kick * machine.reach[j, k] * moved
 
 
 @kernel(inline=True)
-def _moved(
+def moved_against_gap(
     machine: MachineArrays, columns: Columns, j: int, side: int, U: Real, p: int, work: ColumnWork
 ) -> tuple[float, float]:
     """d x_p + d_p x - e_p and its rate at the state in work.z; p = P stands for omega."""
@@ -354,8 +419,11 @@ def _moved(
     for k in range(n):
         place += machine.direction[j, k] * U[k, p]
         rate += machine.direction[j, k] * U[n + k, p]
-    if p < columns.static.shape[0]:
+    if p == columns.static.shape[0]:
+        return place, rate
+    if columns.touches[p, 5] != 0:
         place -= gap_slope(columns, j, side, p)
+    if columns.touches[p, 6] != 0:
         for k in range(n):
             place += columns.direction[p, j, k] * work.z[k]
             rate += columns.direction[p, j, k] * work.z[n + k]
@@ -367,213 +435,13 @@ def carry_columns(
     machine: MachineArrays, flow: Flow, omega: float, columns: Columns, U: Real, work: ColumnWork
 ) -> None:
     """Carry columns of U, (2 N, P) or (2 N, P + 1), over the recorded flow, at fixed times."""
+    turns = 0
+    for p in range(columns.touches.shape[0]):
+        turns += columns.touches[p, 6]
     for e in range(flow.segments[0]):
         length = flow.length[e]
         advance_columns(machine, flow, e, omega, columns, length, U, work)
         if flow.kick[e] != 0.0:
-            segment_state(machine, flow, e, omega, length, work.z, work.rate)
+            if turns != 0:
+                segment_state(machine, flow, e, omega, length, work.z, work.rate)
             kick_columns(machine, flow, e, columns, U, work)
-
-
-@kernel
-def _set_shifts(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    shift: Real,
-    work: ColumnWork,
-) -> None:
-    """How the end of segment e moves in time, (P + 1,); the state there is in work.z.
-
-    The flow's own end stands at a phase of the force and moves with omega alone.
-    """
-    j, n, parameters = flow.spring[e], U.shape[0] // 2, columns.static.shape[0]
-    if j < 0:
-        for p in range(parameters):
-            shift[p] = 0.0
-        shift[parameters] = -(flow.start[e] + flow.length[e]) / omega
-        return
-    side, stops = _side(flow, e), machine.stops
-    before, after = flow.regimes[e, j], flow.regimes[e + 1, j]
-    alpha, beta, alpha_k, beta_c = exit_between(stops, j, before, after)
-    depth, rate, bend = -signed_gap(stops, j, side), 0.0, 0.0
-    for k in range(n):
-        depth += machine.direction[j, k] * work.z[k]
-        rate += machine.direction[j, k] * work.rate[k]
-        bend += machine.direction[j, k] * work.rate[n + k]
-    for p in range(parameters + 1):
-        moved, moved_rate = _moved(machine, columns, j, side, U, p, work)
-        change = alpha * moved + beta * moved_rate
-        if p < parameters:
-            change += alpha_k * columns.stop_stiffness[p, j] * depth
-            change += beta_c * columns.stop_damping[p, j] * rate
-        shift[p] = -change / (alpha * rate + beta * bend)
-
-
-@kernel
-def _vary_map(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    longer: Real,
-    before: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """Carry T and its derivatives over segment e, which ``_prepare`` has prepared.
-
-    ``longer`` and ``before`` tell how its end and its start move.
-    """
-    slot, size = flow.slot[e], T.shape[0]
-    for p in range(slopes.shape[0]):
-        carry_free(flow, slot, flow.length[e], slopes[p], work.pairs)
-    for c in range(size):
-        _vary_column(machine, flow, e, omega, columns, c, T, slopes, work)
-    for p in range(slopes.shape[0]):
-        more = longer[p] - before[p]
-        for k in range(size):
-            for c in range(size):
-                slopes[p, k, c] += more * work.slope[k, c]
-    carry_free(flow, slot, flow.length[e], T, work.pairs)
-
-
-@kernel
-def _vary_column(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    c: int,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """What the parameters bring into column c of the map, and its rate at the segment's end."""
-    modes, slot, size = flow.modes, flow.slot[e], T.shape[0]
-    count = modes.mode_count[slot]
-    for i in range(count):
-        work.amplitude[i] = 0j
-        for k in range(size):
-            work.amplitude[i] += modes.left[slot, i, k] * T[k, c]
-    _spread_free(flow, slot, work.amplitude, work)
-    for k in range(size):
-        work.slope[k, c] = 0.0
-    for i in range(count):
-        weight = modes.weight[slot, i]
-        after = weight * modes.rate[slot, i] * work.factor[i] * work.amplitude[i]
-        for k in range(size):
-            work.slope[k, c] += (modes.right[slot, k, i] * after).real
-        for p in range(columns.static.shape[0]):
-            gain = weight * _gain(machine, flow, e, omega, columns, i, p, 0.0, work)
-            for k in range(size):
-                slopes[p, k, c] += (modes.right[slot, k, i] * gain).real
-
-
-@kernel
-def _kick_map(
-    machine: MachineArrays, flow: Flow, e: int, columns: Columns, T: Real, slopes: Real
-) -> None:
-    """Saltation S of the map at the end of segment e: S T_p + S_p T, and S T."""
-    j, sign, size = flow.spring[e], flow.kick[e], T.shape[0]
-    n, c = size // 2, machine.stops.damping[j]
-    for p in range(slopes.shape[0]):
-        saltation(machine, j, sign, slopes[p], size)
-    for p in range(columns.static.shape[0]):
-        for column in range(size):
-            gap, turned = 0.0, 0.0
-            for k in range(n):
-                gap += machine.direction[j, k] * T[k, column]
-                turned += columns.direction[p, j, k] * T[k, column]
-            for k in range(n):
-                reach = columns.reach[p, j, k]
-                for s in range(n):
-                    reach -= columns.inertia[p, k, s] * machine.reach[j, s]
-                slope = columns.stop_damping[p, j] * machine.reach[j, k] + c * reach
-                slopes[p, n + k, column] += sign * (slope * gap + c * machine.reach[j, k] * turned)
-    saltation(machine, j, sign, T, size)
-
-
-@kernel(shared=True)
-def carry_variation(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    starts: Real,
-    shift: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """Carry columns, the tangent map and the map's derivatives over the recorded flow.
-
-    U (2 N, P + 1) holds the derivatives of the state at its start, omega last, at fixed time;
-    ``starts`` (E, 2 N, P + 1) keeps them at the start of each segment, and ``shift`` (E + 1, P + 1)
-    how the segments' limits move in time. T (2 N, 2 N) is the map, I at first, and ``slopes``
-    (P + 1, 2 N, 2 N) its derivatives, 0 at first; with P + 1 = 0 of them T stays as it is.
-    """
-    parameters = columns.static.shape[0]
-    for p in range(parameters):
-        shift[0, p] = 0.0
-    shift[0, parameters] = -flow.start[0] / omega
-    for e in range(flow.segments[0]):
-        length = flow.length[e]
-        for k in range(U.shape[0]):
-            for p in range(U.shape[1]):
-                starts[e, k, p] = U[k, p]
-        advance_columns(machine, flow, e, omega, columns, length, U, work)
-        segment_state(machine, flow, e, omega, length, work.z, work.rate)
-        _set_shifts(machine, flow, e, omega, columns, U, shift[e + 1], work)
-        if slopes.shape[0] > 0:
-            _vary_map(machine, flow, e, omega, columns, shift[e + 1], shift[e], T, slopes, work)
-        if flow.kick[e] != 0.0:
-            kick_columns(machine, flow, e, columns, U, work)
-            if slopes.shape[0] > 0:
-                _kick_map(machine, flow, e, columns, T, slopes)
-
-
-@kernel(entry=True)
-def vary_flow(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    starts: Real,
-    shift: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """``carry_variation`` for callers outside the kernels."""
-    carry_variation(machine, flow, omega, columns, U, starts, shift, T, slopes, work)
-
-
-@kernel(entry=True)
-def columns_at(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    starts: Real,
-    t: Real,
-    piece: Int,
-    out: Real,
-    work: ColumnWork,
-) -> None:
-    """Derivatives of the state (K, 2 N, P + 1) at times t (K,) in given segments (K,)."""
-    for s in range(t.shape[0]):
-        e = piece[s]
-        for k in range(out.shape[1]):
-            for p in range(out.shape[2]):
-                out[s, k, p] = starts[e, k, p]
-        elapsed = t[s] - flow.start[e]
-        advance_columns(machine, flow, e, omega, columns, elapsed, out[s], work)

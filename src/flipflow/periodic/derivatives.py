@@ -21,7 +21,8 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import MachineColumns
 from flipflow.dynamics.motion import Motion, motion_of_flow
-from flipflow.dynamics.parameter_tangent import columns_at, new_column_work, vary_flow
+from flipflow.dynamics.parameter_tangent import new_column_work
+from flipflow.dynamics.parameter_variation import columns_at, vary_flow
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.contact_law import shares, signed_gap
 from flipflow.periodic.exact_solver import ExactSolver
@@ -120,8 +121,9 @@ class MotionDerivatives:
     @cached_property
     def _along(self) -> tuple[Real, Real]:
         """Derivatives at the segments' starts and of the segments' limits, both at fixed time."""
+        state = self.state  # over half a turn it may fly that half
         self._fly(self.solver.whole)
-        starts, shift, _, _ = self._vary(self.state, with_map=False)
+        starts, shift, _, _ = self._vary(state, with_map=False)
         return starts, shift
 
     @cached_property
@@ -138,7 +140,7 @@ class MotionDerivatives:
 
         The last column is the derivative in time.
         """
-        starts, _ = self._along
+        starts = self._along[0]
         out = np.zeros((t.size, *self.state.shape))
         machine, flow = self.solver.machine, self.solver.flow
         self._fly(self.solver.whole)

@@ -107,16 +107,18 @@ def _columns_of(asked: Sequence[str], parameters: Sequence[Named]) -> list[int]:
 
 def _reading(orbit: Orbit, quantity: object) -> Callable[[TiltedMotion], Complex]:
     """How a quantity is read off a tilted motion."""
-    if quantity in (STATE, MULTIPLIERS):
-        return lambda motion: motion.omega
-    if isinstance(quantity, tuple) and len(quantity) == 2 and quantity[0] in READINGS:
-        read, which = READINGS[quantity[0]], quantity[1]
-        return lambda motion: read(motion, which)
+    if isinstance(quantity, tuple) and len(quantity) == 2:
+        name, which = quantity
+        if isinstance(name, str) and name in READINGS:
+            read = READINGS[name]
+            return lambda motion: read(motion, which)
     known = {
         name: one
         for name, one in quantities_for(orbit.machine).items()
         if one.of == "motion" and not one.of_folds
     }
+    if isinstance(quantity, str) and quantity in (STATE, MULTIPLIERS):
+        return lambda motion: motion.omega
     if not isinstance(quantity, str) or quantity not in known:
         pairs = ", ".join(f'("{name}", ...)' for name in READINGS)
         remedy = f"choose one of {STATE}, {MULTIPLIERS}, {', '.join(known)}, {pairs}"
