@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
+from flipflow.plotting.scales import MINUS
+from flipflow.plotting.units import units_for
 from flipflow.studies.lyapunov import LyapunovExponents
 
 MOST_SHOWN = 6  # exponents that are drawn
@@ -18,12 +22,13 @@ def lyapunov_figure(result: LyapunovExponents) -> Figure:
     count = np.arange(1.0, batches + 1.0)
     periods = count * result.periods / batches
     means = np.cumsum(result.batches, axis=0) / count[:, None]
+    unit = " 1/s" if units_for(result, None) == "engineering" else ""
     traces = []
     for k in range(shown):
-        value, error = result.exponents[k], result.standard_error[k]
+        name = _with_error(result.exponents[k], result.standard_error[k])
         traces.append(
-            Trace(f"{value:.4g} +- {error:.2g} 1/s", periods, means[:, k], "stable",
-                  case_colour(k), case_symbol(k), bold=k == 0)
+            Trace(f"{name}{unit}", periods, means[:, k], "stable", case_colour(k), case_symbol(k),
+                  bold=k == 0)
         )  # fmt: skip
     panel = Panel(
         Axis("forcing periods", ""), Axis("Lyapunov exponents", "1/s"), tuple(traces),
@@ -35,3 +40,11 @@ def lyapunov_figure(result: LyapunovExponents) -> Figure:
         "that repeats. The legend gives the final values with their standard errors."
     )
     return Figure("Lyapunov exponents", caption, (panel,), height=340)
+
+
+def _with_error(value: float, error: float) -> str:
+    """A value and its standard error, to the second digit of the error."""
+    if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
+        return f"{value:.4g}"
+    decimals = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}".replace("-", MINUS)

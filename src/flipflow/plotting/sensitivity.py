@@ -14,7 +14,7 @@ from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
-from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
+from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
 Real = NDArray[np.float64]
@@ -173,7 +173,7 @@ def _row(result: Sensitivity | OneAtATime, i: int) -> str:
     if not isinstance(nominal, float) or not np.isfinite(nominal) or nominal == 0.0:
         return name
     low, high = (100.0 * (float(end) / nominal - 1.0) for end in ends)  # type: ignore[arg-type]
-    return f"{name} {low:+.3g} to {high:+.3g} %"
+    return f"{name} {low:+.3g} to {high:+.3g} %".replace("-", MINUS)
 
 
 def _name(field: str) -> str:
