@@ -14,8 +14,8 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Cells, Panel, Trace
 from flipflow.plotting.response import label
-from flipflow.plotting.scales import MM, RPM
-from flipflow.plotting.units import length_of
+from flipflow.plotting.scales import MM
+from flipflow.plotting.units import length_of, speed_of
 from flipflow.studies.basins import Basins, GridAxis
 
 Real = NDArray[np.float64]
@@ -62,7 +62,7 @@ def basins_figure(basins: Basins) -> Figure:
         traces,
         cells=(_cells(grid, across, upwards[0] if upwards else None, len(basins.orbits)),),
     )
-    title = f"Basins at {basins.omega * RPM:.4g} rpm"
+    title = f"Basins at {speed_of(basins, basins.omega)}"
     return Figure(title, " ".join([READING, *basins.notes]), (panel,), height=430)
 
 

@@ -11,7 +11,7 @@ from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
 
 DRAWN: tuple[tuple[Direction, str, str, str], ...] = (
-    ("up", "rising", "main", "circle"), ("down", "falling", "floating", "circle"),
+    ("up", "rising", "main", "circle"), ("down", "falling", "floating", "square"),
 )  # fmt: skip
 
 

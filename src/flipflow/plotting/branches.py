@@ -29,7 +29,7 @@ from flipflow.plotting.response import (
     stability_key,
 )
 from flipflow.plotting.scales import MM, RPM
-from flipflow.plotting.units import units_for
+from flipflow.plotting.units import speed_of
 
 Real = NDArray[np.float64]
 
@@ -89,20 +89,13 @@ def branch_name(branch: Branch) -> str:
     periods = "1 period" if branch.periods == 1 else f"{branch.periods} periods"
     met = [point for point in branch.special_points if point.position < 0.0]
     if met:
-        return f"{periods}, from {_speed(branch, met[0].omega)}"
+        return f"{periods}, from {speed_of(branch, met[0].omega)}"
     if branch.status is BranchStatus.CLOSED:
         return f"{periods}, closed"
     if branch.status is BranchStatus.FOLLOWED:
-        low, high = (_speed(branch, end) for end in (branch.omega.min(), branch.omega.max()))
+        low, high = (speed_of(branch, end) for end in (branch.omega.min(), branch.omega.max()))
         return f"{periods}, {low.removesuffix(' rpm')} to {high}"
     return f"{periods}, from below"
-
-
-def _speed(branch: Branch, omega: float) -> str:
-    """A speed as a branch's name says it: a machine of its user has no units."""
-    if units_for(branch, None) == "engineering":
-        return f"{omega * RPM:.4g} rpm"
-    return f"{omega:.4g}"
 
 
 def field_branch_figure(branch: FieldBranch, which: Coordinate | None = None) -> Figure:

@@ -17,8 +17,8 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import within
 from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.response import case_look, case_names, coordinates, label
-from flipflow.plotting.scales import MM, RPM
-from flipflow.plotting.units import length_of
+from flipflow.plotting.scales import MM
+from flipflow.plotting.units import length_of, speed_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
 
 Real = NDArray[np.float64]
@@ -59,7 +59,7 @@ def orbit_figure(orbit: Orbit, which: Coordinate | None = None) -> Figure:
     touched = bool(orbit.contact_intervals)
     said = CONTACT_WORDS if touched else NO_CONTACT if _stops(orbit) else NO_STOP
     caption = f"{said} {PORTRAIT}"
-    title = f"Motion at {orbit.omega * RPM:.4g} rpm"
+    title = f"Motion at {speed_of(orbit, orbit.omega)}"
     name = label(chosen)
     panels = (
         Panel(
@@ -92,7 +92,7 @@ def orbits_in_time_figure(orbits: Sequence[Orbit], which: Coordinate | None = No
             tuple(_loop(orbit, chosen, word, k) for k, (orbit, word) in pairs),
         ),
     )  # fmt: skip
-    title = f"Motions at {orbits[0].omega * RPM:.4g} rpm"
+    title = f"Motions at {speed_of(orbits[0], orbits[0].omega)}"
     return Figure(title, PORTRAIT, panels, columns=2, height=340, shares=(0.6, 0.4))
 
 

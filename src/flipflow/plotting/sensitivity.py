@@ -15,6 +15,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
+from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
 Real = NDArray[np.float64]
@@ -183,10 +184,10 @@ def _name(field: str) -> str:
 def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:
     label = quantity_named(result.quantity, result.machine).label
     if isinstance(result.omega, float):
-        return f"Sensitivity of {label} at {result.omega * RPM:.4g} rpm"
+        return f"Sensitivity of {label} at {speed_of(result, result.omega)}"
     if at is None:
         return f"Sensitivity of {label}"
-    return f"Sensitivity of {label} at {np.asarray(result.omega)[at] * RPM:.4g} rpm"
+    return f"Sensitivity of {label} at {speed_of(result, np.asarray(result.omega)[at])}"
 
 
 def _one_at_a_time() -> str:

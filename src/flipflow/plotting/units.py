@@ -42,6 +42,13 @@ def length_of(owner: object, metres: float, digits: int) -> str:
     return f"{metres:.{digits}g}"
 
 
+def speed_of(owner: object, omega: float) -> str:
+    """A speed as words say it: in rpm for a screen, without a unit for any other machine."""
+    if units_for(owner, None) == "engineering":
+        return f"{omega * RPM:.4g} rpm"
+    return f"{omega:.4g}"
+
+
 def in_units(figure: Figure, units: str) -> Figure:
     """The figure, which is drawn in an engineer's units, in others."""
     if units == "engineering":
