@@ -66,6 +66,7 @@ html_sidebars = {
         "how-to/*",
     )
 }
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
 html_css_files = ["flipflow.css"]
 html_copy_source = False
 html_show_sourcelink = False

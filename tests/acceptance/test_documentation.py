@@ -72,7 +72,11 @@ class Page(HTMLParser):
 @functools.cache
 def pages() -> dict[str, Page]:
     found = {str(one.relative_to(BUILT)): one for one in sorted(BUILT.rglob("*.html"))}
-    return {name: Page(path.read_text(encoding="utf-8")) for name, path in found.items()}
+    return {
+        name: Page(path.read_text(encoding="utf-8"))
+        for name, path in found.items()
+        if not name.startswith("_static")
+    }
 
 
 def test_every_page_is_there() -> None:
@@ -92,7 +96,7 @@ def test_links_lead_somewhere() -> None:
             if urlsplit(link).scheme or link.startswith("//"):
                 continue
             target, place = urldefrag(urljoin(name, link))
-            target = unquote(target)
+            target = unquote(urlsplit(target).path)
             if not (BUILT / target).is_file():
                 lost.append(f"{name}: {link}")
             elif target in pages() and unquote(place) not in pages()[target].places:

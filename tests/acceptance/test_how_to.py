@@ -34,7 +34,10 @@ QUESTIONS = questions()
 
 def test_the_questions_are_there() -> None:
     assert len(QUESTIONS) >= 10
-    for word in ("gaps", "bifurcation", "chaos", "cusp", "touches no other", "starts", "double"):
+    for word in (
+        "gaps", "bifurcation", "chaos", "cusp", "touches no other", "starts", "double", "harmonics",
+        "matters", "pandas",
+    ):  # fmt: skip
         assert any(word in question for question in QUESTIONS), word
 
 
