@@ -59,6 +59,10 @@ class Figure(PanelGrid):
         """
         return write_rendered(path, FORMATS, self._rendered)
 
+    def _repr_svg_(self) -> str:
+        """What a notebook shows."""
+        return self._rendered(".svg").decode()
+
     def _rendered(self, ending: str) -> bytes:
         if ending == ".html":
             from flipflow.plotting.plotly import page  # noqa: PLC0415  loads plotly
