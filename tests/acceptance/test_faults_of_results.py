@@ -86,6 +86,7 @@ def test_a_machine_of_its_user_keeps_its_numbers_and_words() -> None:
         ff.sweep(chain(), np.array([0.8, 0.9, 1.0])),
         ff.bifurcation_diagram(chain(), "omega", [0.8, 0.9]),
         ff.lyapunov_exponents(chain(), 1.0, periods=64),
+        ff.sensitivity(chain(), {"forcing": (0.9, 1.1)}, "amplitude[1]", omega=1.0, n=4),
         ff.response_family(chain(), {"forcing": [0.9, 1.0]}, omega=(0.5, 1.5)),
     )  # fmt: skip
     for result in results:
