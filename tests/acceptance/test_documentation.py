@@ -29,8 +29,8 @@ pytestmark = pytest.mark.skipif(
 browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 WIDTHS = 1400, 390
 LOADED = {"img": "src", "script": "src", "link": "href", "source": "src", "iframe": "src"}
-# No complaints: the theme notes light or dark, and where it has scrolled to.
-NOTES = re.compile(r'"\[PST\]: (?:Changed to auto mode|Scrolled sidebar)')
+# No complaints: the theme notes light or dark, where it has scrolled to, what has the focus.
+NOTES = re.compile(r'"\[PST\]: (?:Changed to auto mode|Scrolled sidebar|Set focus on search)')
 HARNESS = """<!DOCTYPE html><title>looking</title><link rel="icon" href="data:,">
 <pre id="seen"></pre><script>
 const seen = [];
