@@ -22,6 +22,7 @@ version = release = flipflow.__version__
 
 extensions = [
     "svgmath",
+    "validation",
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
@@ -55,8 +56,17 @@ html_title = "flipflow"
 html_static_path = ["_static"]
 html_sidebars = {
     page: []
-    for page in ("index", "conventions", "why-exact", "coexistence", "tutorials/*", "how-to/*")
+    for page in (
+        "index",
+        "conventions",
+        "why-exact",
+        "coexistence",
+        "gallery",
+        "tutorials/*",
+        "how-to/*",
+    )
 }
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
 html_css_files = ["flipflow.css"]
 html_copy_source = False
 html_show_sourcelink = False

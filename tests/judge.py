@@ -1,6 +1,14 @@
-"""One comparison for all acceptance tests: a failure prints both values."""
+"""One comparison for all acceptance tests: a failure prints both values.
+
+The page of validation is made of what is compared here: where the environment names a file in
+``FLIPFLOW_RECORD``, every comparison is a line of it.
+"""
 
 from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,11 +31,33 @@ def close(
     got, expected = np.asarray(got), np.asarray(expected)
     assert got.shape == expected.shape, f"{what}: shapes {got.shape} and {expected.shape}"
     off = np.abs(got - expected)
+    if "FLIPFLOW_RECORD" in os.environ:
+        _record(what, got, expected, off, abs + rel * np.abs(expected))
     worst = off.max(initial=0.0)
     good = bool(np.all(off <= abs + rel * np.abs(expected)))
     assert good, (
         f"{what}: got {got}, expected {expected}, off by {worst:.3g} (abs {abs}, rel {rel})"
     )
+
+
+def _record(
+    what: str, got: np.ndarray, expected: np.ndarray, off: np.ndarray, allowed: np.ndarray
+) -> None:
+    """The comparison, of many numbers the one that is nearest to what is allowed."""
+    if not got.size:
+        return
+    near = np.argmax(off - allowed)
+    one = {
+        "test": os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0],
+        "what": what,
+        "count": got.size,
+        "got": str(got.flat[near]),
+        "expected": str(expected.flat[near]),
+        "off": float(off.flat[near]),
+        "allowed": float(np.broadcast_to(allowed, off.shape).flat[near]),
+    }
+    with Path(os.environ["FLIPFLOW_RECORD"]).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(one) + "\n")
 
 
 def kinds(branch: Branch) -> list[str]:

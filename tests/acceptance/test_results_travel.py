@@ -228,7 +228,7 @@ def test_a_machine_of_its_user_has_no_units() -> None:
     followed = ff.frequency_response(chain(), (0.5, 1.9))
     fold = followed.folds[0]
     curve = ff.figure(ff.continue_fold(fold, "springs[0].clearance", (0.35, 0.45)), coordinate=0)
-    assert [panel.y.title for panel in curve.panels] == ["amplitude", "angular frequency"]
+    assert [panel.y.title for panel in curve.panels] == ["angular frequency", "amplitude, x[0]"]
     written = [line.text for line in ff.figure(followed).panels[0].lines if line.text]
     assert written
     assert any(text.endswith(f" {fold.omega:.4g}") for text in written)

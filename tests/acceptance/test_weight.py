@@ -30,6 +30,7 @@ def hanging(screen: ff.FlipFlowScreen) -> ff.MechanicalSystem:
 
 
 def test_row_34(drawn) -> None:
+    """The weight of the floating frame on a deck of 15 degrees shifts the gaps."""
     close("shift", drawn.gap_shift, 0.29142e-3, abs=1e-8)
     branch = ff.frequency_response(drawn, (60.0, 100.0))
     begins = {p.side: p.omega * RPM for p in branch.special_points if p.kind == "contact begin"}

@@ -41,8 +41,8 @@ def info(
 
 def _contents(kept: ChunkStore, states: list[ChunkState]) -> Block:
     from flipflow.batch.chunk_store import FINISHED, MISSING  # noqa: PLC0415  keeps --help quick
+    from flipflow.model.numerals import rpm  # noqa: PLC0415
     from flipflow.report.blocks import Values  # noqa: PLC0415
-    from flipflow.report.numbers import rpm  # noqa: PLC0415
     from flipflow.studies.study_plan import plan_from  # noqa: PLC0415
 
     plan = plan_from(kept)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.dynamics.contact_free import complex_amplitudes, span
-from flipflow.model.arguments import checked_speeds
+from flipflow.model.arguments import checked_speeds, refuse_pair
 from flipflow.model.screen import FlipFlowScreen, unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.results.frozen import Frozen
@@ -118,6 +118,7 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     InputError
         For frequencies that are not finite or not above 0, and without any damping.
     """
+    refuse_pair("omega", omega)
     frequencies = checked_speeds(omega)
     system = system_of(machine).with_bonded()
     system.require_damping()

@@ -1,97 +1,58 @@
-"""Branches as tables: NetCDF and CSV."""
+"""The responses of all load cases as one table: NetCDF and CSV."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flipflow.continuation.branch import Branch
-from flipflow.io.spreadsheet import csv_text
+from flipflow.io.arrays import arrays_of
+from flipflow.io.labelled import Arrays, Variable
+from flipflow.io.tables import csv_text, netcdf_bytes
 from flipflow.model.constants import RPM
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 
 NAMES = "response.nc", "response.csv"
-Columns = dict[str, tuple[NDArray[Any], dict[str, str]]]
-
-
-def branch_columns(branch: Branch) -> Columns:
-    """The points of a branch by name: values (n,) and attributes such as units."""
-    columns: Columns = {
-        "omega": (branch.omega, {"units": "rad/s"}),
-        "speed": (branch.omega * RPM, {"units": "rpm"}),
-        "stable": (branch.stable.astype(np.int8), {"flag_meanings": "1: returns"}),
-        "error": (branch.error, {"units": "m"}),
-        "largest_multiplier": (np.abs(branch.multipliers[:, 0]), {}),
-    }
-    for which in branch.system.named:
-        columns[f"amplitude_{which}"] = (branch.amplitude(which), {"units": "m"})
-        columns[f"phase_{which}"] = (branch.phase(which), {"units": "rad"})
-    return columns
-
-
-def _attributes(branch: Branch) -> dict[str, str]:
-    return {
-        "title": "Periodic motions over frequency",
-        "method": repr(branch.method),
-        "status": branch.status.value,
-        "flipflow_version": branch.version,
-    }
 
 
 def write_response(assessment: Assessment, folder: Path) -> None:
-    """Write the response of every case as NetCDF and CSV, as :data:`NAMES`.
+    """Write the response of every case as NetCDF and CSV, as :data:`NAMES`."""
+    arrays = response_arrays(assessment)
+    write_file(folder / NAMES[0], netcdf_bytes(arrays))
+    write_file(folder / NAMES[1], csv_text(arrays).encode())
 
-    Branches have different numbers of points, so the cases follow each other along "point".
-    """
-    tables = [branch_columns(case.branch) for case in assessment.cases]
-    joined: Columns = {
-        name: (np.concatenate([table[name][0] for table in tables]), attributes)
-        for name, (_, attributes) in tables[0].items()
-    }
-    owner = np.repeat(np.arange(len(tables)), [case.branch.omega.size for case in assessment.cases])
-    meanings = ", ".join(f"{k}: {case.name}" for k, case in enumerate(assessment.cases))
-    joined["case"] = (owner.astype(np.int32), {"flag_meanings": meanings})
-    shared = dict(
-        set.intersection(*(set(_attributes(case.branch).items()) for case in assessment.cases))
+
+def response_arrays(assessment: Assessment) -> Arrays:
+    """The branches of all cases; as their points differ in number, one case follows the other."""
+    names = [case.name for case in assessment.cases]
+    parts = [arrays_of(case.branch) for case in assessment.cases]
+    shared = set.intersection(*(set(part.attributes.items()) for part in parts))
+    omega = np.concatenate([part.coordinates["omega"].data for part in parts])
+    labels = parts[0].coordinates["coordinate"]
+    cases = _cases(names, parts, "omega", "point")
+    return Arrays(
+        parts[0].title,
+        "point",
+        {"case": cases, "omega": Variable(("point",), omega, "rad/s"), "coordinate": labels},
+        {
+            "speed": Variable(("point",), omega * RPM, "rpm"),
+            **dict(_joined(parts)),
+            "special_case": _cases(names, parts, "special_kind", "special"),
+        },
+        {**dict(shared), "input_hash": assessment.input_hash},
     )
-    shared["input_hash"] = assessment.input_hash
-    write_file(folder / NAMES[0], _netcdf(joined, shared))
-    rows = [
-        _csv(table, case=case.name, head=k == 0)
-        for k, (case, table) in enumerate(zip(assessment.cases, tables, strict=True))
-    ]
-    write_file(folder / NAMES[1], b"".join(rows))
 
 
-def _netcdf(columns: Columns, attributes: Mapping[str, str]) -> bytes:
-    """Classic NetCDF, text in UTF-8, with one dimension, "point"; xarray opens it as a table."""
-    from scipy.io import netcdf_file  # noqa: PLC0415  only files need it
-
-    content = io.BytesIO()
-    with netcdf_file(content, "w") as file:
-        for name, text in attributes.items():
-            setattr(file, name, text.encode())
-        file.createDimension("point", next(iter(columns.values()))[0].size)
-        for name, (values, own) in columns.items():
-            variable = file.createVariable(name, values.dtype, ("point",))
-            variable[:] = values
-            for key, text in own.items():
-                setattr(variable, key, text.encode())
-        file.flush()
-        return content.getvalue()
+def _joined(parts: list[Arrays]) -> Iterator[tuple[str, Variable]]:
+    """Each variable of all parts, one after the other along its first dimension."""
+    for name, one in parts[0].variables.items():
+        values = np.concatenate([part.variables[name].data for part in parts])
+        yield name, Variable(one.dims, values, one.units)
 
 
-def _csv(columns: Columns, case: str | None = None, *, head: bool = True) -> bytes:
-    units = [own.get("units", "") for _, own in columns.values()]
-    heads = [f"{n} [{u}]" if u else n for n, u in zip(columns, units, strict=True)]
-    rows = zip(*(values.tolist() for values, _ in columns.values()), strict=True)
-    if case is None:
-        return csv_text(heads, rows).encode()
-    text = csv_text(["case", *heads], ((case, *row) for row in rows))
-    return (text if head else text.partition("\n")[2]).encode()
+def _cases(names: list[str], parts: list[Arrays], of: str, dim: str) -> Variable:
+    """To which case each point belongs."""
+    counts = [len({**part.coordinates, **part.variables}[of].data) for part in parts]
+    return Variable((dim,), np.repeat(np.array(names, str), counts))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import html
 import io
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import MissingExtra
+from flipflow.io import spreadsheet
 from flipflow.io.labelled import Arrays, Variable
 
 if TYPE_CHECKING:
@@ -88,11 +88,8 @@ def _label(arrays: Arrays, dim: str, place: int) -> str:
 def csv_text(arrays: Arrays) -> str:
     """The table as CSV with units in its heading; a complex number is two columns."""
     columns = [part for name, one in table_columns(arrays) for part in _real_parts(name, one)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([f"{name} [{one.units}]" if one.units else name for name, one in columns])
-    writer.writerows(zip(*(one.data.tolist() for _, one in columns), strict=True))
-    return text.getvalue()
+    heads = [f"{name} [{one.units}]" if one.units else name for name, one in columns]
+    return spreadsheet.csv_text(heads, zip(*(one.data.tolist() for _, one in columns), strict=True))
 
 
 def netcdf_bytes(arrays: Arrays) -> bytes:

@@ -103,6 +103,16 @@ def checked_speeds(
     return speeds
 
 
+def refuse_pair(name: str, values: object) -> None:
+    """A tuple of two is an interval elsewhere, and would here be two values: it is refused."""
+    if isinstance(values, tuple) and len(values) == 2:
+        low, high = values
+        remedy = (
+            f"a pair is an interval elsewhere; give an array, as np.linspace({low}, {high}, 21)"
+        )
+        raise InputError(name, values, remedy)
+
+
 def checked_pair(name: str, value: object, remedy: str) -> tuple[float, float]:
     """Two numbers, infinite and missing ones too."""
     pair = checked_reals(name, value, remedy)

@@ -377,7 +377,7 @@ def _of_coordinate(which: Coordinate, part: Part) -> Quantity:
     """Amplitude or phase of one coordinate."""
     unit, shown_unit, symbol, sentence = _READ[part]
     named = isinstance(which, str)
-    words = which if isinstance(which, str) else f"x{which + 1}"
+    words = which if isinstance(which, str) else f"x[{which}]"
     return Quantity(
         f"{which}_{part}" if named else f"{part}[{which}]", f"{part} of {words}",
         symbol.format(words), unit, shown_unit, sentence, coordinate=which, part=part,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from flipflow.errors import InputError, MissingExtra
 from flipflow.model.system import Coordinate
 from flipflow.plotting.dispatch import figure
+from flipflow.plotting.layout import MARKS, mark_size
 from flipflow.plotting.palette import MARKERS
 from flipflow.plotting.panels import Panel, Trace
 
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DASHES = {"unstable": "--", "undetermined": ":"}
-FEW = 200  # points of a cloud up to which they are drawn as large marks
 
 
 def draw_on(
@@ -65,8 +65,10 @@ def _draw_trace(axes: Axes, trace: Trace, colours: dict[str, Any]) -> None:
     style: dict[str, Any] = {"label": name}
     if trace.role == "point":
         hollow = (trace.symbol or "").endswith("-open")
-        mark = MARKERS.get(trace.symbol or "circle", "o") if trace.x.size <= FEW else ","
+        mark = MARKERS.get(trace.symbol or "circle", "o")
         style |= {"ls": "none", "marker": mark} | ({"mfc": "none"} if hollow else {})
+        if trace.x.size > MARKS:
+            style |= {"ms": mark_size(trace.x.size), "mew": 0.0, "marker": "o"}
     else:
         style["ls"] = DASHES.get(trace.role, "-")
     if trace.colour in colours:

@@ -11,7 +11,7 @@ from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
 
 DRAWN: tuple[tuple[Direction, str, str, str], ...] = (
-    ("up", "rising", "main", "circle"), ("down", "falling", "floating", "cross"),
+    ("up", "rising", "main", "circle"), ("down", "falling", "floating", "square"),
 )  # fmt: skip
 
 
@@ -34,7 +34,7 @@ def bifurcation_figure(diagram: BifurcationDiagram, which: Coordinate | None = N
             if x.size:
                 traces.append(
                     Trace(word, values * scale, x * MM, "point", colour, symbol,
-                          legend=row == 0, x_also=also)
+                          legend=row == 0, bold=direction == "up", x_also=also)
                 )  # fmt: skip
         panels.append(Panel(axis, Axis(label(name), "mm"), tuple(traces), bands=bands))
     caption = (

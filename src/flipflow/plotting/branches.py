@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from flipflow.plotting.response import (
     label,
     special_point_traces,
     speed_axis,
+    stability_key,
 )
 from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.units import speed_of
@@ -68,6 +69,7 @@ def branches_figure(branches: Sequence[Branch], which: Coordinate | None = None)
             branch_name(branch), curve, curve.amplitude * MM, colour=case_colour(k),
             symbol=case_symbol(k), bold=k == 0,
         )  # fmt: skip
+    traces += stability_key(traces)
     traces += special_point_traces([p for b in branches for p in b.special_points], which)
     top = max(float(curve.amplitude.max()) for curve in curves) * MM
     omega = np.concatenate([curve.omega for curve in curves])
@@ -87,7 +89,7 @@ def branch_name(branch: Branch) -> str:
     periods = "1 period" if branch.periods == 1 else f"{branch.periods} periods"
     met = [point for point in branch.special_points if point.position < 0.0]
     if met:
-        return f"{periods}, branches off at {speed_of(branch, met[0].omega)}"
+        return f"{periods}, from {speed_of(branch, met[0].omega)}"
     if branch.status is BranchStatus.CLOSED:
         return f"{periods}, closed"
     if branch.status is BranchStatus.FOLLOWED:
@@ -97,40 +99,51 @@ def branch_name(branch: Branch) -> str:
 
 
 def field_branch_figure(branch: FieldBranch, which: Coordinate | None = None) -> Figure:
-    """Relative amplitude over a field; of a curve of folds the jump speed, too."""
+    """Amplitude over a field; of a curve of folds first the frequency, then the amplitude."""
     if not branch.orbits:
         raise InputError("result", "a branch without points", branch.status.value)
     words = branch.field.replace("_", " ")
     axis, scale = field_axis(branch.field, branch.values)
-    x = branch.values * scale
     system = branch.machine.system()
     named = which is None and "relative" in system.coordinates
     (which,) = coordinates(system, which or ("relative" if named else 0))
-    amplitude = branch.amplitude(which)
-    curve = Curve(branch.values, amplitude, amplitude, branch.stability)
-    traces = [
-        Trace(label(which), x[run], amplitude[run] * MM, role, bold=True)  # type: ignore[arg-type]
-        for role, run in curve.runs()
-    ]
-    for kind in dict.fromkeys(point.kind for point in branch.special_points):
-        points = branch.points_of(kind)
-        at = np.array([point.value for point in points]) * scale
-        heights = np.array([point.amplitude(which) for point in points]) * MM
-        traces.append(
-            Trace(KIND_WORDS.get(kind, kind), at, heights, "point", "jump",
-                  symbol=KIND_SYMBOLS.get(kind, "square-open"))
-        )  # fmt: skip
-    height = Axis(
-        "amplitude (|x2|)" if named else "amplitude",
-        "mm",
-        (0.0, 1.08 * MM * float(amplitude.max())),
-    )
-    panels = [Panel(axis, height, traces=tuple(traces))]
-    if np.ptp(branch.omega) > 0.0:
-        speed = Trace("speed of the fold", x, branch.omega * RPM, colour="main")
-        panels.append(Panel(axis, Axis("shaft speed", "rpm"), traces=(speed,)))
+    of_folds = bool(np.ptp(branch.omega) > 0.0)
+    height = np.array([point.amplitude(which) for point in branch.special_points]) * MM
+    amplitude = branch.amplitude(which) * MM
+    title = f"amplitude, {label(which)}"
+    bounds = None if of_folds else (0.0, 1.08 * float(amplitude.max()))
+    drawn = [(Axis(title, "mm", bounds), amplitude, height)]
+    if of_folds:
+        speed = np.array([point.omega for point in branch.special_points]) * RPM
+        drawn.insert(0, (Axis("shaft speed", "rpm"), branch.omega * RPM, speed))
+    name = "fold" if of_folds else label(which)
+    panels = []
+    for k, (upwards, y, at_points) in enumerate(drawn):
+        curve = Curve(branch.values, y, y, branch.stability)
+        # On a curve of folds every motion is on the edge.
+        runs = [("motion", slice(None))] if of_folds else list(curve.runs())
+        traces = [
+            Trace(name, branch.values[run] * scale, y[run], role, bold=True, legend=k == 0)  # type: ignore[arg-type]
+            for role, run in runs
+        ]
+        marks = _field_points(branch, at_points, scale, legend=k == 0)
+        panels.append(Panel(axis, upwards, (*traces, *stability_key(traces), *marks)))
     caption = f"Half the peak-to-peak motion as {words} is changed."
-    return Figure(f"Motions over {words}", caption, tuple(panels))
+    if of_folds:
+        caption = f"Speed and half the peak-to-peak motion at the fold as {words} is changed."
+    return Figure(f"{'Folds' if of_folds else 'Motions'} over {words}", caption, tuple(panels))
+
+
+def _field_points(branch: FieldBranch, y: Real, scale: float, *, legend: bool) -> Iterator[Trace]:
+    """Marks at special points over the field, one entry of the legend for each kind."""
+    kinds = np.array([point.kind for point in branch.special_points])
+    values = np.array([point.value for point in branch.special_points]) * scale
+    for kind in dict.fromkeys(kinds.tolist()):
+        at = kinds == kind
+        yield Trace(
+            KIND_WORDS.get(kind, kind), values[at], y[at], "point", "jump",
+            symbol=KIND_SYMBOLS.get(kind, "square-open"), legend=legend,
+        )  # fmt: skip
 
 
 def field_axis(name: str, values: Real) -> tuple[Axis, float]:

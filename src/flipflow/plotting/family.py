@@ -14,7 +14,7 @@ from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
-from flipflow.plotting.response import coordinates, curve_traces, label
+from flipflow.plotting.response import NOWHERE, coordinates, curve_traces, label, stability_key
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
 
@@ -72,7 +72,7 @@ def branch_traces(
     legend: bool = True,
     bold: bool = False,
 ) -> Iterator[Trace]:
-    """One coordinate of a branch over rad/s, its folds as circles."""
+    """One coordinate of a branch over rad/s, its folds as crosses."""
     curve = Curve.of(branch, which)
     yield from curve_traces(
         name, curve, curve.amplitude * MM, colour=case_colour(index), symbol=case_symbol(index),
@@ -156,10 +156,13 @@ def _panel(
         traces += beneath_traces(BALANCE, member.branch, which, legend=first and k == 0)
     for k, (member, words) in enumerate(zip(members, labels, strict=True)):
         traces += branch_traces(words, member.branch, which, k, legend=first)
-    ends = [member.branch.omega for member in members]
     top = max(float(trace.y.max()) for trace in traces)
+    if first:
+        traces += stability_key(traces)
+        if any(member.branch.folds for member in members):
+            traces.append(Trace("fold", NOWHERE, NOWHERE, "point", "gap", "cross"))
     return Panel(
-        speed_axis_in_radians(0.0, max(float(omega.max()) for omega in ends)),
+        speed_axis_in_radians(0.0, max(float(one.branch.omega.max()) for one in members)),
         Axis("amplitude", "mm", (0.0, 1.06 * top)), tuple(traces), title=label(which),
     )  # fmt: skip
 

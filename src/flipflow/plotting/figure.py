@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flipflow.plotting.files import write_rendered
+from flipflow.plotting.layout import arrange, beside_panels
 from flipflow.plotting.panels import PanelGrid
 
 COLUMN = 250.0  # pixels that a column of panels needs at least
-ASPECT, LOWEST = 0.72, 190.0  # height of a panel over its width, and its least height in pixels
+ASPECT, LOWEST = 0.66, 70.0  # height of a panel over its width, and its least height in pixels
+PAGE_HEIGHT = 870.0  # pixels, 230 mm: a figure and its caption on a page
 FORMATS = (".html", ".svg", ".pdf", ".png")
 
 
@@ -21,15 +23,16 @@ class Figure(PanelGrid):
     def narrowed(self, width: float) -> Figure:
         """The same figure at another width in pixels, panels below each other where it is narrow.
 
-        A panel is as high as two thirds of its width, unless it was lower.
+        A panel is as high as two thirds of its width, unless it was lower or a page has less room.
         """
         columns = self.columns if width >= COLUMN * self.columns else 1
-        rows = -(-len(self.panels) // columns)
-        was = self.height / -(-len(self.panels) // self.columns)
-        row = min(was, max(width / columns * ASPECT, LOWEST))
         shares = self.shares if columns == self.columns else ()
-        height = int(row * rows)
-        return replace(self, width=width, columns=columns, shares=shares, height=height)
+        figure = replace(self, width=width, columns=columns, shares=shares)
+        rows, beside = -(-len(self.panels) // columns), beside_panels(figure, even=False)
+        widest = max(rect.width for rect in arrange(figure).rects)
+        was = arrange(self, even=False).rects[0].height
+        each = min(was, ASPECT * widest, (PAGE_HEIGHT - beside) / rows)
+        return replace(figure, height=round(beside + rows * max(each, LOWEST)))
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the figure to a file, in the format its ending names.
@@ -55,6 +58,10 @@ class Figure(PanelGrid):
             When matplotlib is needed and not installed.
         """
         return write_rendered(path, FORMATS, self._rendered)
+
+    def _repr_svg_(self) -> str:
+        """What a notebook shows."""
+        return self._rendered(".svg").decode()
 
     def _rendered(self, ending: str) -> bytes:
         if ending == ".html":

@@ -26,9 +26,8 @@ def foundation_figure(loads: FoundationLoads) -> Figure:
     ticks = tuple((float(len(rows) - 1 - k), name) for k, (name, _) in enumerate(rows))
     top = 1.1 * max((bar.high for bar in bars), default=1.0)
     panel = Panel(
-        Axis("greatest dynamic force, all supports", "kN", (0.0, top)),
+        Axis("greatest dynamic force", "kN", (0.0, top)),
         Axis("", "", (-0.6, len(rows) - 0.4), ticks), bars=tuple(bars),
     )  # fmt: skip
-    return Figure(
-        "Loads on the foundation", " ".join(loads.notes), (panel,), 1, 80 + 44 * len(rows)
-    )
+    caption = " ".join(["All supports together.", *loads.notes])
+    return Figure("Loads on the foundation", caption, (panel,), 1, 80 + 44 * len(rows))

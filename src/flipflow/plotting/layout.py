@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from flipflow.plotting.panels import PAGE_WIDTH, Line, Panel, PanelGrid
 
 PIXELS_A_MM = 96.0 / 25.4
-FONT = 11
-CHARACTER = 5.9
+FONT = 32.0 / 3.0  # 8 point
+CHARACTER = 6.3
 LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
 BOTTOM, LEFT, RIGHT = 40, 58, 14
 BARE_GAP, ROW_GAP = 26, 48
 LEGEND_MARK = 42
+LARGEST, SMALLEST, MARKS = 5.0, 0.8, 30  # marks in points; up to how many they are large
 SIDES = {0.0: "left", 1.0: "right"}  # flush ends of a horizontal line's label
 
 
@@ -56,17 +60,13 @@ class Geometry:
     titles: tuple[float, ...]
 
 
-def arrange(figure: PanelGrid) -> Geometry:
-    """Lay out a figure in its width."""
-    columns = figure.columns
-    rows = [figure.panels[k : k + columns] for k in range(0, len(figure.panels), columns)]
-    spans = list(_columns(rows, figure.shares or (1.0,) * columns, figure.width))
-    legend = LEGEND_ROW * legend_rows(figure)
+def arrange(figure: PanelGrid, *, even: bool = True) -> Geometry:
+    """Lay out a figure in its width; the columns of the legend are ``even`` in plotly.js alone."""
+    rows, spans = _grid(figure)
     heads = [_head(row, spans) for row in rows]
-    room = figure.height - legend - sum(heads) - BOTTOM - ROW_GAP * (len(rows) - 1)
-    height = max(room / len(rows), 20.0)
+    height = max((figure.height - beside_panels(figure, even=even)) / len(rows), 20.0)
     rects, labels, titles = [], [], []
-    top = float(legend)
+    top = float(LEGEND_ROW * legend_rows(figure, even=even))
     for row, head in zip(rows, heads, strict=True):
         top += head
         for panel, (left, width) in zip(row, spans, strict=False):
@@ -75,6 +75,43 @@ def arrange(figure: PanelGrid) -> Geometry:
             titles.append(head - 6.0 - TITLE_ROW)
         top += height + ROW_GAP
     return Geometry(tuple(rects), tuple(labels), tuple(titles))
+
+
+def beside_panels(figure: PanelGrid, *, even: bool = True) -> float:
+    """Height that legend, labels, titles and axes take, all but the panels themselves."""
+    rows, spans = _grid(figure)
+    legend = LEGEND_ROW * legend_rows(figure, even=even)
+    heads = sum(_head(row, spans) for row in rows)
+    return legend + heads + BOTTOM + ROW_GAP * (len(rows) - 1)
+
+
+def mark_size(count: int) -> float:
+    """Size of each of so many marks in points: a cloud shows its structure."""
+    return min(LARGEST, max(SMALLEST, LARGEST * MARKS / max(count, 1)))
+
+
+def fitted(panel: Panel, width: float) -> Panel:
+    """The panel with room for its words: at the ends of bars, and of notes within the axes."""
+    if panel.x.bounds is None:
+        return panel
+    low, high = panel.x.bounds
+    for bar in panel.bars:
+        share = 1.0 - _length(bar.text, width)
+        if bar.text and share > 0.0:
+            high = max(high, low + (bar.high - low) / share)
+    notes = tuple(
+        dataclasses.replace(note, x=min(note.x, high - _length(note.text, width) * (high - low)))
+        if note.anchor == "left"
+        else note
+        for note in panel.notes
+    )
+    axis = dataclasses.replace(panel.x, bounds=(low, high))
+    return dataclasses.replace(panel, x=axis, notes=notes)
+
+
+def _length(text: str, width: float) -> float:
+    """Length of a text and of a blank, as a share of the width."""
+    return CHARACTER * (max(map(len, text.split("<br>"))) + 1) / width
 
 
 def legend_names(figure: PanelGrid) -> list[str]:
@@ -92,13 +129,21 @@ def within(text: str, width: int, lines: int = 1) -> str:
 
 
 def legend_columns(figure: PanelGrid) -> int:
-    """Entries of the legend in a row."""
-    return _entries_in_a_row(legend_names(figure), figure.width)
+    """Columns of the legend, each as wide as its own entries, filled from the left."""
+    names = legend_names(figure)
+    for columns in range(len(names), 1, -1):
+        parts = np.array_split([len(name) for name in names], columns)
+        if sum(LEGEND_MARK + CHARACTER * part.max() for part in parts) <= figure.width - RIGHT:
+            return columns
+    return 1
 
 
-def legend_rows(figure: PanelGrid) -> int:
+def legend_rows(figure: PanelGrid, *, even: bool = True) -> int:
     """Rows the legend needs; none where there is one entry only."""
-    return legend_lines(legend_names(figure), figure.width)
+    names = legend_names(figure)
+    if even or len(names) < 2:
+        return legend_lines(names, figure.width)
+    return math.ceil(len(names) / legend_columns(figure))
 
 
 def legend_lines(names: Sequence[str], width: float = PAGE_WIDTH) -> int:
@@ -152,6 +197,15 @@ def _labels_height(labels: dict[int, Label]) -> float:
     return float(LABEL_ROW * (max(one.level for one in labels.values()) + 1)) if labels else 0.0
 
 
+def _grid(
+    figure: PanelGrid,
+) -> tuple[list[tuple[Panel, ...]], list[tuple[float, float]]]:
+    """Panels row by row; left edge and width of each column."""
+    columns = figure.columns
+    rows = [figure.panels[k : k + columns] for k in range(0, len(figure.panels), columns)]
+    return rows, list(_columns(rows, figure.shares or (1.0,) * columns, figure.width))
+
+
 def _head(row: Sequence[Panel], spans: Sequence[tuple[float, float]]) -> float:
     """Height above the axes of a row for labels and titles."""
     labels = max(
@@ -183,5 +237,6 @@ def _left(panel: Panel) -> float:
     """Room for the labels of the y axis."""
     if panel.y.ticks:
         lines = (line for _, word in panel.y.ticks for line in word.splitlines())
-        return 14.0 + CHARACTER * max(map(len, lines), default=0)
+        title = TITLE_ROW if panel.y.title else 0.0
+        return 14.0 + title + CHARACTER * max(map(len, lines), default=0)
     return float(LEFT if panel.y.title else BARE_GAP)

@@ -12,7 +12,7 @@ from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.studies.loading import LoadedMachine, Loading, RegionChange
 
-WORDS = {"unloaded": "region of the empty machine", "loaded": "from the loaded machine's region"}
+WORDS = {"unloaded": "empty", "loaded": "loaded"}
 
 
 def loading_figure(loading: Loading, title: str = "", beneath: Loading | None = None) -> Figure:
@@ -44,8 +44,8 @@ def loading_figure(loading: Loading, title: str = "", beneath: Loading | None = 
     ]
     caption = (
         "Half the peak-to-peak motion; green: operating region of the empty machine. Right: loaded "
-        "minus empty over that region, with the paper's straight line through its ends and the "
-        "line of least squares."
+        "minus empty over that region, with straight lines through its ends, as in the paper, and "
+        "of least squares; the same over what the loaded machine's region leaves of it."
     )
     return Figure(
         title or "What the load does to the relative amplitude", caption, tuple(panels),
@@ -110,7 +110,7 @@ def _lines(region: RegionChange, *, legend: bool) -> Iterator[Trace]:
              ("least squares", region.line_of_least_squares, "dot", None))  # fmt: skip
     for kind, line, style, symbol in kinds:
         yield Trace(
-            f"{WORDS[region.start]}: {kind}", ends,
+            f"{WORDS[region.start]} region: {kind}", ends,
             (line.intercept + line.slope * (ends - region.lower)) * MM, "motion", colour,
             symbol=symbol, dash=style, legend=legend,
         )  # fmt: skip

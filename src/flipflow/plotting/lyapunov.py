@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from flipflow.model.screen import unit_in
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
+from flipflow.plotting.scales import MINUS
 from flipflow.studies.lyapunov import LyapunovExponents
 
 MOST_SHOWN = 6  # exponents that are drawn
@@ -21,10 +24,10 @@ def lyapunov_figure(result: LyapunovExponents) -> Figure:
     means = np.cumsum(result.batches, axis=0) / count[:, None]
     traces, unit = [], unit_in(result.machine, "1/s")
     for k in range(shown):
-        value, error = result.exponents[k], result.standard_error[k]
+        name = _with_error(result.exponents[k], result.standard_error[k])
         traces.append(
-            Trace(f"{value:.4g} +- {error:.2g}{unit}", periods, means[:, k], "stable",
-                  case_colour(k), case_symbol(k), bold=k == 0)
+            Trace(f"{name}{unit}", periods, means[:, k], "stable", case_colour(k), case_symbol(k),
+                  bold=k == 0)
         )  # fmt: skip
     panel = Panel(
         Axis("forcing periods", ""), Axis("Lyapunov exponents", "1/s"), tuple(traces),
@@ -36,3 +39,11 @@ def lyapunov_figure(result: LyapunovExponents) -> Figure:
         "that repeats. The legend gives the final values with their standard errors."
     )
     return Figure("Lyapunov exponents", caption, (panel,), height=340)
+
+
+def _with_error(value: float, error: float) -> str:
+    """A value and its standard error, to the second digit of the error."""
+    if not (math.isfinite(value) and math.isfinite(error) and error > 0.0):
+        return f"{value:.4g}"
+    decimals = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}".replace("-", MINUS)

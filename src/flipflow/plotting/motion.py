@@ -63,7 +63,7 @@ def orbit_figure(orbit: Orbit, which: Coordinate | None = None) -> Figure:
     name = label(chosen)
     panels = (
         Panel(
-            _shaft(), Axis(f"{name} displacement", "mm"), (_in_time(orbit, chosen, name),),
+            _shaft(), Axis(name, "mm"), (_in_time(orbit, chosen, name),),
             bands=tuple(contact_bands(orbit)), lines=lines,
         ),
         Panel(
@@ -84,7 +84,7 @@ def orbits_in_time_figure(orbits: Sequence[Orbit], which: Coordinate | None = No
     pairs = list(enumerate(zip(orbits, words, strict=True)))
     panels = (
         Panel(
-            _shaft(), Axis(f"{label(chosen)} displacement", "mm"),
+            _shaft(), Axis(label(chosen), "mm"),
             tuple(_in_time(orbit, chosen, word, k) for k, (orbit, word) in pairs),
         ),
         Panel(

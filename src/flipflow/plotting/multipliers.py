@@ -17,6 +17,7 @@ from flipflow.plotting.scales import RPM
 
 Complex = NDArray[np.complex128]
 MOST_SHOWN = 6
+WIDEST = 1.6  # of the plane around the unit circle
 CIRCLE = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))
 
 
@@ -37,14 +38,16 @@ def multipliers_figure(branch: Branch | FieldBranch) -> Figure:
         ways.append(Trace(name, mu.real, mu.imag, colour=colour, legend=False))
     ends = 1.05 * max(1.0, float(np.abs(tracked).max(initial=1.0)))
     left = Panel(axis, Axis("|multiplier|", "", (0.0, ends)), tuple(sizes), lines=(Line("y", 1.0),))
+    wide = min(ends, WIDEST)
     right = Panel(
-        Axis("real part", "", (-ends, ends)), Axis("imaginary part", "", (-ends, ends)),
+        Axis("real part", "", (-wide, wide)), Axis("imaginary part", "", (-wide, wide)),
         tuple(ways), equal=True,
     )  # fmt: skip
     caption = (
         "Factors by which small disturbances grow over a period; each line is one multiplier, "
         "followed along the branch. Below 1 the motion returns."
         + (f" The {MOST_SHOWN} that grow largest." if largest.size > MOST_SHOWN else "")
+        + (f" The plane ends at {WIDEST}." if ends > WIDEST else "")
     )
     return Figure("Multipliers", caption, (left, right), 2, 320, (0.6, 0.4))
 

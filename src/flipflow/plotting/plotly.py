@@ -24,7 +24,9 @@ from flipflow.plotting.layout import (
     Label,
     Rect,
     arrange,
+    fitted,
     legend_names,
+    mark_size,
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, STABILITY_WORDS, TINTS
 from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
@@ -34,6 +36,7 @@ FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 SYMBOLS = {"triangle": "triangle-up", "triangle-open": "triangle-down-open", "cross": "x-thin-open"}
 VEIL = "rgba(255,255,255,0.85)"  # behind words that lines may cross
 MARKS_SHOWN = 9
+PIXELS_A_POINT = 1.4  # on a screen marks are somewhat larger than in print
 # The bar of tools would cover the legend; zoom, pan and reset work with the mouse alone.
 CONFIG = {"displayModeBar": False, "displaylogo": False, "responsive": False, "showTips": False}
 START = """
@@ -91,6 +94,7 @@ def described(figure: PanelGrid) -> Json:
     layout = _frame(figure)
     for k, (panel, rect) in enumerate(zip(figure.panels, geometry.rects, strict=True)):
         key = "" if k == 0 else str(k + 1)
+        panel = fitted(panel, rect.width)  # noqa: PLW2901
         layout[f"xaxis{key}"] = _axis(panel.x, rect, figure, key, across=True)
         layout[f"yaxis{key}"] = _axis(panel.y, rect, figure, key, across=False)
         if panel.equal:
@@ -183,8 +187,16 @@ def _cells(cells: Cells, key: str) -> Json:
 
 def _look(trace: Trace, colour: str) -> Json:
     if trace.role == "point":
-        mark = {"symbol": SYMBOLS.get(trace.symbol or "", trace.symbol), "size": 7, "color": colour}
-        return {"mode": "markers", "marker": mark | {"line": {"width": 1.5, "color": colour}}}
+        size = PIXELS_A_POINT * mark_size(trace.x.size)
+        mark = {
+            "symbol": SYMBOLS.get(trace.symbol or "", trace.symbol),
+            "size": size,
+            "color": colour,
+        }
+        return {
+            "mode": "markers",
+            "marker": mark | {"line": {"width": size / 5.0, "color": colour}},
+        }
     width = 6.0 if trace.role == "beneath" else 2.2 if trace.bold else 1.4
     look: Json = {
         "mode": "lines",

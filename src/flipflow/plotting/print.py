@@ -16,10 +16,21 @@ from flipflow.plotting.layout import (
     Geometry,
     Label,
     arrange,
+    fitted,
     legend_columns,
     legend_names,
+    mark_size,
 )
-from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, MARKERS, TINTS
+from flipflow.plotting.palette import (
+    COLOURS,
+    DASHES,
+    FAINT,
+    FILLS,
+    INK,
+    MARKERS,
+    SYMBOLS,
+    TINTS,
+)
 from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
 
 if TYPE_CHECKING:
@@ -28,10 +39,13 @@ if TYPE_CHECKING:
 
 PIXELS_AN_INCH = 96.0
 POINT = 72.0 / PIXELS_AN_INCH
-RESOLUTION = 200
+RESOLUTION = 300
 DATE = {"pdf": "CreationDate", "svg": "Date"}
 STYLES = {"dash": (0, (5, 2.5)), "dot": (0, (1, 2)), "dashdot": (0, (5, 2, 1, 2)), "solid": "-"}
-MARKS_SHOWN = 9
+MARKS_APART = 0.15  # along a line, as a share of the panel's diagonal
+EDGE = 1.0  # pixels between a figure's edge and what is written
+LEAST_IN_LEGEND = 3.0  # points; a mark of a cloud would not be seen there
+OVERLAID = 1.8  # how much larger a bold mark is, which others are laid over
 VEIL = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0}
 FAMILIES = ("Arial", "Liberation Sans", "DejaVu Sans")
 STYLE = {
@@ -95,21 +109,42 @@ def font_folder() -> str:
     return str(Path(mpl.get_data_path()) / "fonts" / "ttf")
 
 
-def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
-    import matplotlib as mpl  # noqa: PLC0415  slow to import
-    from matplotlib.figure import Figure as Sheet  # noqa: PLC0415
+def drawn_sheet(figure: PanelGrid) -> Sheet:
+    """The figure as a sheet of matplotlib, in the style that is set."""
+    from matplotlib.figure import Figure as Sheet  # noqa: PLC0415  slow to import
 
     foot = subject_lines(figure)
     height = figure.height + LABEL_ROW * len(foot)
+    size = (figure.width / PIXELS_AN_INCH, height / PIXELS_AN_INCH)
+    sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
+    _draw(sheet, figure, arrange(figure, even=False), height)
+    if foot:
+        sheet.text(3.0 / figure.width, 3.0 / height, "\n".join(foot), color=COLOURS["mark"],
+                   va="bottom")  # fmt: skip
+    _keep_within(sheet)
+    return sheet
+
+
+def _keep_within(sheet: Sheet) -> None:
+    """Move the left edge of panels whose ticks are so long that the axis' title is cut off."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  slow to import
+
+    canvas: Any = FigureCanvasAgg(sheet)
+    renderer = canvas.get_renderer()
+    for axes in sheet.axes:
+        words = axes.yaxis.get_tightbbox(renderer)
+        if words is not None and words.x0 < EDGE:
+            place, beyond = axes.get_position(), (EDGE - words.x0) / sheet.bbox.width
+            axes.set_position((place.x0 + beyond, place.y0, place.width - beyond, place.height))
+
+
+def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
+    import matplotlib as mpl  # noqa: PLC0415  slow to import
+
     buffer = io.BytesIO()
     style: Any = {**STYLE, **own}
     with mpl.rc_context(style):
-        size = (figure.width / PIXELS_AN_INCH, height / PIXELS_AN_INCH)
-        sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
-        _draw(sheet, figure, arrange(figure), height)
-        if foot:
-            sheet.text(3.0 / figure.width, 3.0 / height, "\n".join(foot), color=COLOURS["mark"],
-                       va="bottom")  # fmt: skip
+        sheet = drawn_sheet(figure)
         undated = {DATE[form]: None} if form in DATE else {}
         sheet.savefig(buffer, format=form, dpi=RESOLUTION, metadata=undated)
     return buffer.getvalue()
@@ -135,16 +170,18 @@ def _draw(sheet: Sheet, figure: PanelGrid, geometry: Geometry, height: float) ->
         foot = height - rect.top - rect.height
         place = (rect.left / figure.width, foot / height, rect.width / figure.width,
                  rect.height / height)  # fmt: skip
-        axes = sheet.add_axes(place)
-        _draw_panel(axes, panel, handles)
-        _draw_labels(axes, panel, geometry, k)
+        axes, shown = sheet.add_axes(place), fitted(panel, rect.width)
+        _draw_panel(axes, shown, handles)
+        _draw_labels(axes, shown, geometry, k)
     names = legend_names(figure)
     if len(names) > 1:
-        sheet.legend(
+        legend = sheet.legend(
             [handles[name] for name in names], names, loc="upper left", frameon=False,
             bbox_to_anchor=(0.0, 1.0), ncols=legend_columns(figure),
             borderaxespad=0.2, handlelength=2.4, columnspacing=1.2,
         )  # fmt: skip
+        for line in legend.get_lines():
+            line.set_markersize(max(line.get_markersize(), LEAST_IN_LEGEND))
 
 
 def _draw_panel(axes: Axes, panel: Panel, handles: dict[str, Any]) -> None:
@@ -184,14 +221,23 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
     style: dict[str, Any] = {"color": colour}
     hollow = (trace.symbol or "").endswith("-open")
     if trace.role == "point":
-        style |= {"ls": "none", "ms": 5.0, "zorder": 3.0, "mfc": "none" if hollow else colour}
+        size = mark_size(trace.x.size) * (OVERLAID if trace.bold else 1.0)
+        style |= {"ls": "none", "ms": size, "mew": min(1.0, size / 4.0), "zorder": 3.0,
+                  "mfc": "none" if hollow else colour}  # fmt: skip
     else:
         beneath = trace.role == "beneath"
         style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
                   "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
-                  "markevery": max(trace.x.size // MARKS_SHOWN, 1)}  # fmt: skip
+                  "markevery": _marks(trace.symbol)}  # fmt: skip
     (handle,) = axes.plot(trace.x, trace.y, marker=MARKERS.get(trace.symbol or "", ""), **style)
     handles.setdefault(trace.name, handle)
+
+
+def _marks(symbol: str | None) -> tuple[float, float] | None:
+    """Where marks begin on a line, and how far apart: those of lines that coincide alternate."""
+    if not symbol:
+        return None
+    return MARKS_APART * SYMBOLS.index(symbol) / len(SYMBOLS), MARKS_APART
 
 
 def _draw_cells(axes: Axes, cells: Cells) -> None:

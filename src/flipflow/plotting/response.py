@@ -17,7 +17,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_ROW, legend_rows, within
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
 from flipflow.plotting.panels import Arrow, Axis, Band, Line, Panel, Trace
-from flipflow.plotting.scales import DEGREES, HZ, MM, RPM, SPEEDS
+from flipflow.plotting.scales import DEGREES, HZ, MINUS, MM, RPM, SPEEDS
 from flipflow.studies.assessment import Assessment
 
 Real = NDArray[np.float64]
@@ -35,6 +35,7 @@ BAND_POINTS = 300
 ROWS, ROW_HEIGHT = 5, 186  # of load cases one below the other on a page, pixels
 OTHER_CASES, LEGEND_LETTERS = "the other load cases", 48
 NEAR = 0.35
+NOWHERE = np.array([np.nan])
 MOST_COORDINATES = CASES
 LEGEND_WITHIN = 2  # rows of the legend of all load cases that its height has room for
 READING = (
@@ -76,7 +77,8 @@ def branch_figure(
     jumps = curves[-1].jumps()
     top = Panel(
         axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
-        traces=(*amplitude, *points), lines=(*_working(omega), *_jump_lines(jumps)),
+        traces=(*amplitude, *stability_key(amplitude), *points),
+        lines=(*_working(omega), *_jump_lines(jumps)),
         arrows=_arrows(jumps),
     )  # fmt: skip
     bottom = Panel(
@@ -283,6 +285,13 @@ def curve_traces(
         legend = False
 
 
+def stability_key(traces: Sequence[Trace]) -> Iterator[Trace]:
+    """Entries of the legend that say what dashed and dotted lines are, where there are any."""
+    for role in ("unstable", "undetermined"):
+        if any(trace.role == role for trace in traces):
+            yield Trace(role, NOWHERE, NOWHERE, role, "gap")
+
+
 def special_point_traces(
     special_points: Sequence[SpecialPoint], which: Coordinate
 ) -> Iterator[Trace]:
@@ -392,7 +401,7 @@ def _phase_axis(curves: Sequence[Curve]) -> Axis:
     high = max(float(curve.phase.max()) for curve in curves) * DEGREES
     step = 90.0 if high - low < 600.0 else 180.0
     first, last = math.floor(low / step + 0.1), math.ceil(high / step - 0.1)
-    ticks = tuple((k * step, f"{k * step:.0f}") for k in range(first, last + 1))
+    ticks = tuple((k * step, f"{k * step:.0f}".replace("-", MINUS)) for k in range(first, last + 1))
     margin = 0.04 * (high - low)
     bounds = (min(low - margin, first * step), max(high + margin, last * step))
     return Axis("phase", "deg", bounds, ticks)

@@ -11,5 +11,6 @@ HZ = 0.5 / math.pi
 MM = 1e3
 KN = 1e-3
 DEGREES = 180.0 / math.pi
+MINUS = "\N{MINUS SIGN}"  # as matplotlib writes it
 
 SPEEDS = {"rpm": RPM, "Hz": HZ, "rad/s": 1.0}

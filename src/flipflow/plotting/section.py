@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
@@ -11,8 +12,10 @@ from flipflow.plotting.response import coordinates, label
 from flipflow.plotting.scales import HZ, MM
 from flipflow.studies.poincare import Section, Spectrum
 
+Real = NDArray[np.float64]
 MOST_HARMONICS = 6.0
 DECADES = 6.0
+LEAST_SPAN = 0.02  # on either side of points that coincide, as a share of their value
 
 
 def section_figure(section: Section, which: Coordinate | None = None) -> Figure:
@@ -21,7 +24,8 @@ def section_figure(section: Section, which: Coordinate | None = None) -> Figure:
     for name in coordinates(section.system, which):
         x, v = section.displacement(name) * MM, section.velocity(name)
         points = Trace("once a turn", x, v, "point", symbol="circle", legend=False)
-        panels.append(Panel(Axis(label(name), "mm"), Axis("velocity", "m/s"), (points,)))
+        across, upwards = Axis(label(name), "mm", _around(x)), Axis("velocity", "m/s", _around(v))
+        panels.append(Panel(across, upwards, (points,)))
     caption = (
         f"{section.states.shape[0]} turns, a point whenever the unbalance points along +x. A "
         "motion that repeats after n turns shows n points, one that never repeats "
@@ -29,6 +33,13 @@ def section_figure(section: Section, which: Coordinate | None = None) -> Figure:
     )
     columns = min(len(panels), 3)
     return Figure("Poincare section", caption, tuple(panels), columns=columns, height=260)
+
+
+def _around(values: Real) -> tuple[float, float]:
+    """Ends of an axis around points; those of a motion that repeats differ by rounding alone."""
+    low, high = float(values.min()), float(values.max())
+    margin = max(0.06 * (high - low), LEAST_SPAN * max(abs(low), abs(high))) or 1.0
+    return low - margin, high + margin
 
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:

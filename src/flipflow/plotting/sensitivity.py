@@ -14,7 +14,8 @@ from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
-from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
+from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
+from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
 Real = NDArray[np.float64]
@@ -173,7 +174,7 @@ def _row(result: Sensitivity | OneAtATime, i: int) -> str:
     if not isinstance(nominal, float) or not np.isfinite(nominal) or nominal == 0.0:
         return name
     low, high = (100.0 * (float(end) / nominal - 1.0) for end in ends)  # type: ignore[arg-type]
-    return f"{name} {low:+.3g} to {high:+.3g} %"
+    return f"{name} {low:+.3g} to {high:+.3g} %".replace("-", MINUS)
 
 
 def _name(field: str) -> str:
@@ -183,10 +184,10 @@ def _name(field: str) -> str:
 def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:
     label = quantity_named(result.quantity, result.machine).label
     if isinstance(result.omega, float):
-        return f"Sensitivity of {label} at {result.omega * RPM:.4g} rpm"
+        return f"Sensitivity of {label} at {speed_of(result, result.omega)}"
     if at is None:
         return f"Sensitivity of {label}"
-    return f"Sensitivity of {label} at {np.asarray(result.omega)[at] * RPM:.4g} rpm"
+    return f"Sensitivity of {label} at {speed_of(result, np.asarray(result.omega)[at])}"
 
 
 def _one_at_a_time() -> str:

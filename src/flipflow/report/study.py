@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flipflow.batch.reasons import FOUND
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.numerals import rpm
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.vary import Choice, Distribution, Normal
 from flipflow.plotting.study import (
@@ -32,7 +33,7 @@ from flipflow.report.blocks import (
     Values,
     cells,
 )
-from flipflow.report.numbers import NOTHING, bounds, quantity, rpm
+from flipflow.report.numbers import NOTHING, bounds, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import FOLDS, Tolerance, jumped_motions

@@ -25,6 +25,7 @@ from flipflow.model.arguments import (
     checked_numbers,
     checked_speed,
     checked_text,
+    refuse_pair,
 )
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import Parameter, parameter_of
@@ -358,6 +359,7 @@ def _passing(
     machine: Machine, parameter: str, values: ArrayLike, omega: float | None, max_periods: int
 ) -> _Passing:
     """The machine with the parameter's values, checked."""
+    refuse_pair("values", values)
     remedy = "give finite values in one row, at least one"
     row = np.atleast_1d(checked_numbers("values", values, remedy))
     if row.ndim != 1 or row.size == 0:

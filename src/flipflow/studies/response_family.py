@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.arguments import checked_interval, checked_reals, checked_word
+from flipflow.model.arguments import checked_interval, checked_reals, checked_word, refuse_pair
 from flipflow.model.fields import FIELD
 from flipflow.model.parameters import named_parameter, with_values
 from flipflow.model.quantities import leading_coordinate
@@ -273,6 +273,7 @@ def _one_field(vary: Mapping[str, ArrayLike], machine: Machine) -> tuple[str, Re
     else:
         named_parameter(machine, field, "vary")
     name = f"vary[{field!r}]"
+    refuse_pair(name, values)
     array = np.atleast_1d(checked_reals(name, values, "give numbers in SI"))
     if array.ndim != 1 or array.size == 0:
         raise InputError(name, values, "give a list of values")

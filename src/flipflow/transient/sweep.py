@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.errors import Cancelled, InputError
-from flipflow.model.arguments import checked_count, checked_monitor, checked_speeds
+from flipflow.errors import Cancelled
+from flipflow.model.arguments import checked_count, checked_monitor, checked_speeds, refuse_pair
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
@@ -211,9 +211,7 @@ def sweep(
         For frequencies that are not finite and above 0, a count below 1, a state of wrong shape,
         or a machine without damping, which never settles.
     """
-    if isinstance(omega, tuple) and len(omega) == 2:
-        remedy = "a pair is an interval elsewhere; give an array, such as np.linspace(190, 210, 21)"
-        raise InputError("omega", omega, remedy)
+    refuse_pair("omega", omega)
     speeds = checked_speeds(omega)
     max_periods = checked_count("max_periods", max_periods, MAX_PERIODS)
     most_turns = checked_count("most_turns", most_turns, 10_000_000)

@@ -1,0 +1,170 @@
+"""Faults that results once had when they travelled, each with the test of its kind."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.plotting.panels import Axis, Line, Note, Panel, PanelGrid, Trace
+
+API = Path(__file__).parents[2] / "docs" / "api" / "index.md"
+
+
+@dataclass(frozen=True)
+class Rig:
+    """An oscillator between two stops."""
+
+    c: float = 0.06
+
+    def system(self) -> ff.MechanicalSystem:
+        """As matrices and springs."""
+        stop = ff.ClearanceSpring([1.0], 30.0, 1.0, clearance=1.0)
+        force = ff.HarmonicForce([0.5])
+        return ff.MechanicalSystem([[1.0]], [[self.c]], [[1.0]], [stop], force)
+
+
+@cache
+def chain() -> ff.MechanicalSystem:
+    """Two masses of its user, without names and without units."""
+    stop = ff.ClearanceSpring([1.0, 0.0], 30.0, 0.3, 0.4)
+    C, K = [[0.06, -0.03], [-0.03, 0.06]], [[2.0, -1.0], [-1.0, 2.0]]
+    return ff.MechanicalSystem(np.eye(2), C, K, [stop], ff.HarmonicForce([0.3, 0.0]))
+
+
+@cache
+def chain_branch() -> ff.Branch:
+    return ff.frequency_response(chain(), (0.5, 1.9))
+
+
+@cache
+def fold_curve() -> ff.FieldBranch:
+    fold = ff.frequency_response(Rig(), (0.4, 8.0)).folds[0]
+    return ff.continue_fold(fold, "c", (0.02, 1.0))
+
+
+@cache
+def closed() -> ff.Branch:
+    """A branch that ends where it began."""
+    (start, *_) = ff.periodic_orbits(ff.load("ffs0827"), omega=446.0, max_periods=3)
+    branch = ff.continue_orbit(start, "omega", (300.0, 600.0))
+    assert branch.status is ff.BranchStatus.CLOSED
+    return branch
+
+
+@pytest.mark.parametrize("made", [closed, fold_curve])
+def test_a_repr_tells_least_and_greatest(made) -> None:
+    """Of what it spans, though it ends where it began."""
+    branch = made()
+    values = branch.omega if isinstance(branch, ff.Branch) else branch.values
+    low, high = map(float, re.search(r"([\d.]+) to ([\d.]+)", repr(branch)).groups())
+    assert (low, high) == pytest.approx((values.min(), values.max()), rel=1e-5)
+    assert high - low > 0.1 * high
+
+
+def test_an_argument_that_is_not_there_is_refused_by_its_own_name() -> None:
+    """Not by that of a function of the inside."""
+    with pytest.raises(TypeError, match=r"^figure\(\) got an unexpected keyword argument 'ax'"):
+        ff.figure(chain_branch(), ax=None)
+
+
+def test_a_machine_of_its_user_keeps_its_numbers_and_words() -> None:
+    """Nothing is a millimetre, a speed in rpm, or a coordinate of a screen."""
+    orbit = max(chain_branch().orbits_at(1.5), key=lambda one: one.amplitude(0))
+    drawn = ff.figure(chain_branch(), coordinate=0).panels[0]
+    top = max(float(trace.y.max()) for trace in drawn.traces if trace.name == "x[0]")
+    assert top == pytest.approx(chain_branch().peak(0).amplitude(0), rel=1e-3)
+    results = (
+        chain_branch(), orbit, [orbit], [chain_branch()], fold_curve(),
+        ff.poincare_section(chain(), 1.0, turns=8), ff.simulate(chain(), 1.0, 2),
+        ff.sweep(chain(), np.array([0.8, 0.9, 1.0])),
+        ff.bifurcation_diagram(chain(), "omega", [0.8, 0.9]),
+        ff.lyapunov_exponents(chain(), 1.0, periods=64),
+        ff.sensitivity(chain(), {"forcing": (0.9, 1.1)}, "amplitude[1]", omega=1.0, n=4),
+        ff.response_family(chain(), {"forcing": [0.9, 1.0]}, omega=(0.5, 1.5)),
+    )  # fmt: skip
+    for result in results:
+        for text in _texts(ff.figure(result)):
+            assert not re.search(r"\bx2\b|\brpm\b|\bmm\b|\bm/s\b|\brad/s\b|1/s", text), text
+
+
+def test_legends_have_the_units_of_the_axes() -> None:
+    drawn = ff.figure(ff.response_family(ff.load("ffs0827"), {"clearance": [5e-3, 6e-3]}))
+    assert drawn.panels[0].y.unit == "mm"
+    names = {trace.name for trace in drawn.panels[0].traces}
+    assert {"e = 5 mm", "e = 6 mm"} <= names
+    assert not any("0.00" in name or name.endswith(" m") for name in names)
+
+
+@pytest.mark.parametrize(
+    ("field", "call"),
+    [
+        ("omega", lambda pair: ff.sweep(chain(), pair)),
+        ("omega", lambda pair: ff.linear_response(chain(), pair)),
+        ("values", lambda pair: ff.bifurcation_diagram(chain(), "omega", pair)),
+        (r"vary\['forcing'\]", lambda pair: ff.response_family(chain(), {"forcing": pair})),
+    ],
+)
+def test_a_pair_that_is_no_interval_is_refused(field, call) -> None:
+    with pytest.raises(ff.InputError, match=rf"{field} = .*a pair is an interval elsewhere"):
+        call((0.8, 1.0))
+
+
+def test_what_has_no_name_is_asked_for_by_an_index() -> None:
+    with pytest.raises(ff.InputError, match="coordinate = 'tip': none is named: give an index"):
+        chain_branch().amplitude("tip")
+
+
+def test_every_class_that_is_listed_as_importable_is() -> None:
+    """The page says from where; what stands elsewhere is listed with its place."""
+    text = API.read_text(encoding="utf-8")
+    everything, _, parts = text.partition("## Parts of results")
+    assert parts
+    listed = [name for block in re.findall(r"```\{eval-rst\}(.*?)```", everything, re.DOTALL)
+              for name in re.findall(r"^   (\w[\w.]*)$", block, re.MULTILINE)]  # fmt: skip
+    assert len(listed) > 70
+    assert [name for name in listed if "." in name or not hasattr(ff, name)] == []
+
+
+def test_the_figure_of_basins_says_where_its_marks_are() -> None:
+    values = {"relative": np.linspace(-0.02, 0.02, 2)}
+    caption = ff.figure(ff.basins(ff.load("ffs0827"), 120.0, values)).caption
+    assert "what is not on its axes is 0 for the cells, but not for the motions" in caption
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("sweep", "ffs0827", "--speeds", "800 rpm", "820 rpm", "--steps", "2"), "sweep.html"),
+        (("orbits", "ffs0827", "--speed", "850 rpm", "--max-periods", "1"), "motion-1.html"),
+    ],
+)
+def test_a_figure_of_a_command_names_its_machine_and_has_one_title(
+    command, tmp_path, words, name
+) -> None:
+    code, _, told = command(*words, "-o", tmp_path / "out")
+    assert code == 0, told
+    page = (tmp_path / "out" / name).read_text(encoding="utf-8")
+    read = re.sub(r"<script.*?</script>", "", page.partition("<body>")[2], flags=re.DOTALL)
+    assert "FFS0827" in read
+    (title,) = re.findall(r"<h1>(.*?)</h1>", read)
+    assert read.count(title) == 1
+
+
+def _texts(part: object) -> Iterator[str]:
+    """Every text of a figure that is drawn: not captions, and not what only the mouse shows."""
+    if isinstance(part, str):
+        yield part
+    elif isinstance(part, tuple):
+        for one in part:
+            yield from _texts(one)
+    elif isinstance(part, (PanelGrid, Panel, Axis, Trace, Line, Note)) and is_dataclass(part):
+        for field in fields(part):
+            if field.name not in {"caption", "x_also", "role", "colour", "symbol", "dash"}:
+                yield from _texts(getattr(part, field.name))
