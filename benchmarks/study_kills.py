@@ -135,6 +135,9 @@ def kill_workers(make, folder, kills, rng):
 
         def shoot():
             while len(counted) < kills and not done.is_set():
+                # Faster than workers begin, kills would let none of them come to work.
+                while len(cluster.scheduler.workers) < WORKERS and not done.is_set():
+                    time.sleep(0.05)
                 time.sleep(rng.exponential(0.5))
                 nannies = list(cluster.workers.values())
                 # A worker that is being started anew has no number yet, or has ended already.
