@@ -17,6 +17,7 @@ import signal
 import tempfile
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -134,11 +135,17 @@ def kill_workers(make, folder, kills, rng):
 
         def shoot():
             while len(counted) < kills and not done.is_set():
+                # Faster than workers begin, kills would let none of them come to work.
+                while len(cluster.scheduler.workers) < WORKERS and not done.is_set():
+                    time.sleep(0.05)
                 time.sleep(rng.exponential(0.5))
-                workers = [one.process.pid for one in list(cluster.workers.values()) if one.process]
-                if workers and not done.is_set():
-                    os.kill(int(rng.choice(workers)), signal.SIGKILL)
-                    counted.append(1)
+                nannies = list(cluster.workers.values())
+                # A worker that is being started anew has no number yet, or has ended already.
+                known = [one.process.pid for one in nannies if one.process and one.process.pid]
+                if known and not done.is_set():
+                    with suppress(ProcessLookupError):
+                        os.kill(int(rng.choice(known)), signal.SIGKILL)
+                        counted.append(1)
 
         shooting = threading.Thread(target=shoot)
         shooting.start()

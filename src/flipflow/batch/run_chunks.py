@@ -98,7 +98,7 @@ def _submitted(
 ) -> Future[Any]:
     try:
         return executor.submit(_attempt, lost, work, *task[1])
-    except (RuntimeError, *_closed()) as error:  # type: ignore[misc]  # a broken executor's, too
+    except _closed() as error:
         raise IncompleteError(f"The workers are gone ({error}).") from None
 
 
@@ -130,8 +130,8 @@ def _killed() -> tuple[type[BaseException], ...]:
 
 
 def _closed() -> tuple[type[BaseException], ...]:
-    """What a client of dask raises once it is closed."""
-    return _loaded("distributed.client", "ClosedClientError")
+    """What an executor raises that takes no more work: a broken pool, a closed client of dask."""
+    return (RuntimeError, *_loaded("distributed.client", "ClosedClientError"))
 
 
 def _loaded(module: str, name: str) -> tuple[type[BaseException], ...]:
