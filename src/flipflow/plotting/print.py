@@ -19,6 +19,7 @@ from flipflow.plotting.layout import (
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, MARKERS, TINTS
 from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
+from flipflow.plotting.symbols import mathtext_subscript, with_symbols
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,9 +104,22 @@ def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
     with mpl.rc_context(style):
         sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
         _draw(sheet, figure, arrange(figure))
+        if figure.symbols:
+            _set_symbols(sheet)
         undated = {DATE[form]: None} if form in DATE else {}
         sheet.savefig(buffer, format=form, dpi=RESOLUTION, metadata=undated)
     return buffer.getvalue()
+
+
+def _set_symbols(sheet: Sheet) -> None:
+    from matplotlib.text import Text  # noqa: PLC0415  slow to import
+
+    for text in sheet.findobj(Text):
+        said = text.get_text()
+        shown = with_symbols(said, mathtext_subscript)
+        if shown != said:
+            text.set_parse_math(True)
+            text.set_text(shown)
 
 
 def _families() -> list[str]:
