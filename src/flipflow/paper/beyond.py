@@ -36,11 +36,13 @@ LEANING, UPRIGHT = (2e-3, 3e-3), 4e-3  # gaps in m
 MARGIN = 1.2  # times the speed of contact, followed under weight
 WORKING_SPEED = 850.0 * math.pi / 30.0
 SAMPLES = 720  # times in a turn at which a motion's extremes are looked for
+SPEEDS = 25  # at which a stretch of equal stability is drawn
 CAPTION = (
     "Excursion of the relative displacement just above the speed at which contact begins. Solid: "
     "stable; dashed: unstable. The first panels: small gaps, without weight; the machine leans to "
     "one side or, mirrored, to the other. The last: gaps as drawn, shifted by the floating frame's "
-    "weight on the inclined deck; between the period doublings every other turn reaches farther."
+    "weight on the inclined deck, towards the side that is then farther away; between the period "
+    "doublings every other turn reaches farther."
 )
 
 Real = NDArray[np.float64]
@@ -131,49 +133,44 @@ def draw(data: Beyond) -> Figure:
 
 
 def _doubled_panel(data: Weighed) -> Panel:
-    """Excursion of each turn towards the plus side, over speed."""
-    speeds = [s for pair in data.just_above for s in pair]
+    """Excursion of each turn towards the farther stop, where one turn and the next differ most."""
+    ends = [speed for pair in data.just_above for speed in pair]
     contacts = [w for w in (data.gaps.contact_plus, data.gaps.contact_minus) if w is not None]
-    low, high = min((*speeds, *contacts)), max((*speeds, *contacts))
-    reach = 0.25 * (high - low)
-    near = (data.branch.omega > low - reach) & (data.branch.omega < high + reach)
-    rows = np.flatnonzero(near)
-    traces = list(_one_turn(data.branch, rows))
+    low, high = min((*ends, *contacts)), max((*ends, *contacts))
+    low, high = low - 0.25 * (high - low), high + 0.25 * (high - low)
+    traces = list(_one_turn(data.branch, sorted((low, *ends, high))))
     for k, branch in enumerate(data.doubled):
         order = np.argsort(branch.omega)
-        omega = branch.omega[order]
-        turns = np.array([_excursions(branch.orbit(int(i))) for i in order])
-        for column, name, colour in ((0, "one turn", "case 1"), (1, "the next", "case 2")):
+        turns = np.sort([_excursions(branch.orbit(int(i))) for i in order], axis=1)
+        for column, name, colour in ((1, "farther turn", "case 1"), (0, "other turn", "case 2")):
             traces.append(
-                Trace(f"motion of two turns: {name}", omega, np.sort(turns, axis=1)[:, 1 - column],
+                Trace(f"motion of two turns: {name}", branch.omega[order], turns[:, column],
                       "stable", colour, legend=k == 0, bold=True)
             )  # fmt: skip
-    lines = tuple(Line("x", at, f"{at:.4g}", "mark") for pair in data.just_above for at in pair)
+    lines = tuple(Line("x", at, f"{at:.4g}", "mark") for at in ends)
     return Panel(
-        speed_axis_in_radians(low - reach, high + reach), Axis("excursion |x2|", "mm"),
-        tuple(traces), lines=lines, title="period doubling under the floating frame's weight",
+        speed_axis_in_radians(low, high), Axis("excursion |x2|", "mm"), tuple(traces), lines=lines,
+        title="period doubling under the floating frame's weight",
     )  # fmt: skip
 
 
-def _one_turn(branch: Branch, rows: NDArray[np.intp]) -> Iterator[Trace]:
-    """Stretches of equal stability; a stretch reaches to the first point of the next."""
-    omega = branch.omega[rows]
-    height = np.array([_excursions(branch.orbit(int(i)))[0] for i in rows])
-    stable = branch.stable[rows]
-    edges = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1).tolist(), rows.size]
-    for start, end in itertools.pairwise(edges):
-        part = slice(start, min(end + 1, rows.size))
-        role: Role = "stable" if stable[start] else "unstable"
-        yield Trace("motion of one turn", omega[part], height[part], role, "case 0",
-                    legend=start == 0, bold=True)  # fmt: skip
+def _one_turn(branch: Branch, ends: list[float]) -> Iterator[Trace]:
+    """Between two speeds at which its stability changes each, as the speed rises."""
+    for k, (start, end) in enumerate(itertools.pairwise(ends)):
+        omega = np.linspace(start, end, SPEEDS)
+        orbits = [branch.orbit_from_below(float(speed)) for speed in omega]
+        height = np.array([math.nan if o is None else _excursions(o)[0] for o in orbits])
+        middle = orbits[SPEEDS // 2]
+        role: Role = "stable" if middle is not None and middle.stable else "unstable"
+        yield Trace("motion of one turn", omega, height, role, "case 0", legend=k == 0, bold=True)
 
 
 def _excursions(orbit: Orbit) -> Real:
-    """Greatest relative displacement of each turn in mm, (periods,)."""
+    """Greatest displacement of each turn towards the minus side in mm, (periods,)."""
     turn = 2.0 * math.pi / orbit.omega
     t = turn * np.arange(orbit.periods * SAMPLES) / SAMPLES
     x = orbit.displacement("relative", t).reshape(orbit.periods, SAMPLES)
-    return np.asarray(MM * x.max(axis=1))
+    return np.asarray(-MM * x.min(axis=1))
 
 
 def leans(data: Beyond) -> Evaluation:

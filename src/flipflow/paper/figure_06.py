@@ -27,8 +27,8 @@ MICROMETRES = 1e6
 CAPTION = (
     "Force of the stop over the relative displacement. Wide and pale: piecewise law, Eq. (2); "
     f"thin: Eq. (3) with eps = 1e{round(math.log10(SHARPNESS))} per metre. With damping: at a "
-    "constant rate. With a motion: x2 = 1.5 e sin(w t) at the antiresonance. Below: the same around "
-    "the gap, where the tangent takes its time to switch."
+    "constant rate. With a motion: x2 = 1.5 e sin(w t) at the antiresonance. Below: the same "
+    "around the gap, where the tangent takes its time to switch."
 )
 
 

@@ -94,6 +94,8 @@ def write_reproduction(
 def write_figure(one: ReproducedFigure, folder: Path) -> tuple[str, ...]:
     """Write one figure as HTML, SVG and PDF into an existing folder; names of the files.
 
+    Interrupted, it leaves none of them.
+
     Raises
     ------
     MissingExtra
@@ -104,8 +106,13 @@ def write_figure(one: ReproducedFigure, folder: Path) -> tuple[str, ...]:
     if one.figure is None:
         return ()
     names = tuple(f"{one.name}{ending}" for ending in ENDINGS)
-    for name in names:
-        one.figure.write(folder / name)
+    try:
+        for name in names:
+            one.figure.write(folder / name)
+    except KeyboardInterrupt:
+        for name in names:
+            (folder / name).unlink(missing_ok=True)
+        raise
     return names
 
 

@@ -173,13 +173,14 @@ class Prediction:
 
     @property
     def answer(self) -> bool | None:
-        """Whether all rigs meet the number; None where some do, or they lie on both sides of it."""
+        """Whether all rigs meet the number, or all miss it by more than their spread; else None."""
         if not self.values:
             return None
         least, most = min(self.values), max(self.values)
         if self.low <= least and most <= self.high:
             return True
-        return False if most < self.low or self.high < least else None
+        missed = max(self.low - most, least - self.high)
+        return False if missed > most - least else None
 
 
 def judged(predictions: tuple[Prediction, ...]) -> Evaluation:
