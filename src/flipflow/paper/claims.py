@@ -68,6 +68,8 @@ class Evaluation:
         What it says, one thing after the other, and whether that holds.
     words
         What the answers to the parts are called.
+    note
+        What else there is to say of it.
     """
 
     verdict: Verdict
@@ -75,6 +77,7 @@ class Evaluation:
     where: str = ""
     parts: tuple[Part, ...] = ()
     words: Words = field(default_factory=lambda: WORDS)
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,7 @@ class DecidedClaim:
             "where": self.claim.where,
             "figure": self.figure,
             "holds_where": self.evaluation.where,
+            "note": self.evaluation.note,
             "parts": [
                 {"what": part.what, "answer": self.evaluation.words[part.answer]}
                 for part in self.evaluation.parts

@@ -176,7 +176,7 @@ def with_stop(data: Loads) -> Evaluation:
             ("at w_lb", machine.region.at_upper),
         )
     )
-    return replace(found, where=f"{found.where} Computed: {words}.".strip())
+    return replace(found, note=f"Computed: {words}.")
 
 
 def without_stop(data: Loads) -> Evaluation:

@@ -44,7 +44,7 @@ CAPTION = (
     "Above: the rig fitted to all points. Solid: stable; dashed: unstable; crosses: folds. Small "
     "symbols: exact sweeps in the paper's steps of 30 rpm. Filled: the six points that the "
     "paper's text gives. Below: rigs that were fitted without the points of one jump, a thin line "
-    "each; how far they spread is what the other points leave open."
+    "each, followed up to 300 rad/s; how far they spread is what the other points leave open."
 )
 
 

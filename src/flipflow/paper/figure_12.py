@@ -23,6 +23,7 @@ from flipflow.studies.response_family import Member
 WHERE = "Fig. 12"
 PLAN = FamilyPlan("clearance", (2, 3, 4, 5, 6, 7, 8), (2, 4, 6, 8), None)
 SAME = 1e-6
+BELOW = "greatest relative difference from the largest gap"
 
 
 def coincide(pair: FamilyPair) -> Evaluation:
@@ -34,7 +35,8 @@ def coincide(pair: FamilyPair) -> Evaluation:
     for member, label in zip(members[:-1], pair.labels[:-1], strict=True):
         worst = _difference(member, widest)
         parts.append(Part(label, None if worst is None else worst < SAME))
-        numbers["greatest relative difference below contact", label] = Number(worst)
+        numbers[BELOW, label] = Number(worst)
+    numbers[BELOW, pair.labels[-1]] = Number(0.0)
     return decide(parts, numbers)
 
 

@@ -47,6 +47,7 @@ FOUND = {
     Verdict.FAILS: "not found",
     Verdict.UNDECIDED: "cannot be decided",
 }
+SINGLE = ("",)  # columns of numbers that stand in no table of their claim; they come last
 ANSWERS = {True: "pass", False: "fail", None: "not checked"}
 INTRODUCTION = (
     "Every figure below is computed from the machine file, and every claim is decided by the "
@@ -218,6 +219,7 @@ def number_tables(claims: Iterable[DecidedClaim]) -> Iterator[Table]:
         for one in claims
         for columns, name, row in _lines(one.evaluation.numbers)
     ]
+    lines.sort(key=lambda line: line[0] == SINGLE)
     title = "Numbers behind the verdicts"
     for columns, group in itertools.groupby(lines, key=lambda line: line[0]):
         rows = [(id_, name, row) for _, id_, name, row in group]
@@ -232,7 +234,7 @@ def _lines(numbers: Numbers) -> Iterator[tuple[tuple[str, ...], str, Row]]:
     """Columns, name and numbers of each row."""
     rows: dict[str, dict[str, Number]] = {}
     for name, one in numbers.items():
-        row, column = (name, "") if isinstance(name, str) else name
+        row, column = (name, *SINGLE) if isinstance(name, str) else name
         rows.setdefault(row, {})[column] = one
     for name, row_ in rows.items():
         yield tuple(row_), name, tuple(row_.values())
@@ -245,7 +247,7 @@ def _number_table(title: str, columns: tuple[str, ...], rows: list[tuple[str, st
         column[0] if len(set(column)) == 1 else None for column in zip(*units, strict=True)
     ]
     of_rows = [row[0] if len(set(row)) == 1 else None for row in units]
-    by_column, by_row = None not in of_columns, None not in of_rows and columns != ("",)
+    by_column, by_row = None not in of_columns, None not in of_rows and columns != SINGLE
     heads = [
         Column(name or "Value", (unit or "") if by_column else "", numeric=True)
         for name, unit in zip(columns, of_columns, strict=True)
@@ -266,18 +268,19 @@ def _verdict(one: DecidedClaim, words: Mapping[Verdict, str]) -> Cell:
 
 
 def _but(evaluation: Evaluation) -> str:
-    """What does not hold or is open, where a claim does not hold as a whole."""
+    """What does not hold or is open, where a claim does not hold as a whole, and what to add."""
     if len({part.answer for part in evaluation.parts}) < 2:
-        return evaluation.where
+        return f"{evaluation.where} {evaluation.note}".strip()
     groups = {
         answer: [part.what for part in evaluation.parts if part.answer is answer]
         for answer in (False, None)
     }
-    return " ".join(
+    sentences = [
         f"{evaluation.words[answer].capitalize()}: {'; '.join(found)}."
         for answer, found in groups.items()
         if found
-    )
+    ]
+    return " ".join((*sentences, evaluation.note)).strip()
 
 
 def _shown(value: Number, *, with_unit: bool) -> str:

@@ -184,7 +184,8 @@ def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
     answers = {word: answer for answer, word in words.items()}
     parts = tuple(Part(part["what"], answers[part["answer"]]) for part in told)
     where = document["holds_where"]
-    evaluation = Evaluation(Verdict(document["verdict"]), numbers, where, parts, words)
+    note = document.get("note", "")
+    evaluation = Evaluation(Verdict(document["verdict"]), numbers, where, parts, words, note)
     return DecidedClaim(known[name], figure, evaluation)
 
 

@@ -118,7 +118,7 @@ class Trend:
             parts.append(Part("slightly (by less than 10 %)", little))
         found = decide(parts, _numbers(self.quantity, labels, values))
         if self.quantity is REGION and found.verdict is not Verdict.HOLDS and _folds_born(family):
-            return replace(found, where=f"{found.where} {BORN}")
+            return replace(found, note=BORN)
         return found
 
     def _step(self, before: float, after: float) -> bool | None:
@@ -220,7 +220,7 @@ def trend_claim(id_: str, where: str, statement: str, rule: Rule) -> Claim[Famil
         if balance.verdict is exact.verdict:
             return exact
         also = f"By third-order harmonic balance: {balance.verdict}. {balance.where}"
-        return replace(exact, where=f"{exact.where} {also}".strip())
+        return replace(exact, note=f"{exact.note} {also}".strip())
 
     return Claim(id_, where, statement, evaluate)
 
