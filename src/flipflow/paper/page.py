@@ -47,6 +47,7 @@ FOUND = {
     Verdict.FAILS: "not found",
     Verdict.UNDECIDED: "cannot be decided",
 }
+ROUNDING = 1e-9  # below it only the size of a number means something
 SINGLE = ("",)  # columns of numbers that stand in no table of their claim; they come last
 ANSWERS = {True: "pass", False: "fail", None: "not checked"}
 INTRODUCTION = (
@@ -288,6 +289,8 @@ def _shown(value: Number, *, with_unit: bool) -> str:
         return NOTHING
     if isinstance(value.value, int):
         text = str(value.value)
+    elif 0.0 < abs(value.value) < ROUNDING:
+        text = f"{value.value:.0e}"
     else:
         text = f"{value.value:.2f}" if value.unit == "rad/s" else number(value.value)
     return f"{text} {value.unit}".strip() if with_unit else text
