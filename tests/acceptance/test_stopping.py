@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import time
 import pytest
 
 import flipflow as ff
+from flipflow.paper.page import write_figure
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
 # Sends itself a signal while the command line loads what it is built with.
@@ -95,3 +97,46 @@ def test_a_long_simulation_is_drawn_thin_and_kept_whole():
         assert greatest == pytest.approx(1e3 * history.displacement("relative").max(), rel=1e-12)
     assert drawn[1] == pytest.approx(drawn[0], rel=0.01)
     assert kept[1] > 3.9 * kept[0]
+
+
+# Sends itself a signal where Python drops what is raised: in the callback of a weak reference.
+DROPPED = """
+import os, sys, weakref
+number = int(sys.argv.pop())
+class Gone: pass
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "flipflow.paper.page":
+            gone = Gone()
+            self.reference = weakref.ref(gone, lambda _: os.kill(os.getpid(), number))
+            del gone
+sys.meta_path.insert(0, Interrupting())
+from flipflow.cli.main import main
+main()
+"""
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_a_signal_that_falls_into_a_callback_is_not_lost(tmp_path, number):
+    words = (sys.executable, "-c", DROPPED, "reproduce", "2c", "-o", "out", str(int(number)))
+    run = subprocess.run(
+        words, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300.0
+    )
+    assert run.returncode == 130
+    assert "Traceback" not in run.stderr
+    assert run.stderr.endswith(".\n")
+
+
+def test_a_figure_is_written_whole_or_not_at_all(tmp_path):
+    """Ctrl-C between its files."""
+    found = ff.reproduce(figures=("2c",)).figures[0]
+
+    class Interrupted:
+        def write(self, path):
+            if path.suffix == ".svg":
+                raise KeyboardInterrupt
+            path.write_text("begun")
+
+    with pytest.raises(KeyboardInterrupt):
+        write_figure(dataclasses.replace(found, figure=Interrupted()), tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import gc
 import os
 import signal
@@ -15,6 +16,7 @@ STOPPED_CODE = 130
 STOPPED_EARLY = "Stopped by the user; nothing is written.\n"
 OBJECTS = 50_000  # made since garbage was last looked for
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+AGAIN = 0.02  # seconds until a dropped interrupt is raised again
 
 
 def main() -> None:
@@ -24,7 +26,7 @@ def main() -> None:
     with _stopped_at_once():
         # Loading the commands takes a moment, in which libraries would answer Ctrl-C themselves.
         from flipflow.cli.app import run  # noqa: PLC0415
-    with _terminated_as_interrupted():
+    with _terminated_as_interrupted(), _never_lost():
         run()
 
 
@@ -52,6 +54,30 @@ def _terminated_as_interrupted() -> Iterator[None]:
 
     with _answered({signal.SIGTERM: interrupted}):
         yield
+
+
+@contextmanager
+def _never_lost() -> Iterator[None]:
+    """Raise an interrupt again that Python drops: it does so within a finalizer or a callback."""
+    before, waiting = sys.unraisablehook, list[threading.Timer]()
+
+    def again(dropped: sys.UnraisableHookArgs) -> None:
+        if not issubclass(dropped.exc_type, KeyboardInterrupt):
+            before(dropped)
+            return
+        # From another thread, after a moment: here it would be dropped once more.
+        later = threading.Timer(AGAIN, _thread.interrupt_main)
+        later.daemon = True
+        waiting.append(later)
+        later.start()
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+        for later in waiting:
+            later.cancel()
 
 
 @contextmanager

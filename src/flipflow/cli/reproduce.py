@@ -11,12 +11,13 @@ from flipflow.cli.options import Json, Output
 from flipflow.cli.output import console
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rich.console import Console
 
     from flipflow.model.monitor import Monitor
     from flipflow.model.screen import FlipFlowScreen
+    from flipflow.paper.claims import DecidedClaim, Verdict
     from flipflow.paper.reproduce import ReproducedFigure, Reproduction
 
 FOLDER = Path("reproduction")
@@ -96,19 +97,26 @@ def _show(found: Reproduction, out: Console) -> None:
     from rich.table import Table  # noqa: PLC0415  slow to import
     from rich.text import Text  # noqa: PLC0415
 
-    from flipflow.paper.page import STATES  # noqa: PLC0415  keeps --help quick
+    from flipflow.paper.page import BEYOND, FOUND, STATES, VERDICTS  # noqa: PLC0415  quick --help
     from flipflow.report.terminal import STYLES  # noqa: PLC0415
 
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-    for title in ("Claim", "Verdict", "Statement"):
-        table.add_column(title, no_wrap=title != "Statement")
-    for one in found.claims:
-        verdict = one.evaluation.verdict
-        shown = Text(str(verdict), STYLES[STATES[verdict]])
-        table.add_row(one.claim.id, shown, one.claim.statement)
-    out.print(table)
-    out.print()
-    out.print(", ".join(f"{n} {verdict}" for verdict, n in found.counts.items() if n) + ".")
+    def shown(title: str, claims: Sequence[DecidedClaim], words: Mapping[Verdict, str]) -> None:
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+        for head in (title, "Verdict", "Statement"):
+            table.add_column(head, no_wrap=head != "Statement")
+        for one in claims:
+            verdict = one.evaluation.verdict
+            word = Text(words[verdict], STYLES[STATES[verdict]])
+            table.add_row(one.claim.id, word, one.claim.statement)
+        out.print(table)
+        out.print()
+
+    if found.claims:
+        shown("Claim", found.claims, VERDICTS)
+        out.print(", ".join(f"{n} {verdict}" for verdict, n in found.counts.items() if n) + ".")
+    if found.findings:
+        out.print(f"\n{BEYOND}:")
+        shown("", found.findings, FOUND)
     for figure in found.figures:
         if figure.failure:
             out.print(f"{figure.name} is not drawn. {figure.failure}", style="yellow")

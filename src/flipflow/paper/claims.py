@@ -32,7 +32,16 @@ class Number:
     unit: str = ""
 
 
-Numbers = Mapping[str, Number]
+# A name, or a row and a column of a table: ("width of the operating region", "2 mm").
+Name = str | tuple[str, str]
+Numbers = Mapping[Name, Number]
+
+
+Answer = bool | None
+Words = Mapping[Answer, str]
+WORDS: Words = {True: "holds", False: "does not hold", None: "cannot be decided"}
+# For what is within the noise of its rival.
+WORDS_OF_TIES: Words = {**WORDS, None: "a tie"}
 
 
 @dataclass(frozen=True)
@@ -40,16 +49,35 @@ class Part:
     """One thing a claim says; ``answer`` is None where it cannot be decided."""
 
     what: str
-    answer: bool | None
+    answer: Answer
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The verdict on a claim, the numbers it rests on, and a sentence on where it holds."""
+    """The verdict on a claim and what it rests on.
+
+    Parameters
+    ----------
+    verdict
+        What became of it.
+    numbers
+        Computed numbers.
+    where
+        A sentence on where it holds, where it does not hold everywhere.
+    parts
+        What it says, one thing after the other, and whether that holds.
+    words
+        What the answers to the parts are called.
+    note
+        What else there is to say of it.
+    """
 
     verdict: Verdict
     numbers: Numbers = field(default_factory=dict)
     where: str = ""
+    parts: tuple[Part, ...] = ()
+    words: Words = field(default_factory=lambda: WORDS)
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -91,17 +119,29 @@ class DecidedClaim:
             "where": self.claim.where,
             "figure": self.figure,
             "holds_where": self.evaluation.where,
+            "note": self.evaluation.note,
+            "parts": [
+                {"what": part.what, "answer": self.evaluation.words[part.answer]}
+                for part in self.evaluation.parts
+            ],
             "numbers": {
-                name: {"value": _finite(one.value), "unit": one.unit}
+                flat(name): {"value": _finite(one.value), "unit": one.unit}
                 for name, one in self.evaluation.numbers.items()
             },
         }
 
 
-def decide(parts: Sequence[Part], numbers: Numbers | None = None) -> Evaluation:
+def flat(name: Name) -> str:
+    """A number's name in one piece."""
+    return name if isinstance(name, str) else ", ".join(name)
+
+
+def decide(
+    parts: Sequence[Part], numbers: Numbers | None = None, words: Words = WORDS
+) -> Evaluation:
     """The verdict on a claim from its parts: all, some or none of them hold.
 
-    Parts that cannot be decided count only where nothing else is known.
+    Where none holds, the claim fails if one part does, and is open if none could be decided.
     """
     known = [part for part in parts if part.answer is not None]
     if not known:
@@ -110,7 +150,8 @@ def decide(parts: Sequence[Part], numbers: Numbers | None = None) -> Evaluation:
         verdict = Verdict.HOLDS if len(known) == len(parts) else Verdict.IN_PART
     else:
         verdict = Verdict.IN_PART if any(part.answer for part in known) else Verdict.FAILS
-    return Evaluation(verdict, numbers or {}, _where(parts, verdict))
+    where = _where(parts, words)
+    return Evaluation(verdict, numbers or {}, where, tuple(parts), words)
 
 
 def undecided(missing: str) -> Evaluation:
@@ -128,16 +169,23 @@ def agrees(computed: float, published: float, digits: int) -> bool:
     digits
         Digits of the published number behind the decimal point.
     """
-    rounding = 0.5 * 10.0**-digits
-    return abs(computed - published) <= max(rounding, AGREEMENT * abs(published))
+    low, high = meant(published, digits)
+    return low <= computed <= high
 
 
-def _where(parts: Sequence[Part], verdict: Verdict) -> str:
-    if verdict is Verdict.HOLDS or len(parts) == 1:
+def meant(published: float, digits: int) -> tuple[float, float]:
+    """The numbers that :func:`agrees` takes for the published one: from, to."""
+    off = max(0.5 * 10.0**-digits, AGREEMENT * abs(published))
+    return published - off, published + off
+
+
+def _where(parts: Sequence[Part], words: Words) -> str:
+    if len({part.answer for part in parts}) < 2:
         return ""
-    words = {True: "Holds", False: "Does not hold", None: "Cannot be decided"}
     groups = {answer: [p.what for p in parts if p.answer is answer] for answer in words}
-    return " ".join(f"{words[key]}: {'; '.join(found)}." for key, found in groups.items() if found)
+    return " ".join(
+        f"{words[key].capitalize()}: {'; '.join(found)}." for key, found in groups.items() if found
+    )
 
 
 def runs(labels: Sequence[str], answers: Sequence[bool | None]) -> Iterator[Part]:

@@ -23,18 +23,18 @@ WHOLE = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
 SHOWN = (0.7, 0.9, 1.0, 1.1, 1.3)
 RISING = (0.7, 0.8, 0.9, 1.0)
 NO_RANGE = "The paper's text gives no range; 0.7 to 1.3 times the nominal value is taken."
-COLUMNS = (
-    ("first_peak_omega", "First peak", "rad/s"),
-    ("first_peak_main", "main frame", "mm"),
-    ("second_peak_omega", "Second peak", "rad/s"),
-    ("second_peak_main", "main frame", "mm"),
-    ("relative_peak", "Relative peak", "mm"),
-    ("omega_cs", "w_cs", "rad/s"),
-    ("omega_lb", "w_lb", "rad/s"),
-    ("omega_ub", "w_ub", "rad/s"),
-    ("lower", "Region from", "rad/s"),
+ROWS = (
+    ("first_peak_omega", "first peak of the main frame at", "rad/s"),
+    ("first_peak_main", "its amplitude", "mm"),
+    ("second_peak_omega", "second peak of the main frame at", "rad/s"),
+    ("second_peak_main", "its amplitude", "mm"),
+    ("relative_peak_omega", "peak of the relative motion at", "rad/s"),
+    ("relative_peak", "its amplitude", "mm"),
+    ("omega_cs", "contact begins at w_cs", "rad/s"),
+    ("omega_lb", "lower fold w_lb", "rad/s"),
+    ("omega_ub", "upper fold w_ub", "rad/s"),
+    ("lower", "operating region from", "rad/s"),
     ("upper", "to", "rad/s"),
-    ("relative_at_middle", "Relative amplitude", "mm"),
 )
 
 
@@ -101,26 +101,23 @@ def draw_family(pair: FamilyPair, title: str, note: str = "") -> Figure:
 def family_tables(pair: FamilyPair) -> tuple[Table, ...]:
     """Peaks, folds and region of every member."""
     table = pair.exact.table()
-    symbol = FIELD[pair.exact.field].symbol
-    columns = (Column(symbol), *(Column(title, unit, numeric=True) for _, title, unit in COLUMNS))
-    rows = []
-    for k, label in enumerate(pair.labels):
-        words = [
-            quantity(_number(table[key][k]), unit, _si(unit), with_unit=False)
-            for key, _, unit in COLUMNS
-        ]
-        failure = table["failure"][k]
-        rows.append(cells(f"{label}: {failure}" if failure else label, *words))
     field = FIELD[pair.exact.field]
-    nominal = shown(getattr(pair.exact.machine, field.name), field.file_unit, field.unit)
-    region = pair.exact.common_region
-    middle = NOTHING if region is None else f"{sum(region) / 2.0:.4g} rad/s"
-    caption = (
-        f"Exact solution; nominal {symbol} = {nominal}. The relative amplitude is that at "
-        f"{middle}, in the middle of the region that all rows share. A row without folds has its "
-        "region up to the peak of the relative motion."
+    columns = (Column(""), *(Column(label, numeric=True) for label in pair.labels))
+    rows = tuple(
+        cells(f"{words}, {unit}", *(_shown(value, unit) for value in table[key]))
+        for key, words, unit in ROWS
     )
-    return (Table("Peaks, folds and operating region", columns, tuple(rows), caption),)
+    nominal = shown(getattr(pair.exact.machine, field.name), field.file_unit, field.unit)
+    caption = (
+        f"Exact solution; nominal {field.symbol} = {nominal}. Without folds the region ends at the "
+        "peak of the relative motion."
+    )
+    failures = [
+        f"{label}: {why}" for label, why in zip(pair.labels, table["failure"], strict=True) if why
+    ]
+    return (
+        Table("Peaks, folds and operating region", columns, rows, " ".join((caption, *failures))),
+    )
 
 
 def _chosen(family: ResponseFamily, pair: FamilyPair) -> ResponseFamily:
@@ -129,9 +126,7 @@ def _chosen(family: ResponseFamily, pair: FamilyPair) -> ResponseFamily:
     )
 
 
-def _number(value: float | str | None) -> float | None:
-    return value if isinstance(value, float) else None
-
-
-def _si(unit: str) -> str:
-    return "m" if unit == "mm" else unit
+def _shown(value: float | str | None, unit: str) -> str:
+    if not isinstance(value, float):
+        return NOTHING
+    return f"{value:.2f}" if unit == "rad/s" else quantity(value, unit, "m", with_unit=False)

@@ -36,6 +36,8 @@ class PaperFigure(Generic[Data]):
         From the data to the neutral figure or the drawing, and to tables for the page.
     claims
         What the paper says of it.
+    findings
+        What is found in it that the paper does not say.
     needs_stop
         Whether it is about the machine with stop.
     """
@@ -47,3 +49,4 @@ class PaperFigure(Generic[Data]):
     claims: tuple[Claim[Data], ...]
     tables: Callable[[Data], tuple[Table, ...]] = no_tables
     needs_stop: bool = True
+    findings: tuple[Claim[Data], ...] = ()

@@ -8,6 +8,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.drawing import Drawing
 from flipflow.plotting.schematic import schematic
+from flipflow.plotting.symbols import svg_with_symbols
 from flipflow.report.details import drawn_values
 
 TITLE = "The flip-flow vibrating screen"
@@ -26,7 +27,7 @@ def compute(screen: FlipFlowScreen) -> FlipFlowScreen:
 
 def draw_machine(screen: FlipFlowScreen, title: str, caption: str) -> Drawing:
     """The schematic with the machine's own values."""
-    return Drawing(title, caption, schematic(screen, drawn_values(screen)))
+    return Drawing(title, caption, svg_with_symbols(schematic(screen, drawn_values(screen))))
 
 
 def draw(screen: FlipFlowScreen) -> Drawing:

@@ -9,7 +9,7 @@ import numpy as np
 
 from flipflow.dynamics.linear_response import LinearResponse, linear_response
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
+from flipflow.paper.claims import Claim, Evaluation, Name, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.family import speed_axis_in_radians
 from flipflow.plotting.figure import Figure
@@ -70,7 +70,10 @@ def as_one(data: Linear) -> Evaluation:
     below = data.response.omega < data.w01
     ratio = data.response.amplitude("relative")[below] / data.response.amplitude("main")[below]
     most = float(ratio.max())
-    numbers = {"greatest x2/x1 below w01": Number(most), "w01": Number(data.w01, "rad/s")}
+    numbers: dict[Name, Number] = {
+        "greatest x2/x1 below w01": Number(most),
+        "w01": Number(data.w01, "rad/s"),
+    }
     return decide([Part("x2/x1 stays below 0.1", most < ALMOST_ONE)], numbers)
 
 
@@ -86,7 +89,8 @@ def boundaries(data: Linear) -> Evaluation:
 
 def larger(data: Linear) -> Evaluation:
     """Sign of |x1| - |x2| over [w01, w_ea] and [w_ea, w_ar]."""
-    parts, numbers = [], {}
+    parts: list[Part] = []
+    numbers: dict[Name, Number] = {}
     bands = (("w01 to w_ea: more", data.w01, data.w_ea, 1.0),
              ("w_ea to w_ar: less", data.w_ea, data.w_ar, -1.0))  # fmt: skip
     difference = data.response.amplitude("main") - data.response.amplitude("relative")

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, bands, decide
+from flipflow.paper.claims import (
+    WORDS_OF_TIES,
+    Claim,
+    Evaluation,
+    Name,
+    Number,
+    Part,
+    bands,
+    decide,
+)
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.family import speed_axis_in_radians
 from flipflow.plotting.figure import Figure
@@ -36,7 +45,7 @@ CAPTION = (
     "Total indices: share of the variance of the relative amplitude that goes with a parameter and "
     "all it does together with others. Each parameter of Table 1 varies evenly by 5 % to either "
     f"side; {GROUPS} groups of samples at each of {FREQUENCIES} frequencies. Shaded: 95 % "
-    "confidence."
+    "confidence. Two parameters whose shaded intervals overlap are tied: neither leads."
 )
 
 Real = NDArray[np.float64]
@@ -61,10 +70,20 @@ class Indices:
         """Total index of a parameter over frequency."""
         return self.result.total[:, self.result.names.index(name)]
 
-    def has_rank(self, name: str, rank: int) -> list[bool]:
-        """Where exactly ``rank`` other parameters have a higher total index."""
-        higher = np.sum(self.result.total > self.total(name)[:, None], axis=1)
-        return [bool(one) for one in higher == rank]
+    def has_rank(self, name: str, rank: int) -> list[bool | None]:
+        """Where exactly ``rank`` other parameters have a higher total index.
+
+        None where a rival's 95 % interval overlaps the parameter's own, so that the samples do not
+        tell which of them is the higher, and with it the rank is open.
+        """
+        k = self.result.names.index(name)
+        total, half = self.result.total, self.result.total_confidence
+        above = np.delete(total - half > (total + half)[:, [k]], k, axis=1).sum(axis=1)
+        not_below = np.delete(total + half >= (total - half)[:, [k]], k, axis=1).sum(axis=1)
+        return [
+            True if low == high == rank else None if low <= rank <= high else False
+            for low, high in zip(above.tolist(), not_below.tolist(), strict=True)
+        ]
 
     def mean_slopes(self) -> dict[str, Real]:
         """Mean size of each total index's slope in s/rad, by band; empty without the bands."""
@@ -122,26 +141,25 @@ def tables(data: Indices) -> tuple[Table, ...]:
 
 def stiffness_first(data: Indices) -> Evaluation:
     """S1: where no parameter has a higher total index than k2."""
-    found = data.has_rank("shear_stiffness", 0)
-    return decide(list(bands(data.omega, found)), _share(found))
+    return _ranked(data, data.has_rank("shear_stiffness", 0))
 
 
 def mass_second(data: Indices) -> Evaluation:
     """S2: where exactly one parameter has a higher total index than m2."""
-    found = data.has_rank("floating_mass", 1)
-    return decide(list(bands(data.omega, found)), _share(found))
+    return _ranked(data, data.has_rank("floating_mass", 1))
 
 
 def largest_past_antiresonance(data: Indices) -> Evaluation:
     """S3: frequency of the largest total index of k2 and of m2."""
-    parts, numbers = [], {}
+    parts: list[Part] = []
+    numbers: dict[Name, Number] = {}
     for name in ("shear_stiffness", "floating_mass"):
         index, symbol = data.total(name), FIELD[name].symbol
         at = float(data.omega[index.argmax()])
         inside = None if data.w_ar is None else data.w_ar < at < data.w02
         parts.append(Part(f"{symbol} between w_ar and w02", inside))
-        numbers[f"largest total index, {symbol}"] = Number(float(index.max()))
-        numbers[f"at, {symbol}"] = Number(at, "rad/s")
+        numbers["largest total index", symbol] = Number(float(index.max()))
+        numbers["at", symbol] = Number(at, "rad/s")
     return decide(parts, numbers)
 
 
@@ -157,11 +175,10 @@ def steepest_past_antiresonance(data: Indices) -> Evaluation:
         Part(word, all(bool(last[i] > mean[i]) for mean in means.values()))
         for i, word in enumerate(words)
     ]
-    numbers = {}
-    for band, mean in (*means.items(), ("w_ar to w02", last)):
-        numbers[f"mean slope, sum of all, {band}"] = Number(
-            1e3 * float(mean.sum()), "per 1000 rad/s"
-        )
+    numbers: dict[Name, Number] = {
+        ("mean slope, sum of all", band): Number(1e3 * float(mean.sum()), "per 1000 rad/s")
+        for band, mean in (*means.items(), ("w_ar to w02", last))
+    }
     return decide(parts, numbers)
 
 
@@ -174,8 +191,15 @@ def _bands(data: Indices) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         yield f"{low} to {high}", (data.omega >= start) & (data.omega <= end)
 
 
-def _share(found: list[bool]) -> dict[str, Number]:
-    return {"share of the frequencies": Number(100.0 * float(np.mean(found)), "%")}
+def _ranked(data: Indices, found: list[bool | None]) -> Evaluation:
+    """Band by band, and how much of the frequencies has each answer."""
+    numbers: dict[Name, Number] = {
+        ("share of the frequencies", WORDS_OF_TIES[answer]): Number(
+            100.0 * found.count(answer) / len(found), "%"
+        )
+        for answer in WORDS_OF_TIES
+    }
+    return decide(list(bands(data.omega, found)), numbers, WORDS_OF_TIES)
 
 
 FIGURE = PaperFigure(

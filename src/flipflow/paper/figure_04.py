@@ -9,7 +9,7 @@ import numpy as np
 
 from flipflow.dynamics.linear_response import LinearResponse, linear_response
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, agrees, decide
+from flipflow.paper.claims import Claim, Evaluation, Name, Number, Part, agrees, decide
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
@@ -75,15 +75,15 @@ def _change(pair: tuple[LinearResponse, LinearResponse], which: str) -> float:
 
 def _judged(data: Portraits, which: str, published: float) -> Evaluation:
     at_paper = _change((data.empty, data.loaded), which)
-    numbers = {
-        f"change at {OMEGA} rad/s": Number(at_paper, "%"),
-        "empty": Number(MM * float(data.empty.amplitude(which)[0]), "mm"),
-        "loaded": Number(MM * float(data.loaded.amplitude(which)[0]), "mm"),
-    }
+    pairs = {f"at {OMEGA} rad/s": (data.empty, data.loaded)}
     if data.middle is not None:
         mean = float(data.middle[0].omega[0])
-        numbers["middle of w_ea and w_ar"] = Number(mean, "rad/s")
-        numbers["change there"] = Number(_change(data.middle, which), "%")
+        pairs[f"at the middle of w_ea and w_ar, {mean:.5g} rad/s"] = data.middle
+    numbers: dict[Name, Number] = {}
+    for where, pair in pairs.items():
+        numbers[where, "change"] = Number(_change(pair, which), "%")
+        for word, one in zip(("empty", "loaded"), pair, strict=True):
+            numbers[where, word] = Number(MM * float(one.amplitude(which)[0]), "mm")
     return decide([Part(f"{published:+.1f} %", agrees(at_paper, published, 1))], numbers)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from flipflow.dynamics.linear_response import linear_response
 from flipflow.errors import IncompleteError
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.smooth import SHARPNESS
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, decide
+from flipflow.paper.claims import Claim, Evaluation, Name, Number, Part, decide
 from flipflow.paper.figure import PaperFigure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
@@ -25,9 +26,9 @@ FITS, THIN = 1e-3, 1e-2
 MICROMETRES = 1e6
 CAPTION = (
     "Force of the stop over the relative displacement. Wide and pale: piecewise law, Eq. (2); "
-    f"thin: Eq. (3) with eps = {SHARPNESS:g} per metre. With damping: at a constant rate. With a "
-    "motion: x2 = 1.5 e sin(w t) at the antiresonance. Below: the same around the gap, where the "
-    "tangent takes its time to switch."
+    f"thin: Eq. (3) with eps = 1e{round(math.log10(SHARPNESS))} per metre. With damping: at a "
+    "constant rate. With a motion: x2 = 1.5 e sin(w t) at the antiresonance. Below: the same "
+    "around the gap, where the tangent takes its time to switch."
 )
 
 
@@ -84,15 +85,15 @@ def _traces(one: LawComparison, x: np.ndarray, rows: slice, *, legend: bool) -> 
 def fits(data: Laws) -> Evaluation:
     """P1: differences outside the switching layers, and how wide these are."""
     parts: list[Part] = []
-    numbers: dict[str, Number] = {}
+    numbers: dict[Name, Number] = {}
     for one in data.conditions:
         name = one.condition
         parts.append(Part(name, one.largest < FITS * one.largest_force))
         numbers |= {
-            f"largest difference outside the layers, {name}": Number(one.largest, "N"),
-            f"rms difference outside, {name}": Number(one.rms, "N"),
-            f"largest difference inside, {name}": Number(one.largest_inside, "N"),
-            f"largest force, {name}": Number(one.largest_force, "N"),
+            ("largest difference outside the layers", name): Number(one.largest, "N"),
+            ("rms difference outside", name): Number(one.rms, "N"),
+            ("largest difference inside", name): Number(one.largest_inside, "N"),
+            ("largest force", name): Number(one.largest_force, "N"),
         }
     width = data.conditions[0].layer_width
     parts.append(Part("the layer is narrower than 1 % of the gap", width < THIN * abs(data.at)))

@@ -13,7 +13,16 @@ from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import AGREEMENT, Claim, Evaluation, Number, Part, decide, undecided
+from flipflow.paper.claims import (
+    AGREEMENT,
+    Claim,
+    Evaluation,
+    Name,
+    Number,
+    Part,
+    decide,
+    undecided,
+)
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.runge_kutta import SteppedSweep, stepped_sweep
 from flipflow.paper.thrown import Thrown, thrown, thrown_panel, thrown_to_the_lower
@@ -153,7 +162,7 @@ def _swept(
 def sweeps_agree(data: Responses) -> Evaluation:
     """N1: Runge-Kutta against third-order balance along both sweeps, and the jumps' speeds."""
     parts: list[Part] = []
-    numbers: dict[str, Number] = {}
+    numbers: dict[Name, Number] = {}
     folds = [fold.omega for fold in data.balance.folds]
     ends = max(folds, default=None), min(folds, default=None)
     for way, (name, one, fold) in enumerate(
@@ -165,11 +174,11 @@ def sweeps_agree(data: Responses) -> Evaluation:
             k = int(np.nanargmax(off))
             label = f"{LABELS[which]}, speed {name}"
             parts.append(Part(f"{label}: within 2 %", bool(off[k] < AGREEMENT)))
-            numbers[f"greatest difference, {label}"] = Number(100.0 * float(off[k]), "%")
-            numbers[f"at, {label}"] = Number(float(one.omega[k]), "rad/s")
+            numbers["greatest difference", label] = Number(100.0 * float(off[k]), "%")
+            numbers["at", label] = Number(float(one.omega[k]), "rad/s")
             exact = np.abs(one.amplitude(which) / data.settled_rows(way, which) - 1.0).max()
             same = same and bool(exact < AGREEMENT)
-            numbers[f"Runge-Kutta against exact sweep, {label}"] = Number(100.0 * exact, "%")
+            numbers["Runge-Kutta against exact sweep", label] = Number(100.0 * exact, "%")
         # Runge-Kutta takes every speed around the folds, so it jumps where the exact sweep does.
         jumps = data.settled[way].jumps if same else ()
         parts.append(Part(f"speed {name}: jump at the fold of the balance", _only(jumps, fold)))
@@ -194,12 +203,12 @@ def _only(jumps: tuple[Jump, ...], fold: float | None) -> bool:
     return len(steps) == 1 and steps[0][0] <= fold <= steps[0][1]
 
 
-def _jump_numbers(jumps: tuple[Jump, ...], fold: float | None, name: str) -> dict[str, Number]:
+def _jump_numbers(jumps: tuple[Jump, ...], fold: float | None, name: str) -> dict[Name, Number]:
     before, after = (jumps[0].omega_before, jumps[0].omega_after) if jumps else (None, None)
     return {
-        f"fold by balance, speed {name}": Number(fold, "rad/s"),
-        f"before the jump, speed {name}": Number(before, "rad/s"),
-        f"after, speed {name}": Number(after, "rad/s"),
+        ("fold by balance", f"speed {name}"): Number(fold, "rad/s"),
+        ("before the jump", f"speed {name}"): Number(before, "rad/s"),
+        ("after", f"speed {name}"): Number(after, "rad/s"),
     }
 
 
@@ -222,7 +231,7 @@ def solutions_coexist(data: Responses) -> Evaluation:
         Part("one beside them", set(without) == {1}),
         Part("sweeps differ there and nowhere else", bool((differ == between).all())),
     ]
-    numbers = {
+    numbers: dict[Name, Number] = {
         "w_lb": Number(low, "rad/s"), "w_ub": Number(high, "rad/s"),
         "fewest stable motions between": Number(min(within)),
         "most beside": Number(max(without)),
@@ -254,7 +263,8 @@ def linear_below_contact(data: Responses) -> Evaluation:
     low = float(data.exact.omega.min())
     omega = np.linspace(low, data.marks.omega_cs, SAMPLES, endpoint=False)
     linear = linear_response(data.screen, omega)
-    parts, numbers = [], {"w_cs": Number(data.marks.omega_cs, "rad/s")}
+    parts: list[Part] = []
+    numbers: dict[Name, Number] = {"w_cs": Number(data.marks.omega_cs, "rad/s")}
     for which in ("main", "relative"):
         orbits = [data.exact.orbit_from_below(float(w)) for w in omega]
         found = np.array([np.nan if o is None else o.amplitude(which) for o in orbits])

@@ -7,6 +7,7 @@ from typing import Any
 
 from flipflow.errors import InputError
 from flipflow.paper import (
+    beyond,
     figure_01,
     figure_02c,
     figure_03,
@@ -34,7 +35,7 @@ from flipflow.paper.figure import PaperFigure
 MODULES = (
     figure_01, figure_02c, figure_03, figure_04, figure_05, figure_06, figure_07, figure_08,
     figure_09, figure_10, figure_11, figure_12, figure_13, figure_14, figure_15, figure_16,
-    figure_17, figure_18, figure_19, figure_20, figure_21,
+    figure_17, figure_18, figure_19, figure_20, figure_21, beyond,
 )  # fmt: skip
 FIGURES: Mapping[str, PaperFigure[Any]] = {m.FIGURE.name: m.FIGURE for m in MODULES}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,16 @@ from flipflow.io.results import SCHEMAS, SUMMARISED
 from flipflow.model.arguments import checked_all, checked_monitor
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Verdict
+from flipflow.paper.claims import (
+    WORDS,
+    WORDS_OF_TIES,
+    DecidedClaim,
+    Evaluation,
+    Number,
+    Numbers,
+    Part,
+    Verdict,
+)
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.registry import FIGURES, chosen
 from flipflow.plotting.drawing import Drawing
@@ -41,6 +51,8 @@ class ReproducedFigure:
         None where it could not be computed.
     tables, claims
         Tables of its page, and what the paper says of it, decided.
+    findings
+        What the paper does not say, decided in the same way.
     failure
         Why it could not be computed, a sentence; empty where it was.
     """
@@ -51,6 +63,7 @@ class ReproducedFigure:
     tables: tuple[Table, ...]
     claims: tuple[DecidedClaim, ...]
     failure: str = ""
+    findings: tuple[DecidedClaim, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +83,11 @@ class Reproduction:
         return tuple(claim for figure in self.figures for claim in figure.claims)
 
     @property
+    def findings(self) -> tuple[DecidedClaim, ...]:
+        """What is found beyond the paper; no claim of it, and not counted."""
+        return tuple(finding for figure in self.figures for finding in figure.findings)
+
+    @property
     def counts(self) -> dict[str, int]:
         """How many claims have each verdict."""
         found = Counter(claim.evaluation.verdict for claim in self.claims)
@@ -84,6 +102,7 @@ class Reproduction:
             "machine": machine_document(self.screen),
             "claims": [claim.document() for claim in self.claims],
             "counts": self.counts,
+            "found_beyond_the_paper": [finding.document() for finding in self.findings],
         }
 
 
@@ -130,27 +149,43 @@ def _reproduced(one: PaperFigure[Any], screen: FlipFlowScreen) -> ReproducedFigu
     try:
         data = one.compute(screen)
         picture, tables = one.draw(data), one.tables(data)
-        claims = tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in one.claims)
+        claims, findings = (
+            tuple(DecidedClaim(claim, one.name, claim.evaluate(data)) for claim in group)
+            for group in (one.claims, one.findings)
+        )
     except (IncompleteError, MissingExtra) as error:
         return _without(one, str(error))
-    return ReproducedFigure(one.name, one.title, picture, tables, claims)
+    if isinstance(picture, Figure):
+        picture = dataclasses.replace(picture, symbols=True)
+    return ReproducedFigure(one.name, one.title, picture, tables, claims, "", findings)
 
 
 def _without(one: PaperFigure[Any], why: str) -> ReproducedFigure:
     """The figure that could not be computed, and its claims that cannot be decided."""
     evaluation = Evaluation(Verdict.UNDECIDED, {}, why)
-    claims = tuple(DecidedClaim(claim, one.name, evaluation) for claim in one.claims)
-    return ReproducedFigure(one.name, one.title, None, (), claims, why)
+    claims, findings = (
+        tuple(DecidedClaim(claim, one.name, evaluation) for claim in group)
+        for group in (one.claims, one.findings)
+    )
+    return ReproducedFigure(one.name, one.title, None, (), claims, why, findings)
 
 
 def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
     """The claim that :meth:`~flipflow.paper.claims.DecidedClaim.document` wrote."""
     name, figure = document["id"], document["figure"]
-    known = {claim.id: claim for claim in FIGURES[figure].claims} if figure in FIGURES else {}
+    one = FIGURES.get(figure)
+    known = {} if one is None else {claim.id: claim for claim in (*one.claims, *one.findings)}
     if name not in known:
         raise StoreError(f"the claim {name!r} of {figure!r} is not known; update flipflow")
-    numbers = {key: Number(**one) for key, one in document["numbers"].items()}
-    evaluation = Evaluation(Verdict(document["verdict"]), numbers, document["holds_where"])
+    numbers: Numbers = {key: Number(**value) for key, value in document["numbers"].items()}
+    told = document.get("parts", ())
+    tied = any(part["answer"] == WORDS_OF_TIES[None] for part in told)
+    words = WORDS_OF_TIES if tied else WORDS
+    answers = {word: answer for answer, word in words.items()}
+    parts = tuple(Part(part["what"], answers[part["answer"]]) for part in told)
+    where = document["holds_where"]
+    note = document.get("note", "")
+    evaluation = Evaluation(Verdict(document["verdict"]), numbers, where, parts, words, note)
     return DecidedClaim(known[name], figure, evaluation)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from flipflow.continuation.branch import Branch
 from flipflow.model.disturbance import Impulse
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import Evaluation, Number, Part, decide
+from flipflow.paper.claims import Evaluation, Name, Number, Part, decide
 from flipflow.plotting.history import envelope
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, MM
@@ -92,7 +92,7 @@ def thrown_to_the_lower(data: Thrown) -> Evaluation:
     """Whether the blow ends on a stable motion of smaller amplitude, and the numbers to it."""
     shares = {id(o): float(s) for o, s in zip(data.basins.orbits, data.basins.shares, strict=True)}
     ordered = sorted(data.basins.orbits, key=lambda o: o.amplitude("relative"))
-    numbers = {
+    numbers: dict[Name, Number] = {
         "speed": Number(data.omega, "rad/s"),
         "share of states that settle on the lower motion": Number(100.0 * shares[id(ordered[0])],
                                                                   "%"),

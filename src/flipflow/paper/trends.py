@@ -9,7 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.branch import SpecialPoint
-from flipflow.paper.claims import Claim, Evaluation, Number, Part, Verdict, bands, decide, runs
+from flipflow.paper.claims import (
+    Claim,
+    Evaluation,
+    Name,
+    Number,
+    Part,
+    Verdict,
+    bands,
+    decide,
+    runs,
+)
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
 
@@ -108,7 +118,7 @@ class Trend:
             parts.append(Part("slightly (by less than 10 %)", little))
         found = decide(parts, _numbers(self.quantity, labels, values))
         if self.quantity is REGION and found.verdict is not Verdict.HOLDS and _folds_born(family):
-            return replace(found, where=f"{found.where} {BORN}")
+            return replace(found, note=BORN)
         return found
 
     def _step(self, before: float, after: float) -> bool | None:
@@ -154,8 +164,8 @@ class AmplitudeTrend:
             return decide([Part("a speed in the region of all members", None)])
         answers = [self._follows(column) for column in table.T]
         middle = omega.size // 2
-        numbers = {
-            f"relative amplitude at {omega[k]:.4g} rad/s, {label}": Number(
+        numbers: dict[Name, Number] = {
+            (f"relative amplitude at {omega[k]:.4g} rad/s", label): Number(
                 MM * float(table[j, k]), "mm"
             )
             for k in sorted({0, middle, omega.size - 1})
@@ -188,12 +198,13 @@ class Unchanged:
 
     def evaluate(self, family: ResponseFamily, labels: Sequence[str]) -> Evaluation:
         """Spread of each quantity over its mean."""
-        parts, numbers = [], {}
+        parts: list[Part] = []
+        numbers: dict[Name, Number] = {}
         for quantity in self.quantities:
             values = quantity.along(family)
             parts.append(Part(quantity.name, _within(values, LITTLE)))
+            numbers |= _numbers(quantity, labels, values)
             numbers[f"change of {quantity.name}"] = Number(100.0 * _spread(values), "%")
-        del labels
         return decide(parts, numbers)
 
 
@@ -209,7 +220,7 @@ def trend_claim(id_: str, where: str, statement: str, rule: Rule) -> Claim[Famil
         if balance.verdict is exact.verdict:
             return exact
         also = f"By third-order harmonic balance: {balance.verdict}. {balance.where}"
-        return replace(exact, where=f"{exact.where} {also}".strip())
+        return replace(exact, note=f"{exact.note} {also}".strip())
 
     return Claim(id_, where, statement, evaluate)
 
@@ -237,8 +248,8 @@ def _spread(values: Real) -> float:
     return float(np.ptp(values) / np.abs(values).mean())
 
 
-def _numbers(quantity: Quantity, labels: Sequence[str], values: Real) -> dict[str, Number]:
+def _numbers(quantity: Quantity, labels: Sequence[str], values: Real) -> dict[Name, Number]:
     return {
-        f"{quantity.name}, {label}": Number(float(value), quantity.unit)
+        (quantity.name, label): Number(float(value), quantity.unit)
         for label, value in zip(labels, values, strict=True)
     }

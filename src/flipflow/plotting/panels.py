@@ -210,6 +210,9 @@ class PanelGrid:
         What it belongs to, machine, load case, revision and date, for a figure on its own.
     width
         Width in pixels.
+    symbols
+        Whether words such as w_ea and k2 are shown as symbols with subscripts; only where no name
+        is a user's.
     """
 
     title: str
@@ -220,3 +223,4 @@ class PanelGrid:
     shares: tuple[float, ...] = ()
     subject: str = ""
     width: float = PAGE_WIDTH
+    symbols: bool = False

@@ -30,6 +30,7 @@ from flipflow.plotting.layout import (
 )
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, STABILITY_WORDS, TINTS
 from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
+from flipflow.plotting.symbols import described_with_symbols, html_subscript, with_symbols
 
 Json = dict[str, Any]
 FAMILY = "Arial, Helvetica, 'Liberation Sans', sans-serif"
@@ -42,7 +43,11 @@ CONFIG = {"displayModeBar": False, "displaylogo": False, "responsive": False, "s
 START = """
 for (const place of document.querySelectorAll("[data-figure]")) {
   const figure = JSON.parse(place.querySelector("script").textContent);
-  Plotly.newPlot(place, figure.data, figure.layout, figure.config);
+  const narrow = innerWidth < 780 && place.querySelector("script[data-narrow]");
+  const layout = narrow ? JSON.parse(narrow.textContent) : figure.layout;
+  place.style.width = `${layout.width}px`;
+  place.style.height = `${layout.height}px`;
+  Plotly.newPlot(place, figure.data, layout, figure.config);
 }
 """
 PAGE = """<!DOCTYPE html>
@@ -58,8 +63,11 @@ h1 {{ font-size: 1.3em; }}</style></head>
 def page(figure: PanelGrid) -> str:
     """One HTML page with the figure, plotly.js embedded."""
     subject = f"<p>{html.escape(figure.subject)}</p>" if figure.subject else ""
+    caption = html.escape(figure.caption)
+    if figure.symbols:
+        caption = with_symbols(caption, html_subscript)
     return PAGE.format(
-        subject=subject, title=html.escape(figure.title), caption=html.escape(figure.caption),
+        subject=subject, title=html.escape(figure.title), caption=caption,
         family=FAMILY, ink=INK, width=figure.width, figure=element(figure), library=library(),
         start=START,
     )  # fmt: skip
@@ -71,14 +79,22 @@ def words(text: str) -> str:
     return plain.replace("\n", "<br>")
 
 
-def element(figure: PanelGrid) -> str:
-    """The place of a figure in a page, its data inside; :data:`START` draws it."""
-    # "<" inside the data could end the script element early.
-    data = json.dumps(described(figure), separators=(",", ":")).replace("<", "\\u003c")
-    return (
-        f'<div data-figure style="width:{figure.width:g}px;height:{figure.height}px">'
-        f'<script type="application/json">{data}</script></div>'
-    )
+def element(figure: PanelGrid, narrow: PanelGrid | None = None) -> str:
+    """The place of a figure in a page, its data inside; :data:`START` draws it.
+
+    ``narrow`` is the same figure for a narrow screen: its layout is taken there.
+    """
+    inside = f'<script type="application/json">{_as_json(described(figure))}</script>'
+    if narrow is not None:
+        layout = _as_json(described(narrow)["layout"])
+        inside += f'<script type="application/json" data-narrow>{layout}</script>'
+    size = f"width:{figure.width:g}px;height:{figure.height}px"
+    return f'<div data-figure style="{size}">{inside}</div>'
+
+
+def _as_json(described: Json) -> str:
+    """JSON within a script element, which "<" could end early."""
+    return json.dumps(described, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def library() -> str:
@@ -107,7 +123,10 @@ def described(figure: PanelGrid) -> Json:
         data += _bars(panel.bars, key)
     _legend_once(data)
     layout["showlegend"] = len(legend_names(figure)) > 1
-    return {"data": data, "layout": layout, "config": CONFIG}
+    found: Json = {"data": data, "layout": layout}
+    if figure.symbols:
+        found = described_with_symbols(found)
+    return found | {"config": CONFIG}
 
 
 def _frame(figure: PanelGrid) -> Json:

@@ -32,6 +32,7 @@ from flipflow.plotting.palette import (
     TINTS,
 )
 from flipflow.plotting.panels import Axis, Bar, Cells, Line, Panel, PanelGrid, Trace
+from flipflow.plotting.symbols import mathtext_subscript, with_symbols
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +119,8 @@ def drawn_sheet(figure: PanelGrid) -> Sheet:
     size = (figure.width / PIXELS_AN_INCH, height / PIXELS_AN_INCH)
     sheet = Sheet(figsize=size, dpi=PIXELS_AN_INCH)
     _draw(sheet, figure, arrange(figure, even=False), height)
+    if figure.symbols:
+        _set_symbols(sheet)
     if foot:
         sheet.text(3.0 / figure.width, 3.0 / height, "\n".join(foot), color=COLOURS["mark"],
                    va="bottom")  # fmt: skip
@@ -148,6 +151,17 @@ def _saved(figure: PanelGrid, form: str, own: dict[str, Any]) -> bytes:
         undated = {DATE[form]: None} if form in DATE else {}
         sheet.savefig(buffer, format=form, dpi=RESOLUTION, metadata=undated)
     return buffer.getvalue()
+
+
+def _set_symbols(sheet: Sheet) -> None:
+    from matplotlib.text import Text  # noqa: PLC0415  slow to import
+
+    for text in sheet.findobj(Text):
+        said = text.get_text()
+        shown = with_symbols(said, mathtext_subscript)
+        if shown != said:
+            text.set_parse_math(True)
+            text.set_text(shown)
 
 
 def _families() -> list[str]:

@@ -28,11 +28,15 @@ class TitleBlock(Block):
 
 @dataclass(frozen=True)
 class Heading(Block):
-    """A heading; level 1 is a part of the report, which begins a page unless told otherwise."""
+    """A heading; level 1 is a part of the report, which begins a page unless told otherwise.
+
+    ``anchor`` is what a :class:`Cell` links to.
+    """
 
     text: str
     level: int = 2
     new_page: bool = True
+    anchor: str = ""
 
 
 @dataclass(frozen=True)
@@ -60,11 +64,15 @@ class Verdict(Block):
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell of a table; ``small`` is printed below it, ``state`` gives it a colour."""
+    """One cell of a table; ``small`` is printed below it, ``state`` gives it a colour.
+
+    ``link`` is the anchor of a heading on the same page, for renderers that can follow it.
+    """
 
     text: str
     small: str = ""
     state: str = ""
+    link: str = ""
 
 
 @dataclass(frozen=True)

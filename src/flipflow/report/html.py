@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flipflow.errors import MissingExtra
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.layout import LEGEND_ROW, legend_rows
 from flipflow.plotting.plotly import START, element, library
+from flipflow.plotting.symbols import html_subscript, with_symbols
 from flipflow.report.blocks import Block, TitleBlock
 from flipflow.report.registry import blocks_of
 from flipflow.results.store import write_file
@@ -19,11 +23,13 @@ from flipflow.studies.study import Study
 
 if TYPE_CHECKING:
     import jinja2
+    from markupsafe import Markup
 
 TEMPLATES = "templates"
 KIND = "vibration report"
 LONG = 15  # letters of a word from which on it can be broken anywhere in a table
 SHORT = 8  # rows of a table that is not cut across two pages
+NARROW = 360.0  # pixels for a figure on a telephone
 
 
 def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
@@ -91,7 +97,9 @@ def footer_of(assessment: Assessment) -> str:
     return f"flipflow {assessment.version}, input {assessment.input_hash}"
 
 
-def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
+def page(
+    blocks: Sequence[Block], *, title: str, kind: str, footer: str, symbols: bool = False
+) -> str:
     """Blocks as one self-contained HTML page.
 
     Parameters
@@ -102,29 +110,44 @@ def page(blocks: Sequence[Block], *, title: str, kind: str, footer: str) -> str:
         Name of the page, and what it is; the latter stands small behind a title block's title.
     footer
         At the foot of every printed sheet.
+    symbols
+        Whether words such as w_ea and k2 are shown as symbols, and tables keep their words whole:
+        for pages without names that are a user's.
 
     Raises
     ------
     MissingExtra
         When jinja2 is not installed.
     """
-    return (
-        require_templates()
-        .get_template("report.html")
-        .render(
-            blocks=blocks,
-            title=title,
-            kind=kind,
-            footer=footer,
-            longest=LONG,
-            short=SHORT,
-            style=_template("report.css"),
-            library=library(),
-            start=START,
-            fit=_template("fit.js"),
-            element=element,
-        )
+    templates = require_templates()
+    templates.filters["said"] = _with_symbols if symbols else str
+    return templates.get_template("report.html").render(
+        blocks=blocks,
+        title=title,
+        kind=kind,
+        footer=footer,
+        whole_words=symbols,
+        longest=LONG,
+        short=SHORT,
+        style=_template("report.css"),
+        library=library(),
+        start=START,
+        fit=_template("fit.js"),
+        element=_element,
     )
+
+
+def _element(figure: Figure) -> str:
+    """A figure and its layout for a narrow screen, taller by what the legend then takes more."""
+    narrow = figure.narrowed(NARROW)
+    more = LEGEND_ROW * (legend_rows(narrow) - legend_rows(figure))
+    return element(figure, replace(narrow, height=narrow.height + max(more, 0)))
+
+
+def _with_symbols(text: str) -> Markup:
+    from markupsafe import Markup, escape  # noqa: PLC0415  comes with jinja2
+
+    return Markup(with_symbols(str(escape(text)), html_subscript))  # noqa: S704  escaped before
 
 
 def require_templates() -> jinja2.Environment:
