@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.limits import Passage
 from flipflow.model.load_case import case_words
+from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.studies.drive_check import (
@@ -154,10 +156,8 @@ def transients(
     alike: dict[FlipFlowScreen, list[str]] = {}
     for name, screen in screens.items():
         alike.setdefault(screen, []).append(name)
-    # Kernels leave the interpreter free, so that cases run side by side.
     try:
-        with ThreadPoolExecutor(2) as pool:
-            runs = list(pool.map(lambda one: _runs(one, drive, omega), alike))
+        runs = _side_by_side(tuple(alike), drive, omega)
     except InputError as error:
         if _known(project):
             raise
@@ -185,13 +185,32 @@ class _Runs:
     coast_down: RunUp | None
 
 
-def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float) -> _Runs:
+def _side_by_side(
+    screens: tuple[FlipFlowScreen, ...], drive: Drive | None, omega: float
+) -> list[_Runs]:
+    """The runs of each screen on two threads; where one fails or Ctrl-C ends the wait, all end."""
+    ended = threading.Event()
+
+    def heard(_sentence: str, _share: float) -> None:
+        if ended.is_set():
+            raise Cancelled("nobody waits for this run")
+
+    # Kernels leave the interpreter free.
+    pool = ThreadPoolExecutor(2)
+    try:
+        return list(pool.map(lambda one: _runs(one, drive, omega, heard), screens))
+    finally:
+        ended.set()
+        pool.shutdown(cancel_futures=True)
+
+
+def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float, monitor: Monitor) -> _Runs:
     if drive is None:
         return _Runs((), None)
-    starts = starts_from_rest(screen, drive, omega)
+    starts = starts_from_rest(screen, drive, omega, monitor=monitor)
     if starts[0].outcome != "reached":
         return _Runs(starts, None)
-    return _Runs(starts, coast_down(screen, starts[0].final_speed, drive))
+    return _Runs(starts, coast_down(screen, starts[0].final_speed, drive, monitor=monitor))
 
 
 def _case(name: str, runs: _Runs, jump: JumpRisk | str, nothing: Mapping[str, str]) -> CaseRuns:
