@@ -57,9 +57,9 @@ def write_response(assessment: Assessment, folder: Path) -> None:
     owner = np.repeat(np.arange(len(tables)), [case.branch.omega.size for case in assessment.cases])
     meanings = ", ".join(f"{k}: {case.name}" for k, case in enumerate(assessment.cases))
     joined["case"] = (owner.astype(np.int32), {"flag_meanings": meanings})
-    shared = dict(
-        set.intersection(*(set(_attributes(case.branch).items()) for case in assessment.cases))
-    )
+    first, *others = (_attributes(case.branch) for case in assessment.cases)
+    # In an order of their own: that of a set would make another file in every process.
+    shared = {k: v for k, v in first.items() if all(other[k] == v for other in others)}
     shared["input_hash"] = assessment.input_hash
     write_file(folder / NAMES[0], _netcdf(joined, shared))
     rows = [
