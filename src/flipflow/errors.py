@@ -57,7 +57,8 @@ class InputError(FlipflowError, ValueError):
         self.field = field
         self.value = value
         self.remedy = remedy
-        super().__init__(f"{field} = {_shown(value)}: {remedy}.")
+        name = field if len(field) <= 2 * WIDTH else f"{field[: 2 * WIDTH - 3]}..."
+        super().__init__(f"{name} = {_shown(value)}: {remedy}.")
 
 
 class IncompleteError(FlipflowError):

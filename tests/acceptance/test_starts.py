@@ -292,6 +292,14 @@ def test_test_functions_of_maps_that_no_number_holds() -> None:
     """A pair of modulus one is still told where other multipliers overflow their product."""
     far = np.array([1e200, 1e200, 0.9, 0.9], complex)
     assert neimark_sacker(far) < 0.0 < neimark_sacker(far * [1.0, 1.0, 1.2, 1.2])
+    # 70 coordinates have 9,730 pairs, whose product no number holds though no multiplier is large.
+    pairs = 0.999 * np.exp(1j * np.linspace(1.8, 2.6, 69))
+    for size in (0.9, 1.1):
+        one = np.array([size * np.exp(0.5j)])
+        many = np.concatenate([pairs, pairs.conj(), one, one.conj()])
+        told = neimark_sacker(many)
+        assert np.isfinite(told)
+        assert np.sign(told) == np.sign(1.0 - size**2)
     assert np.isfinite(determinant_plus(np.eye(4) * 1e100))
     assert determinant_plus(-2.0 * np.eye(3)) == pytest.approx(-1.0)
 

@@ -154,9 +154,18 @@ class Trajectory:
 
 
 def flow(
-    machine: Machine, z: np.ndarray, omega: float, start: float, end: float, rtol: float = RTOL
+    machine: Machine,
+    z: np.ndarray,
+    omega: float,
+    start: float,
+    end: float,
+    rtol: float = RTOL,
+    steps: int = STEPS_PER_TURN,
 ) -> Trajectory:
-    """The motion from state z = (x, x') at time ``start`` to time ``end``."""
+    """The motion from state z = (x, x') at time ``start`` to time ``end``.
+
+    A contact shorter than one of the ``steps`` that a turn has at least may be overlooked.
+    """
     n = machine.M.shape[0]
     z = np.array(z, float)
     states = [stop.state_at(z[:n], z[n:]) for stop in machine.stops]
@@ -170,7 +179,7 @@ def flow(
         solution = solve_ivp(
             right_side(machine, states, omega), (t, end), z, method="DOP853", events=events,
             rtol=rtol, atol=atol, dense_output=True, first_step=min(end - t, 1e-3 / omega),
-            max_step=2.0 * np.pi / omega / STEPS_PER_TURN / highest,
+            max_step=2.0 * np.pi / omega / steps / highest,
         )  # fmt: skip
         assert solution.success, solution.message
         t, z = float(solution.t[-1]), solution.y[:, -1]

@@ -119,7 +119,7 @@ class Lanes:
         """Run states (L, 2 N), which hold at times (L,) of the first turn, until they are caught.
 
         ``tick`` is called with the share of lanes done; where it raises
-        :class:`~flipflow.errors.Cancelled`, no further chunk is started.
+        :class:`~flipflow.errors.Cancelled`, chunks that have not ended are given up.
         """
         count = states.shape[0]
         run = Run(
@@ -132,9 +132,9 @@ class Lanes:
         begin = np.array(begin)
         parts = [slice(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
         pool = ThreadPoolExecutor(self.threads)
-        done = 0
+        done, stop = 0, np.zeros(1, np.int64)
         try:
-            waiting = {pool.submit(self._chunk, run, part, begin, capture, most): part
+            waiting = {pool.submit(self._chunk, run, part, begin, capture, most, stop): part
                        for part in parts}  # fmt: skip
             for future in as_completed(waiting):
                 future.result()
@@ -143,9 +143,11 @@ class Lanes:
                 if tick is not None:
                     tick(done / count)
         except Cancelled:
+            stop[0] = 1
             pool.shutdown(cancel_futures=True)
             return Run(run.states, run.label, run.turns, run.code, cancelled=True)
         finally:
+            stop[0] = 1
             pool.shutdown(cancel_futures=True)
         return run
 
@@ -156,8 +158,10 @@ class Lanes:
         run.states[run.code != status.OK] = np.nan
         return run.states
 
-    def _chunk(self, run: Run, part: slice, begin: Real, capture: Capture, most: int) -> None:
-        """Run a part of the lanes with scratch of its own.
+    def _chunk(
+        self, run: Run, part: slice, begin: Real, capture: Capture, most: int, stop: Int
+    ) -> None:
+        """Run a part of the lanes with scratch of its own, until ``stop`` is set.
 
         Results are written when all lanes have ended, so that a part is either done or not begun.
         """
@@ -165,10 +169,14 @@ class Lanes:
         states = run.states[part].copy()
         nothing = np.empty((states.shape[0], 0, states.shape[1]))
         problem = new_shooting(self.machine, half_turn=False, length=1.0)
+        work = new_shooting_work(self.machine)
+        work = work._replace(flow=work.flow._replace(stop=stop))
         settle_lanes(
-            problem, new_shooting_work(self.machine), states, begin[part], self.omega,
+            problem, work, states, begin[part], self.omega,
             capture.centre, capture.form, capture.owner, most, nothing, label, turns, code,
         )  # fmt: skip
+        if (code == status.STOPPED).any():
+            return
         run.states[part], run.label[part] = states, label
         run.turns[part], run.code[part] = turns, code
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import sys
@@ -105,16 +106,23 @@ def run() -> None:
             sys.stdout.flush()
     except FlipflowError as error:
         head = "" if isinstance(error, Cancelled) else "Error: "
-        typer.echo(_for_terminal(f"{head}{_sentence(str(error))}"), err=True)
+        _say(_for_terminal(f"{head}{_sentence(str(error))}"))
         sys.exit(error.exit_code)
     except OSError as error:
         # What is written to files has its own sentence; this is the terminal, or a pipe from it.
-        typer.echo(f"Error: what was found cannot be shown ({error.strerror}).", err=True)
+        _say(f"Error: what was found cannot be shown ({error.strerror}).")
         # What is still held back would be tried again, and fail again, at the interpreter's end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(StoreError.exit_code)
     except KeyboardInterrupt:
         sys.exit(130)
+
+
+def _say(sentence: str) -> None:
+    """Show a sentence on stderr; where that is closed the exit code says enough."""
+    with contextlib.suppress(OSError):
+        typer.echo(sentence, err=True)
 
 
 def _sentence(text: str) -> str:

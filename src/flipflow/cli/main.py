@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import _thread
+import errno
 import gc
+import io
 import os
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 STOPPED_CODE = 130
@@ -21,6 +23,8 @@ AGAIN = 0.02  # seconds until a dropped interrupt is raised again
 
 def main() -> None:
     """Run the command line; an error is one sentence on stderr and the exit code of its class."""
+    sys.stdout = sys.stdout or Closed()
+    sys.stderr = sys.stderr or Closed()
     # At the usual pace a fourteenth of an analysis goes into looking for garbage that is not there.
     gc.set_threshold(OBJECTS, 50, 50)
     with _stopped_at_once():
@@ -30,12 +34,27 @@ def main() -> None:
         run()
 
 
+class Closed(io.TextIOBase):
+    """A terminal that the caller has closed: nothing can be shown on it."""
+
+    encoding, errors = "utf-8", "backslashreplace"
+
+    def write(self, _text: str) -> int:
+        """Say that it is closed."""
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+    def fileno(self) -> int:
+        """Say that it is closed."""
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+
 @contextmanager
 def _stopped_at_once() -> Iterator[None]:
     """End the process at Ctrl-C or SIGTERM as long as nothing has begun."""
 
     def end(_number: int, _frame: FrameType | None) -> None:
-        os.write(sys.stderr.fileno(), STOPPED_EARLY.encode())
+        with suppress(OSError):
+            os.write(sys.stderr.fileno(), STOPPED_EARLY.encode())
         os._exit(STOPPED_CODE)
 
     with _answered(dict.fromkeys(SIGNALS, end)):

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from flipflow.transient.history import History
 
 IMPULSE = "--impulse"
-MOST_TURNS = 100_000  # 128 points a turn are kept
+MOST_TURNS = 100_000  # 128 points a turn are calculated
+MOST_ROWS = 50_000  # of a document, some 30 MB
 
 
 def simulate(
@@ -57,6 +58,8 @@ def simulate(
     """
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.report.terminal import say  # noqa: PLC0415
+    from flipflow.transient.history import thinned  # noqa: PLC0415
     from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
 
     project = in_case(load_project(file, force=force), case)
@@ -65,6 +68,7 @@ def simulate(
     with Destination(output, json, [file]) as target:
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
+        kept = history
         if output is not None:
             from flipflow.plotting.history import history_figure  # noqa: PLC0415  loads plotly
 
@@ -72,10 +76,13 @@ def simulate(
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            target.document(document_of(history) | {"name": title_of(project, case)})
+            kept = thinned(history, MOST_ROWS)
+            target.document(document_of(kept) | {"name": title_of(project, case)})
         target.keep()
         if target.spoken:
             _show(title_of(project, case), history, blows, console())
+            if kept is not history:
+                say(console(), f"The document is thinned. {kept.notes[-1]}")
         target.tell()
 
 

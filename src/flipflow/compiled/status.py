@@ -15,3 +15,4 @@ SEARCH_NOT_ENDED = 10  # the search for the next contact took too many steps
 CLOSED = 11  # the branch came back to its first point
 FOLLOWED = 12  # the branch was followed to both its ends
 NO_MODES = 13  # no basis of modes was found in one of the contact states
+STOPPED = 14  # nobody waits for it any more

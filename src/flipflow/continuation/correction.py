@@ -70,6 +70,7 @@ class Corrector(NamedTuple):
     b: Real  # (n + 1,)
     pivot: Int  # (n + 1,)
     depth: Real  # (m, 2) depth beyond each gap, as a branch records it
+    stop: Int  # (1,) other than 0: nobody waits for the branch any more
 
 
 def new_corrector(unknowns: int, uneven: Real) -> Corrector:
@@ -97,6 +98,7 @@ def new_corrector(unknowns: int, uneven: Real) -> Corrector:
         b=np.zeros(n + 1),
         pivot=np.zeros(n + 1, np.int64),
         depth=np.zeros((gaps, 2)),
+        stop=np.zeros(1, np.int64),
     )
 
 

@@ -355,7 +355,7 @@ def trace(
         return code, 0
     length, travelled, p = 0.1, 0.0, 1
     clear(branch, p)
-    while p < branch.omega.shape[0]:
+    while p < branch.omega.shape[0] and work.stop[0] == 0:
         longest = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
         step, ends, iterations = attempt(problem, scratch, work, branch, p, longest, course)
         if step == 0.0:

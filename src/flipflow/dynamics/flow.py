@@ -58,6 +58,7 @@ class Flow(NamedTuple):
     spring: Int  # (E,) the spring that changed at its end, -1 at the end of the flow
     kick: Real  # (E,) +1 or -1 times c M^-1 d d^T jumps into the tangent there
     regimes: Int  # (E, m) regimes during the segment
+    stop: Int  # (1,) other than 0: nobody waits for the flow any more
 
 
 def new_flow(machine: MachineArrays) -> Flow:
@@ -83,6 +84,7 @@ def new_flow(machine: MachineArrays) -> Flow:
         spring=np.zeros(e, np.int64),
         kick=np.zeros(e),
         regimes=np.zeros((e, m), np.int64),
+        stop=np.zeros(1, np.int64),
     )
 
 
@@ -284,6 +286,8 @@ def run_flow(
         flow.segments[0] = e + 1
         if slot < 0:
             return status.NO_MODES
+        if flow.stop[0] != 0:
+            return status.STOPPED
         prepare_drive(machine, flow, slot, omega)
         begin_segment(machine, flow, e, slot, omega, t)
         count = flow.modes.mode_count[slot] + machine.order.shape[0]

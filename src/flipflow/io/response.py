@@ -28,7 +28,9 @@ def response_arrays(assessment: Assessment) -> Arrays:
     """The branches of all cases; as their points differ in number, one case follows the other."""
     names = [case.name for case in assessment.cases]
     parts = [arrays_of(case.branch) for case in assessment.cases]
-    shared = set.intersection(*(set(part.attributes.items()) for part in parts))
+    first, *others = (part.attributes for part in parts)
+    # In an order of their own: that of a set would make another file in every process.
+    shared = {k: v for k, v in first.items() if all(other.get(k) == v for other in others)}
     omega = np.concatenate([part.coordinates["omega"].data for part in parts])
     labels = parts[0].coordinates["coordinate"]
     cases = _cases(names, parts, "omega", "point")
@@ -41,7 +43,7 @@ def response_arrays(assessment: Assessment) -> Arrays:
             **dict(_joined(parts)),
             "special_case": _cases(names, parts, "special_kind", "special"),
         },
-        {**dict(shared), "input_hash": assessment.input_hash},
+        {**shared, "input_hash": assessment.input_hash},
     )
 
 

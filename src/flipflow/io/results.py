@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from functools import singledispatch
+from pathlib import Path
 from typing import Any
 
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
@@ -134,7 +135,7 @@ def open_result(path: str | os.PathLike[str]) -> Any:
         For a file that is no result of flipflow, is damaged, or is of a later version.
     """
     source = checked_path("path", path)
-    if not source.is_file():
+    if not _is_file(source):
         raise InputError("path", str(path), "there is no such file; give one that ff.save wrote")
     if source.suffix != ".json":
         remedy = "only .json opens again; read .nc with xarray.open_dataset, .csv as a table"
@@ -161,8 +162,21 @@ def open_result(path: str | os.PathLike[str]) -> Any:
 def _shown(error: Exception) -> str:
     """What is wrong, on one line."""
     told = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-    line = " ".join(told.split()) or type(error).__name__
+    return _line(told) or type(error).__name__
+
+
+def _line(text: str) -> str:
+    """A text on one line, shortened."""
+    line = " ".join(text.split())
     return line if len(line) <= MOST_SHOWN else f"{line[: MOST_SHOWN - 3]}..."
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is such a file; of a name that is too long there is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 @singledispatch
@@ -212,7 +226,7 @@ def opener(schema: str) -> Callable[[Document], object]:
         return lambda document: CODEC.form(tuple[Orbit, ...]).read(document["orbits"])
     kinds = {known: kind for kind, known in SCHEMAS.items()}
     if schema not in kinds:
-        told = f"{schema!r} is no result that opens again; update flipflow if it is newer"
+        told = f"{_line(schema)!r} is no result that opens again; update flipflow if it is newer"
         raise StoreError(told)
     kind = kinds[schema]
     read = CODEC.form(kind).read

@@ -98,6 +98,7 @@ _OFFSET: Mapping[tuple[str, str], float] = {
     ("degC", "K"): -273.15,
     ("degC", "degF"): -160.0 / 9.0,
 }
+MOST_WRITTEN = 100  # characters of a quantity
 _NEVER_PINT = frozenset({"rad", "rad/s", "rad/s^2", "degC", ""})
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -151,6 +152,9 @@ def parse_quantity(
         return _bare(written, unit, field, example, allow_infinite=allow_infinite)
     if not isinstance(written, str):
         raise InputError(field, _toml(written), f"{what} belongs here, for example {example!r}")
+    if len(written) > MOST_WRITTEN:
+        remedy = f"{what} has at most {MOST_WRITTEN} characters, for example {example!r}"
+        raise InputError(field, written, remedy)
     text = _BLANKS.sub(" ", written).strip()
     if allow_infinite and text in {"inf", "+inf"}:
         return math.inf

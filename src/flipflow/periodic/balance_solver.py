@@ -8,6 +8,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.interruptible import interruptible
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion, motion_of_series
@@ -82,7 +83,10 @@ class BalanceSolver(Solver):
         code = np.zeros(omega.size, np.int64)
         walk = 2.0 * np.pi if whole_turn else self.balance.walk
         problem = self.balance._replace(walk=walk)
-        describe_balance(problem, self.balance_work, u, omega, series, code)
+        interruptible(
+            lambda: describe_balance(problem, self.balance_work, u, omega, series, code),
+            work=series.size * self.system.size,
+        )
         series[code != status.OK] = np.nan
         return series
 
@@ -133,7 +137,10 @@ class BalanceSolver(Solver):
         scratch = new_gap_motion(1, rate, spacing=int(self.balance_work.motion.spacing[0]))
         offset = np.ascontiguousarray(seen[:, :, ~moving].real.sum(axis=2))
         low, high = np.empty(offset.shape), np.empty(offset.shape)
-        observe_series(scratch, offset, np.ascontiguousarray(seen[:, :, moving]), low, high)
+        amplitudes = np.ascontiguousarray(seen[:, :, moving])
+        interruptible(
+            lambda: observe_series(scratch, offset, amplitudes, low, high), work=amplitudes.size
+        )
         return low, high, seen[:, :, self.harmonics == 1][:, :, 0]
 
     def motion(self, u: Real, omega: float) -> Motion:
@@ -197,7 +204,10 @@ class SampledSolver(BalanceSolver):
 
     def _read_off(self, u: Real, omega: Real, *, whole_turn: bool = False) -> Complex:
         series = super()._read_off(u, omega, whole_turn=whole_turn)
-        describe_sampled(self.sampled, self.sampled_work, u, omega, series)
+        interruptible(
+            lambda: describe_sampled(self.sampled, self.sampled_work, u, omega, series),
+            work=series.size * self.system.size,
+        )
         return series
 
 

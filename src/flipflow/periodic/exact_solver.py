@@ -8,6 +8,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.interruptible import interruptible
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion, motion_of_flow
@@ -104,9 +105,13 @@ class ExactSolver(Solver):
         record, states = np.empty((1, turns, z.size)), np.array(z)[None]
         nothing = np.zeros((0, z.size)), np.zeros((0, z.size, z.size)), np.zeros(0, np.int64)
         label, run, code = (np.zeros(1, np.int64) for _ in range(3))
-        settle_lanes(
-            self.whole, self.scratch, states, np.zeros(1), omega, *nothing, turns, record, label,
-            run, code,
+        interruptible(
+            lambda: settle_lanes(
+                self.whole, self.scratch, states, np.zeros(1), omega, *nothing, turns, record,
+                label, run, code,
+            ),
+            self.flow.stop,
+            work=turns * self.turns * self.system.size**2,
         )  # fmt: skip
         if code[0] != status.OK:
             raise IncompleteError(f"the flow over one turn at {omega:.6g} rad/s did not end")
@@ -143,9 +148,13 @@ class ExactSolver(Solver):
         problem = self.whole if whole_turn else self.problem
         modes = self.flow.modes.rate.shape[1] + self.machine.order.size
         scratch = new_gap_motion(count, np.zeros(modes, np.complex128))
-        observe_flow(
-            problem, self.scratch, states, omega, waiting, coordinates, scratch, low, high, first,
-            code,
+        interruptible(
+            lambda: observe_flow(
+                problem, self.scratch, states, omega, waiting, coordinates, scratch, low, high,
+                first, code,
+            ),
+            self.flow.stop,
+            work=omega.size * (1 + waiting) * self.turns * self.system.size**2,
         )  # fmt: skip
         bad = code != status.OK
         low[bad], high[bad], first[bad] = np.nan, np.nan, np.nan

@@ -15,6 +15,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.eigen import eigenvalues
+from flipflow.compiled.interruptible import interruptible
 from flipflow.continuation import correction, frequency_loop
 from flipflow.continuation.refinement import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
@@ -342,9 +343,16 @@ class Solver(ABC):
         test: int = 0,
     ) -> tuple[int, int, float]:
         """The compiled loop: status, points, share."""
-        return follow(
-            self.problem, self.scratch, self.corrector, record, u, omega, course, p, *shares, test
-        )
+
+        def run() -> tuple[int, int, float]:
+            return follow(
+                self.problem, self.scratch, self.corrector, record, u, omega, course, p, *shares,
+                test,
+            )  # fmt: skip
+
+        if record.omega.size == 1 or p != TRACE_ALL:
+            return run()
+        return interruptible(run, self.corrector.stop, self.flow.stop)
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""
@@ -453,9 +461,14 @@ class Solver(ABC):
         maps, error = np.empty((points, size, size)), np.empty(points)
         code = np.zeros(points, np.int64)
         square, pivot = np.empty((size, size)), np.zeros(size, np.int64)
-        corrected(
-            self.shooting(half_turn=half_turn), self.shooting_work, states.copy(), omega, harmonics,
-            series, square, pivot, np.empty(size), maps, error, code,
+        problem = self.shooting(half_turn=half_turn)
+        interruptible(
+            lambda: corrected(
+                problem, self.shooting_work, states.copy(), omega, harmonics, series, square,
+                pivot, np.empty(size), maps, error, code,
+            ),
+            self.shooting_work.flow.stop,
+            work=points * size**2,
         )  # fmt: skip
         return maps, error
 

@@ -92,13 +92,17 @@ def neimark_sacker(eigenvalues: Complex) -> Real:
     first, second = eigenvalues[..., i], eigenvalues[..., j]
     with np.errstate(over="ignore", invalid="ignore"):
         found = np.asarray(np.prod(1.0 - first * second, axis=-1).real)
-    # Where no number holds the product, each factor is taken as a share of its size.
-    beyond = ~np.isfinite(found) & np.isfinite(eigenvalues).all(axis=-1)
+    # Where no number holds the product, each factor is taken as a share of its size, and the sizes
+    # are added up as logarithms.
+    beyond = (~np.isfinite(found) | (found == 0.0)) & np.isfinite(eigenvalues).all(axis=-1)
     if beyond.any():
         first, second = first[beyond], second[beyond]
         of_first, of_second = (np.maximum(np.abs(one), 1.0) for one in (first, second))
         factors = 1.0 / of_first / of_second - (first / of_first) * (second / of_second)
-        found[beyond] = np.prod(factors, axis=-1).real
+        some = (factors != 0.0).all(axis=-1)
+        size = np.log(np.abs(factors), out=np.zeros(factors.shape), where=factors != 0.0)
+        most = np.clip(size.sum(axis=-1), -LARGEST_LOG, LARGEST_LOG)
+        found[beyond] = some * np.cos(np.angle(factors).sum(axis=-1)) * np.exp(most)
     return found
 
 

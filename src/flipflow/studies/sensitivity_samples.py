@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -100,17 +101,23 @@ def motion_values(
     rows = [tuple(map(_plain, row)) for row in zip(*columns.values(), strict=True)]
     values = np.full((len(rows), question.omega.size), np.nan)
 
+    ended = threading.Event()
+
     def chunk(begin: int) -> None:
         for k in range(begin, min(begin + CHUNK_ROWS, len(rows))):
+            if ended.is_set():
+                return
             values[k] = _sample(question, names, rows[k])
 
-    for done in _each(chunk, range(0, len(rows), CHUNK_ROWS), threads):
+    for done in _each(chunk, range(0, len(rows), CHUNK_ROWS), threads, ended):
         tell(done)
     return values
 
 
-def _each(work: Callable[[int], None], items: range, threads: int) -> Iterator[float]:
-    """Do all items and yield the share done after each."""
+def _each(
+    work: Callable[[int], None], items: range, threads: int, ended: threading.Event
+) -> Iterator[float]:
+    """Do all items and yield the share done after each; ``ended`` is set when nobody waits."""
     if threads == 1:
         for k, item in enumerate(items):
             work(item)
@@ -123,6 +130,7 @@ def _each(work: Callable[[int], None], items: range, threads: int) -> Iterator[f
             done.result()
             yield (k + 1) / len(items)
     finally:
+        ended.set()
         pool.shutdown(cancel_futures=True)
 
 

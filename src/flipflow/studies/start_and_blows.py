@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.limits import Passage
 from flipflow.model.load_case import case_words
+from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.studies.drive_check import (
@@ -154,17 +156,12 @@ def transients(
     alike: dict[FlipFlowScreen, list[str]] = {}
     for name, screen in screens.items():
         alike.setdefault(screen, []).append(name)
-    # Kernels leave the interpreter free, so that cases run side by side, and beside the blows.
-    with ThreadPoolExecutor(2) as pool:
-        waiting = [pool.submit(_runs, one, drive, omega) for one in alike]
-        jumps = [_jump(screen, omega) for screen in alike]
-        try:
-            runs = [one.result() for one in waiting]
-        except InputError as error:
-            if _known(project):
-                raise
-            reasons["start"] = _not_assumed(error)
-            drive, runs = None, [_Runs((), None) for _ in alike]
+    runs, jumps = _side_by_side(tuple(alike), drive, omega)
+    if isinstance(runs, InputError):
+        if _known(project):
+            raise runs
+        reasons["start"] = _not_assumed(runs)
+        drive, runs = None, [_Runs((), None) for _ in alike]
     starts = {
         name: (run, jump)
         for names, run, jump in zip(alike.values(), runs, jumps, strict=True)
@@ -186,13 +183,40 @@ class _Runs:
     coast_down: RunUp | None
 
 
-def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float) -> _Runs:
+def _side_by_side(
+    screens: tuple[FlipFlowScreen, ...], drive: Drive | None, omega: float
+) -> tuple[list[_Runs] | InputError, list[JumpRisk | str]]:
+    """The runs of each screen on two threads, and its blows beside them.
+
+    Where a run fails or Ctrl-C ends the wait, all end.
+    """
+    ended = threading.Event()
+
+    def heard(_sentence: str, _share: float) -> None:
+        if ended.is_set():
+            raise Cancelled("nobody waits for this run")
+
+    # Kernels leave the interpreter free.
+    pool = ThreadPoolExecutor(2)
+    try:
+        waiting = [pool.submit(_runs, one, drive, omega, heard) for one in screens]
+        jumps = [_jump(screen, omega) for screen in screens]
+        try:
+            return [one.result() for one in waiting], jumps
+        except InputError as error:
+            return error, jumps
+    finally:
+        ended.set()
+        pool.shutdown(cancel_futures=True)
+
+
+def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float, monitor: Monitor) -> _Runs:
     if drive is None:
         return _Runs((), None)
-    starts = starts_from_rest(screen, drive, omega)
+    starts = starts_from_rest(screen, drive, omega, monitor=monitor)
     if starts[0].outcome != "reached":
         return _Runs(starts, None)
-    return _Runs(starts, coast_down(screen, starts[0].final_speed, drive))
+    return _Runs(starts, coast_down(screen, starts[0].final_speed, drive, monitor=monitor))
 
 
 def _case(name: str, runs: _Runs, jump: JumpRisk | str, nothing: Mapping[str, str]) -> CaseRuns:

@@ -15,6 +15,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
+from flipflow.compiled.interruptible import interruptible
 from flipflow.errors import IncompleteError
 from flipflow.model.monitor import Monitor
 from flipflow.periodic.exact_solver import ExactSolver
@@ -169,15 +170,24 @@ class _Frame:
         self.touched = np.zeros(len(solver.springs))
         self.recent = self.z[None].copy()
 
+    def _grown(self, z: Real, frame: Real, growth: Real, states: Real, touched: Real) -> int:
+        """The kernel's status; it carries z and the frame over the periods of ``growth``."""
+        work = self.solver.shooting_work
+        return interruptible(
+            lambda: grow(
+                self.solver.machine, work, self.omega, self.parts, z, frame, growth, states,
+                touched,
+            ),
+            work.flow.stop,
+            work=self.parts * growth.shape[0] * z.size**2,
+        )  # fmt: skip
+
     def carry(self, periods: int) -> Real:
         """Growth in each of some periods, (P, 2 N)."""
         growth, states = np.empty((2, periods, self.z.size))
         while True:
             z, frame, touched = self.z.copy(), self.frame.copy(), self.touched.copy()
-            code = grow(
-                self.solver.machine, self.solver.shooting_work, self.omega, self.parts, z, frame,
-                growth, states, touched,
-            )  # fmt: skip
+            code = self._grown(z, frame, growth, states, touched)
             if code != status.SINGULAR or self.parts >= MOST_PARTS:
                 break
             self.parts *= 2

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -151,6 +153,29 @@ class History(Result):
         if self.torque is None:
             raise IncompleteError("The speed is prescribed here: there is no motor and no power.")
         return np.asarray(self.torque * self.omega)
+
+
+def thinned(history: History, most: int) -> History:
+    """The history with about ``most`` rows at most, the last one kept; a note says so.
+
+    Every k-th row stands, k odd: an even share of a turn would show the same phases every time.
+    """
+    rows = history.t.size
+    if rows <= most:
+        return history
+    step = math.ceil(rows / most) | 1
+    kept = np.append(np.arange(0, rows - 1, step), rows - 1)
+    names = ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal")
+    given = {name: getattr(history, name) for name in names}
+    thin: dict[str, Any] = {
+        name: None if values is None else values[kept] for name, values in given.items()
+    }
+    return replace(
+        history,
+        **thin,
+        works={name: values[kept] for name, values in history.works.items()},
+        notes=(*history.notes, f"Of {rows} calculated times every {step}th is kept."),
+    )
 
 
 def stop_forces(system: MechanicalSystem, x: Real, v: Real, regimes: Int) -> Real:

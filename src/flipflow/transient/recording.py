@@ -14,12 +14,29 @@ from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
-from flipflow.transient.sampling import Budget, Changes, Table, sample_motion
+from flipflow.transient.sampling import PANEL, Budget, Changes, Table, sample_motion
 
 Real = NDArray[np.float64]
 GAUSS_NODES = 16  # in each panel over which powers are integrated
 TURNS_A_CALL = 32  # turns calculated at once, between two calls of the monitor
-SHORTEST = 2.0**-12  # share of a turn below which a stretch that does not end is given up
+WORK_A_CALL = 4e5  # Gauss panels times N^2 at most, a tenth of a second: the work at low speeds
+SHORTEST = 2.0**-12  # share of a turn, or of what one call takes, at which it is given up
+
+
+def work_rate(system: MechanicalSystem, omega: float) -> float:
+    """Gauss panels times N^2 that a second of motion takes, by the fastest mode of any contact."""
+    n = system.size
+    fastest = omega
+    for share in (0.0, 1.0):
+        K, C = system.K.copy(), system.C.copy()
+        for spring in system.springs:
+            square = share * np.outer(spring.direction, spring.direction)
+            K += spring.stiffness * square
+            C += spring.damping * square
+        force = np.linalg.solve(system.M, np.concatenate([-K, -C], axis=1))
+        A = np.concatenate([np.eye(n, 2 * n, n), force])
+        fastest = max(fastest, float(np.abs(np.linalg.eigvals(A)).max()))
+    return fastest * n**2 / PANEL
 
 
 class Recording:
@@ -74,7 +91,8 @@ class Recording:
             work=np.zeros(3),
         )
         turn = 2.0 * np.pi / omega
-        stretch = TURNS_A_CALL * turn
+        stretch = min(TURNS_A_CALL * turn, WORK_A_CALL / work_rate(linear, omega))
+        shortest = SHORTEST * min(stretch, turn)
         t = begin
         while t < end:
             until = min(t + stretch, end)
@@ -82,7 +100,7 @@ class Recording:
             if reached is None:
                 # A turn has more contacts than are recorded at once: go on by parts of it.
                 stretch = min(stretch, turn) / 2.0
-                if stretch < turn * SHORTEST:
+                if stretch < shortest:
                     raise IncompleteError(
                         f"the motion could not be carried on beyond {t:.6g} s: its contacts are "
                         "too many, it grows beyond all numbers, or it is in resonance without "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from typing import cast
 
@@ -26,13 +27,16 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit, initial_state
 from flipflow.transient.history import ContactChange, History
-from flipflow.transient.recording import Recording
+from flipflow.transient.recording import Recording, work_rate
 from flipflow.transient.settling import MAX_PERIODS, Settling
 
 Real = NDArray[np.float64]
 SAMPLES_A_TURN = 128  # default times in each forcing period
 MOST_PERIODS = 1_000_000  # forcing periods that may be asked for
+MOST_WORK = 5e10  # as work_rate counts it: some hours
+WORK_AN_HOUR = 1.5e10  # on a processor of 2024
 MOST_SAMPLES = 20_000_000  # default times that are given without being asked for
+SILENT_SECONDS = 2.0  # before it is said how long the rest will take
 SETTLED = 1e-6  # distance from the periodic motion, relative to it, within which it has settled
 ROUNDING = 1e-12  # relative excess of the last time over the end that is rounding
 
@@ -69,7 +73,9 @@ def simulate(
     t
         Times in s at which the motion is wanted; 128 a period when left out.
     monitor
-        Called with a sentence and the share done; raise from it to cancel.
+        Called with a sentence, which after some seconds says how many more, and the share done;
+        raise from it to cancel. The work grows with the time that is simulated, in vibrations of
+        the fastest mode.
 
     Returns
     -------
@@ -80,7 +86,7 @@ def simulate(
     Raises
     ------
     InputError
-        For a speed, count, state or disturbance that makes no sense.
+        For a speed, count, state or disturbance that makes no sense, and for work of many hours.
     IncompleteError
         Where stops chatter: too many contacts even in a small part of a turn. Where the motion
         grows beyond all numbers, and at the very natural frequency of a machine without damping.
@@ -91,6 +97,7 @@ def simulate(
     turn = 2.0 * math.pi / speed
     end = periods * turn
     system = system_of(machine)
+    _require_time_for(system, speed, periods)
     times = _times(t, periods, turn)
     blows = sorted(_checked_blows(disturbances), key=lambda one: one.t)
     if blows and blows[-1].t >= end:
@@ -117,6 +124,17 @@ def simulate(
         method="exact flow",
         counters={"events": len(run.recording.changes)},
     )
+
+
+def _require_time_for(system: MechanicalSystem, omega: float, periods: int) -> None:
+    """Refuse turns so slow that the vibrations in them take hours."""
+    work = work_rate(system.with_bonded(), omega) * periods * 2.0 * math.pi / omega
+    if work > MOST_WORK:
+        raise InputError(
+            "omega", omega,
+            f"{periods} turns at it hold so many of the machine's own vibrations that they take "
+            f"about {work / WORK_AN_HOUR:.2g} hours; give fewer periods or a higher speed",
+        )  # fmt: skip
 
 
 def _settled(system: MechanicalSystem, z: Real, omega: float) -> tuple[float | None, bool]:
@@ -163,7 +181,7 @@ class _Run:
         monitor: Monitor | None,
     ) -> None:
         self.machine, self.build, self.omega, self.end = machine, build, omega, end
-        self.monitor = monitor
+        self.monitor, self.began = monitor, time.monotonic()
         self.springs = build(machine).springs
         # The flow knows only springs that can open and close.
         self.kept = [k for k, one in enumerate(self.springs) if one.acts and not one.bonded]
@@ -262,8 +280,13 @@ class _Run:
         return screen.loaded(load).replace(measured_shift=screen.measured_shift)
 
     def _tell(self, t: float) -> None:
-        if self.monitor is not None:
-            self.monitor(f"{t:.4g} s of {self.end:.4g} s", t / self.end)
+        if self.monitor is None:
+            return
+        passed = time.monotonic() - self.began
+        sentence = f"{t:.4g} s of {self.end:.4g} s"
+        if passed > SILENT_SECONDS:
+            sentence += f", about {passed * (self.end / t - 1.0):.0f} s to go"
+        self.monitor(sentence, t / self.end)
 
 
 def _normal(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.contact_law import engaged_side
 from flipflow.model.drive import Drive, SpeedProfile
@@ -33,6 +34,7 @@ SETTLED = 1e-7  # change of the state over a period, relative to it, within whic
 MOST_TURNS = 2000  # turns waited for a motion to settle
 TURNS_AT_ONCE = 20  # turns between two looks at whether it has settled
 MOST_PERIODS = 6  # turns after which a settled motion may repeat
+MOST_STEPS = 5e6  # for these turns: half a minute, and it settles in twice as many at least
 
 STATUS = {
     status.OK: "The whole time was calculated.",
@@ -145,8 +147,21 @@ def settled_start(machine: Machine, speed: float, method: RungeKutta | None = No
 
     The motion may repeat after up to six turns. Where it has not settled after 2000 turns, the
     state reached then is returned, marked as not settled.
+
+    Raises
+    ------
+    InputError
+        Without damping, and where so slow a turn is too many steps of the fastest vibration.
     """
     movable(machine)
+    duration = TURNS_AT_ONCE * 2.0 * np.pi / speed
+    steps = duration / _stepper(machine, speed, at_rest(machine).state, method).longest_step
+    if steps > MOST_STEPS:
+        remedy = (
+            f"{TURNS_AT_ONCE} turns at it are about {steps:.0e} steps, more than is waited for "
+            "until the motion has settled; give a higher speed"
+        )
+        raise InputError("speed", speed, remedy)
     state = at_rest(machine).state
     for _ in range(MOST_TURNS // TURNS_AT_ONCE):
         state = _carried(machine, speed, state, TURNS_AT_ONCE - MOST_PERIODS, method)
@@ -163,13 +178,18 @@ def _carried(
     machine: Machine, speed: float, state: Real, turns: int, method: RungeKutta | None
 ) -> Real:
     """The state after some turns at constant speed."""
-    stepper = Stepper(
-        system_of(machine), SpeedProfile((0.0, 1.0), (speed, speed)), state,
-        normal=normal_direction(machine), method=method, fastest=speed,
-    )  # fmt: skip
+    stepper = _stepper(machine, speed, state, method)
     for _stretch in stepper.run(turns * 2.0 * np.pi / speed):
         pass
     return stepper.walk.s[: state.size].copy()
+
+
+def _stepper(machine: Machine, speed: float, state: Real, method: RungeKutta | None) -> Stepper:
+    """A run at constant speed from a state."""
+    return Stepper(
+        system_of(machine), SpeedProfile((0.0, 1.0), (speed, speed)), state,
+        normal=normal_direction(machine), method=method, fastest=speed,
+    )  # fmt: skip
 
 
 def steady_power(

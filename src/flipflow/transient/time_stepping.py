@@ -186,6 +186,11 @@ class Stepper:
         return float(self.walk.s[2 * self.size + 1])
 
     @property
+    def longest_step(self) -> float:
+        """Longest step in s; the only one of a method with a fixed step."""
+        return float(self.method.step or self.walk.longest)
+
+    @property
     def counters(self) -> dict[str, int]:
         """Steps, events, rejected steps."""
         count = self.walk.tally

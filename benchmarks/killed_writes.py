@@ -1,0 +1,127 @@
+"""Commands killed while they write: the files they leave are the old ones or the new ones.
+
+Each command runs again and again in two cases, so that every run replaces what the one before has
+written, and is killed by SIGKILL at a random moment after it begins to write.
+"""
+
+import argparse
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+LINEAR = ("ffs0827-linear", "--speeds", "800 rpm", "900 rpm", "-o")
+# Words of a command in two cases; what it writes stands in the folder that is added last.
+CASES = {
+    "analyze": (
+        ("analyze", *LINEAR),
+        ("analyze", "--overwrite", "--harmonics", "3", *LINEAR),
+    ),
+    "simulate": (
+        ("simulate", "ffs0827", "--periods", "20", "-o"),
+        ("simulate", "ffs0827", "--periods", "30", "-o"),
+    ),
+    "simulate --json": (
+        ("simulate", "ffs0827", "--periods", "20", "--json"),
+        ("simulate", "ffs0827", "--periods", "30", "--json"),
+    ),
+    "reproduce": (
+        ("reproduce", "2c", "-o"),
+        ("reproduce", "2c", "--machine", "ffs0827-linear", "-o"),
+    ),
+}
+CHILD = """
+import json, sys
+from flipflow.cli.main import main
+from flipflow.results import stage
+from flipflow.cli import destination
+
+def telling(function):
+    def told(*given, **options):
+        print("writing", file=sys.stderr, flush=True)
+        return function(*given, **options)
+    return told
+
+stage.Stage.commit = telling(stage.Stage.commit)
+cases, out = json.loads(sys.argv[1]), sys.argv[2]
+for k in range(1_000_000):
+    sys.argv = ["flipflow", *cases[k % 2], out]
+    if "analyze" in sys.argv and k % 2 == 0:
+        sys.argv.insert(2, "--overwrite")
+    try:
+        main()
+    except SystemExit as ended:
+        assert ended.code in (0, None, 3), ended.code
+"""
+
+
+def content(out):
+    """Files by name; what is aside is none of the set."""
+    if out.is_file():
+        return {out.name: out.read_bytes()}
+    if not out.exists():
+        return {}
+    return {
+        path.name: path.read_bytes()
+        for path in sorted(out.rglob("*"))
+        if path.is_file() and ".part" not in str(path)
+    }
+
+
+def attempt(cases, out, rng):
+    """Kill a run at its third to sixth writing, up to 30 ms after that began."""
+    import json  # noqa: PLC0415
+
+    words = [sys.executable, "-c", CHILD, json.dumps(cases), str(out)]
+    with subprocess.Popen(
+        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as child:
+        for _ in range(rng.randrange(3, 7)):
+            while "writing" not in child.stderr.readline():
+                assert child.poll() is None
+        time.sleep(rng.uniform(0.0, 0.03))
+        child.send_signal(signal.SIGKILL)
+        child.stderr.read()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("names", nargs="*", help="of analyze, simulate, ...; all if left out")
+    given = parser.parse_args()
+    print(f"seed {given.seed}")
+    bad, rng = 0, random.Random(given.seed)  # noqa: S311
+    for name in given.names or CASES:
+        with tempfile.TemporaryDirectory() as folder:
+            bad += tried(name, Path(folder), rng, given.kills)
+    return 1 if bad else 0
+
+
+def tried(name, folder, rng, kills):
+    """Number of attempts that left neither the one set nor the other."""
+    cases, file = CASES[name], "motion.json" if "--json" in CASES[name][0] else ""
+    sets = []
+    for k, words in enumerate(cases):
+        out = folder / f"case-{k}" / file
+        out.parent.mkdir(exist_ok=True)
+        run = [sys.executable, "-m", "flipflow", *words, str(out)]
+        assert subprocess.run(run, check=False, capture_output=True).returncode in (0, 3)
+        sets.append(content(out))
+    counts = Counter()
+    for _ in range(kills):
+        out = folder / "out" / file
+        out.parent.mkdir(exist_ok=True)
+        attempt(cases, out, rng)
+        left = content(out)
+        counts["neither" if left not in sets else ("first", "second")[sets.index(left)]] += 1
+    print(f"{name:20s} {dict(counts)}", flush=True)
+    return counts["neither"]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
