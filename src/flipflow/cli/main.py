@@ -97,6 +97,9 @@ def _never_lost() -> Iterator[None]:
         sys.unraisablehook = before
         for later in waiting:
             later.cancel()
+        # An interrupt that passed through code made from text, as dataclasses are, has "python -m"
+        # end itself by SIGINT in place of the exit code; running such code forgets it.
+        exec("")  # noqa: S102
 
 
 @contextmanager
