@@ -135,9 +135,13 @@ def kill_workers(make, folder, kills, rng):
 
         def shoot():
             while len(counted) < kills and not done.is_set():
-                # Faster than workers begin, kills would let none of them come to work.
-                while len(cluster.scheduler.workers) < WORKERS and not done.is_set():
-                    time.sleep(0.05)
+                # Half of the kills wait for a chunk more: faster than workers begin, kills would
+                # let none of them come to work.
+                count = len(list(folder.glob("checksum/c.*")))
+                waits = rng.random() < 0.5
+                while waits and len(list(folder.glob("checksum/c.*"))) <= count:
+                    if done.wait(0.02):
+                        return
                 time.sleep(rng.exponential(0.5))
                 nannies = list(cluster.workers.values())
                 # A worker that is being started anew has no number yet, or has ended already.
