@@ -23,6 +23,7 @@ from flipflow.studies.basins import Basins
 from flipflow.studies.compare import Comparison
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
 from flipflow.transient.history import History
 
 OLD = Path(__file__).parents[1] / "documents"
@@ -87,15 +88,25 @@ COMMANDS = {
     "sensitivity": (Sensitivity, LINEAR, "--vary", "floating_mass=+-5 %", "--n", "2"),
     "simulate": (History, LINEAR, "--periods", "2"),
     "startup": (Startup, LINEAR, "--profile", "0 s: 0 rpm, 0.3 s: 300 rpm"),
+    "study": (Study, "study.toml"),
     "sweep": (Sweeps, LINEAR, "--speeds", "800 rpm", "802 rpm", "--steps", "2", "--rate", "60"),
 }
+STUDY = f"""
+machine = "{LINEAR}"
+[vary]
+floating_mass = ["300 kg", "310 kg"]
+[study]
+quantities = ["relative_amplitude"]
+speed = "800 rpm"
+"""
 NO_RESULT = {"new", "schema"}
-NAMED = {"basins", "orbits", "sensitivity", "simulate"}
+NAMED = {"basins", "orbits", "sensitivity", "simulate", "study"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_document_of_a_command_opens_as_what_was_found(command, monkeypatch, tmp_path, name):
     monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(STUDY)
     kind, *words = COMMANDS[name]
     code, _, err = command(name, *words, "--json", "found.json")
     assert code == 0, err

@@ -45,6 +45,11 @@ class Course(NamedTuple):
     beside_lower: float = -math.inf
     beside_upper: float = math.inf
 
+    @property
+    def along_omega(self) -> tuple[float, ...]:
+        """All but the bounds of a second parameter, which a branch over frequency has none of."""
+        return self[:6]
+
 
 class Corrector(NamedTuple):
     """Scratch of the bordered Newton solves, and the last two points, all at one section."""

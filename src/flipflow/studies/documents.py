@@ -83,7 +83,7 @@ BRANCH = CODEC.table(
         "saddle_side_at_start": bool, "return_maps": Real, "unknowns": Real, **RECORDED, **TRIED,
         "code": int, "course": tuple[float, ...],
     },
-    **FORMULATION_AT, unknowns="traced.u", code="traced.code", course="traced.course",
+    **FORMULATION_AT, unknowns="traced.u", code="traced.code", course="traced.course.along_omega",
     **{name: f"traced.record.{name}" for name in RECORDED},
     **{name: f"traced.{name}" for name in TRIED},
 )  # fmt: skip
