@@ -48,6 +48,8 @@ from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -122,6 +124,15 @@ def screen() -> ff.FlipFlowScreen:
 def plain() -> ff.FlipFlowScreen:
     """The same without stop: closed form."""
     return ff.load("ffs0827-linear")
+
+
+@cache
+def stored() -> Path:
+    """The store of a study."""
+    path = folder() / "study.zarr"
+    vary, sample = {"main_mass": (900.0, 920.0)}, ff.Sample(n=4)
+    ff.study(plain(), vary, "relative_amplitude", OMEGA, sampling=sample, store=path)
+    return path
 
 
 @cache
@@ -312,6 +323,15 @@ def functions() -> tuple[Call, ...]:
         Call("sweep", ff.sweep,
              {"machine": tiny(), "omega": [99.0, OMEGA], "initial": "rest", "max_periods": 1,
               "most_turns": 50, "monitor": None}, (Sweep,)),
+        Call("study", ff.study,
+             {"machine": plain(), "vary": {"main_mass": (900.0, 920.0)},
+              "quantities": "relative_amplitude", "omega": OMEGA, "load_cases": (),
+              "sampling": ff.Sample(n=4), "branch": "from-below", "store": None,
+              "executor": None, "threads": 1, "monitor": None}, (Study,)),
+        Call("open_study", ff.open_study, {"path": stored()}, (Study,)),
+        Call("tolerance", ff.tolerance,
+             {"study": ff.open_study(stored()), "limits": ff.Limits(relative_amplitude=(0.0, 1.0))},
+             (Tolerance,)),
         Call("switch_branch", ff.switch_branch,
              {"point": doubled(), "interval": (doubled().omega - 0.1, doubled().omega + 0.1),
               "monitor": None}, (Branch,)),
@@ -328,6 +348,7 @@ def classes() -> tuple[Call, ...]:
             "harmonics": 3, "samples": 256, "sharpness": 1e6, "points": 300,
         },
         ff.RungeKutta: {"formula": "dopri5", "tolerance": 1e-8, "step": None},
+        ff.Sample: {"n": 8, "method": "sobol", "seed": 0, "covariance": None},
         ff.Choice: {"values": (1.0, 2.0)},
         ff.Normal: {"mean": 1.0, "std": 0.1},
         ff.ClearanceSpring: {

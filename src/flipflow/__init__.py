@@ -38,6 +38,10 @@ _HOME = {
     "lyapunov_exponents": "flipflow.studies.lyapunov",
     "bifurcation_diagram": "flipflow.studies.bifurcation_diagram",
     "sensitivity": "flipflow.studies.sensitivity",
+    "study": "flipflow.studies.study",
+    "open_study": "flipflow.studies.study",
+    "tolerance": "flipflow.studies.tolerance",
+    "Sample": "flipflow.model.sampling",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
     "response_family": "flipflow.studies.response_family",
@@ -89,7 +93,9 @@ _HOME = {
     "Sensitivity": "flipflow.studies.sensitivity",
     "SpecialPoint": "flipflow.continuation.branch",
     "Spectrum": "flipflow.studies.poincare",
+    "Study": "flipflow.studies.study",
     "Sweep": "flipflow.transient.sweep",
+    "Tolerance": "flipflow.studies.tolerance",
     "Cancelled": "flipflow.errors",
     "IncompleteError": "flipflow.errors",
     "MissingExtra": "flipflow.errors",
@@ -135,6 +141,7 @@ if TYPE_CHECKING:
     from flipflow.model.limits import PassingLimits as PassingLimits
     from flipflow.model.motor import Motor as Motor
     from flipflow.model.project import Project as Project
+    from flipflow.model.sampling import Sample as Sample
     from flipflow.model.screen import FlipFlowScreen as FlipFlowScreen
     from flipflow.model.screen import Load as Load
     from flipflow.model.starter import Converter as Converter
@@ -179,6 +186,11 @@ if TYPE_CHECKING:
     from flipflow.studies.response_family import response_family as response_family
     from flipflow.studies.sensitivity import Sensitivity as Sensitivity
     from flipflow.studies.sensitivity import sensitivity as sensitivity
+    from flipflow.studies.study import Study as Study
+    from flipflow.studies.study import open_study as open_study
+    from flipflow.studies.study import study as study
+    from flipflow.studies.tolerance import Tolerance as Tolerance
+    from flipflow.studies.tolerance import tolerance as tolerance
     from flipflow.transient.history import History as History
     from flipflow.transient.simulate import simulate as simulate
     from flipflow.transient.startup import RunUp as RunUp

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.batch.lane_path import FORBIDDEN, FOUND, UNSTABLE
+from flipflow.batch.reasons import FOUND, REFUSED, UNSTABLE
 from flipflow.model.quantities import quantity_named
 from flipflow.studies.lane_values import lane_values
 from flipflow.studies.quantity_values import MOTION_VALUES, Working
@@ -108,7 +108,7 @@ def test_a_lane_that_fails_poisons_no_neighbour(screen):
     columns["clearance"][19] = np.nan
     found, why = values(screen, columns, "relative_amplitude")
     struck = np.isin(np.arange(30), (7, 19))
-    assert (why[struck] == FORBIDDEN).all()
+    assert (why[struck] == REFUSED).all()
     assert np.isnan(found[struck]).all()
     np.testing.assert_array_equal(found[~struck], clean[~struck])
 

@@ -38,6 +38,8 @@ from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import Peak, RunUp
 from flipflow.transient.sweep import Sweep
@@ -76,6 +78,15 @@ def response() -> Branch:
 def assessed() -> Assessment:
     project = ff.load_project("ffs0827")
     return ff.assess(dataclasses.replace(project, load_cases=project.load_cases[:2]))
+
+
+def studied() -> Study:
+    """A few machines under two loads, whose normal fields vary together."""
+    vary = {"main_mass": ff.Normal(916.0, 2.0), "floating_mass": ff.Normal(310.0, 1.0)}
+    sample = ff.Sample(n=4, covariance=[[4.0, 1.0], [1.0, 1.0]])
+    loads = [ff.Load(name="empty"), ff.Load(name="full", floating_mass=30.0)]
+    asked = ("relative_amplitude", "omega_lb", "omega_ub")
+    return ff.study(screen(), vary, asked, 120.0, sampling=sample, load_cases=loads)
 
 
 MADE: dict[type, list[Callable[[], object]]] = {
@@ -147,6 +158,19 @@ MADE: dict[type, list[Callable[[], object]]] = {
             screen(), {"clearance": ff.Choice((5e-3, 6e-3))}, "omega_ub", (80.0, 230.0), n=2
         ),
     ],
+    Study: [
+        studied,
+        lambda: ff.study(
+            screen(),
+            {"clearance": np.array([5e-3, 6e-3]), "stop_law": ff.Choice(("paper", "elasto-gap"))},
+            "stroke",
+            120.0,
+        ),
+        lambda: ff.study(
+            chain(), {"forcing": (0.9, 1.1)}, "stop_force", 0.8, sampling=ff.Sample(n=4)
+        ),
+    ],
+    Tolerance: [lambda: ff.tolerance(studied(), ff.Limits(relative_amplitude=(5e-3, 9e-3)))],
     Assessment: [assessed],
     Reproduction: [lambda: ff.reproduce(figures=("1", "3", "5"))],
 }

@@ -71,6 +71,15 @@ MADE: dict[str, Callable[[], object]] = {
     "Sensitivity": lambda: ff.sensitivity(
         screen(), {"clearance": (5.4e-3, 6.6e-3)}, "relative_amplitude", omega=120.0, n=16, rng=0
     ),
+    "Study": lambda: ff.study(
+        screen(),
+        {"clearance": (5.4e-3, 6.6e-3)},
+        ("relative_amplitude", "omega_ub"),
+        [89.0, 120.0],
+        sampling=ff.Sample(n=4),
+        load_cases=[ff.Load(name="empty"), ff.Load(name="hot", temperature=40.0)],
+    ),
+    "Tolerance": lambda: ff.tolerance(made("Study"), ff.Limits(relative_amplitude=(5e-3, 9e-3))),
     "Comparison": lambda: ff.compare([screen(), screen().replace(clearance=5e-3)], omega=89.0),
     "FoundationLoads": lambda: ff.foundation_loads({"empty": branch().orbits_at(89.0)[0]}),
     "Assessment": lambda: ff.assess(ff.load_project("ffs0827")),

@@ -10,13 +10,9 @@ import numpy as np
 from flipflow.batch.lane_path import (
     FAR,
     FAR_FROM_GUESS,
-    FORBIDDEN,
-    FOUND,
     MARGIN,
-    NO_MOTION,
     PUSH,
     SAME,
-    UNSTABLE,
     LaneWork,
     contact_free_state,
     follow,
@@ -28,6 +24,7 @@ from flipflow.batch.lane_path import (
     settle,
 )
 from flipflow.batch.lane_readings import Asked, Readings, ReadingWork, read_lane
+from flipflow.batch.reasons import FOUND, NO_MOTION, REFUSED, UNSTABLE
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
@@ -92,7 +89,7 @@ def run_lanes(
     are even.
     """
     for lane in range(first, last):
-        if found.reason[lane, 0] == FORBIDDEN:
+        if found.reason[lane, 0] == REFUSED:
             continue
         forget(work)
         machine = machine_of(batch, lane)

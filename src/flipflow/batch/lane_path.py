@@ -46,8 +46,6 @@ TURNS_MOST = 64 * 64
 PUSH = 1e-2  # share of the state by which an even motion is pushed out of symmetry
 SAME = 1e-6  # first Newton step, as a share of the motion, within which two motions are one
 
-FOUND, UNSTABLE, NO_MOTION, FAILED, FORBIDDEN, NOT_RUN = 0, 1, 2, 3, 4, 5
-
 
 class LaneWork(NamedTuple):
     """Scratch of one thread for machines of N degrees of freedom; one lane after the other."""

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipflow.batch.lane_kernels import Found, new_found, run_lanes
-from flipflow.batch.lane_path import FOUND, NOT_RUN, new_lane_work
+from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
+from flipflow.batch.reasons import FOUND, NOT_COMPUTED
 from flipflow.batch.variants import Batch, stacked
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_arrays
@@ -89,7 +90,7 @@ def solve_lanes(
     """
     lanes, speeds = batch.rows.size, omega.size
     nominal = _machine(batch.arrays, 0)
-    found = new_found(lanes, speeds, batch.system.size, NOT_RUN)
+    found = new_found(lanes, speeds, batch.system.size, NOT_COMPUTED)
     readings = new_readings(lanes, speeds, nominal, asked)
     length = characteristic_length(batch.system, nominal)
     # A read-only array is another type to the compiler, and would be compiled for anew.

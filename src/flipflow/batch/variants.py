@@ -115,6 +115,7 @@ def _one_by_one(machine: Machine, columns: Columns, allowed: Bool) -> list[Batch
 def _sums(machine: Machine, columns: Columns, allowed: Bool) -> Batch | None:
     """All allowed variants as sums over their parameters; None where they are no sums."""
     rows = np.flatnonzero(allowed)
+    machine = _with_own(machine, columns, rows)
     own = {name: value_of(machine, name) for name in columns}
     numbers = [isinstance(value, float) and math.isfinite(value) for value in own.values()]
     words = any(column.dtype.kind != "f" for column in columns.values())
@@ -135,6 +136,12 @@ def _sums(machine: Machine, columns: Columns, allowed: Bool) -> Batch | None:
             return None
     arrays = _assembled(system, total, shapes)
     return None if arrays is None else Batch(rows, system, arrays)
+
+
+def _with_own(machine: Machine, columns: Columns, rows: Int) -> Machine:
+    """The machine, with the first value of each column where it has none of its own."""
+    none = [name for name in columns if value_of(machine, name) is None] if rows.size else []
+    return with_values(machine, {name: columns[name][rows[0]].item() for name in none})
 
 
 def _row(machine: Machine, columns: Columns, row: int) -> Machine:

@@ -25,6 +25,8 @@ from flipflow.cli.schema import schema
 from flipflow.cli.sensitivity import sensitivity
 from flipflow.cli.simulate import simulate
 from flipflow.cli.startup import startup
+from flipflow.cli.store import info
+from flipflow.cli.study import study
 from flipflow.cli.sweep import sweep
 from flipflow.errors import Cancelled, FlipflowError, StoreError
 
@@ -49,6 +51,7 @@ COMMANDS = (
     orbits,
     startup,
     sensitivity,
+    study,
     reproduce,
 )
 
@@ -68,6 +71,13 @@ def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
 
 for one in COMMANDS:
     app.command()(_stoppable(one))
+
+
+stores = typer.Typer(
+    help="Stores of studies.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
+)
+stores.command()(_stoppable(info))
+app.add_typer(stores, name="store")
 
 
 def _show_version(wanted: bool) -> None:

@@ -17,7 +17,7 @@ from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import InputError
 from flipflow.io.labelled import Arrays, Variable
-from flipflow.model.quantities import QUANTITIES
+from flipflow.model.quantities import QUANTITIES, quantity_named
 from flipflow.model.screen import is_screen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.orbit import Orbit
@@ -41,6 +41,9 @@ from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
+from flipflow.studies.study_plan import unit_of
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -517,6 +520,74 @@ def _(found: Sensitivity) -> Arrays:
             "variance": Variable(dims[:-1], np.asarray(found.variance)),
         },
         _attributes(found, quantity=found.quantity, groups=found.n),
+    )
+
+
+@arrays_of.register
+def _(found: Study) -> Arrays:
+    dims = ("sample", "case", "omega")
+    asked = {name: quantity_named(name, found.machine) for name in found.quantities}
+    whole = {name for name, one in asked.items() if one.of == "response"}
+    own = {name: dims[:2] if name in whole else dims for name in asked}
+    ends = {"low": found.at_low, "high": found.at_high}
+    return Arrays(
+        "Quantities of many machines",
+        "sample",
+        {
+            "case": _column("case", np.array(found.cases, str)),
+            "omega": _column("omega", found.omega, "rad/s"),
+            "field": _column("field", np.array(found.names, str)),
+        },
+        {
+            **{
+                name: _column("sample", column, unit_of(found.machine, name))
+                for name, column in found.columns.items()
+            },
+            **{name: Variable(own[name], found.values[name], asked[name].unit) for name in asked},
+            "reason": Variable(dims, found.reason),
+            **{
+                f"nominal_{name}": Variable(own[name][1:], found.nominal[name], asked[name].unit)
+                for name in asked
+            },
+            **{
+                f"{end}_{name}": Variable(("field", *own[name][1:]), table[name], asked[name].unit)
+                for end, table in ends.items()
+                for name in asked
+            },
+        },
+        _attributes(found, sampling=found.sampling, branch=found.branch),
+    )
+
+
+@arrays_of.register
+def _(found: Tolerance) -> Arrays:
+    ends = ("frequency", "end")
+    return Arrays(
+        "Machines that meet every limit",
+        "frequency",
+        {
+            "omega": _column("frequency", found.omega, "rad/s"),
+            "end": _column("end", np.array(["low", "high"])),
+            "limit": _column("limit", np.array(found.checked, str)),
+            "case": _column("case", np.array(found.cases, str)),
+            "field": _column("field", np.array(found.names, str)),
+            "factor": _column("factor", found.factors),
+        },
+        {
+            "share": _column("frequency", found.share),
+            "share_interval": Variable(ends, found.share_interval),
+            "unknown": _column("frequency", found.unknown),
+            "jump_share": _column("frequency", found.jump_share),
+            "jump_interval": Variable(ends, found.jump_interval),
+            "coexisting": _column("frequency", found.coexisting),
+            "by_limit": Variable(("frequency", "limit"), found.by_limit.T),
+            "by_case": Variable(("frequency", "case"), found.by_case.T),
+            "halved": Variable(("frequency", "field"), found.halved.T),
+            "scaled": Variable(("frequency", "factor"), found.scaled.T),
+            "passing": Variable(("machine", "frequency"), found.passing),
+            "jumped": Variable(("machine", "frequency"), found.jumped),
+        },
+        _attributes(found, machines=found.size),
     )
 
 

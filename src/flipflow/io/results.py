@@ -36,6 +36,8 @@ from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -62,6 +64,8 @@ SCHEMAS: dict[type, str] = {
     Loading: "flipflow/loading/1",
     ResponseFamily: "flipflow/response-family/1",
     Sensitivity: "flipflow/sensitivity/1",
+    Study: "flipflow/study/1",
+    Tolerance: "flipflow/tolerance/1",
     Assessment: "flipflow/assessment/1",
     Comparison: "flipflow/comparison/1",
     Startup: "flipflow/startup/1",

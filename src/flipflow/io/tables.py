@@ -72,11 +72,17 @@ def table_columns(arrays: Arrays) -> Iterator[tuple[str, Variable]]:
     for name, one in {**arrays.coordinates, **arrays.variables}.items():
         if one.dims == (arrays.index,):
             yield name, one
-        elif len(one.dims) == 2 and one.dims[0] == arrays.index:
-            labels = arrays.coordinates.get(one.dims[1])
-            for k, values in enumerate(one.data.T):
-                label = k if labels is None else labels.data[k]
-                yield f"{name}_{label}", Variable((arrays.index,), values, one.units)
+        elif len(one.dims) > 1 and one.dims[0] == arrays.index:
+            for place in np.ndindex(one.data.shape[1:]):
+                words = [_label(arrays, dim, k) for dim, k in zip(one.dims[1:], place, strict=True)]
+                values = one.data[(slice(None), *place)]
+                yield "_".join([name, *words]), Variable((arrays.index,), values, one.units)
+
+
+def _label(arrays: Arrays, dim: str, place: int) -> str:
+    """What stands at a place of a dimension: its coordinate, else the place itself."""
+    known = arrays.coordinates.get(dim)
+    return str(place if known is None else known.data[place])
 
 
 def csv_text(arrays: Arrays) -> str:

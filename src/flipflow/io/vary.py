@@ -37,7 +37,7 @@ def read_vary(words: Iterable[str], screen: FlipFlowScreen) -> dict[str, object]
         if not sign or not text:
             raise InputError(OPTION, word, EXAMPLE)
         name, count = _pieces(name, word, screen)
-        field = _field(name, word)
+        field = field_named(name, word)
         if field.name in found:
             raise InputError(OPTION, word, f"{field.name} is given twice, name each field once")
         found[field.name] = _checked(field, text, word, screen, count)
@@ -46,7 +46,14 @@ def read_vary(words: Iterable[str], screen: FlipFlowScreen) -> dict[str, object]
     return found
 
 
-def _field(name: str, word: str) -> Field:
+def field_named(name: str, word: str) -> Field:
+    """A field by its name, its place in the file, or the last part of that.
+
+    Raises
+    ------
+    InputError
+        For what names no field, or several; ``word`` is what was written.
+    """
     if name in FIELD:
         return FIELD[name]
     fitting = [key for key in BY_KEY if name in (key, key.rpartition(".")[2])]
@@ -64,7 +71,7 @@ def _pieces(name: str, word: str, screen: FlipFlowScreen) -> tuple[str, float]:
     total = name.removesuffix(EACH)
     if total == name:
         return name, 1.0
-    counter = _field(total, word).count
+    counter = field_named(total, word).count
     if counter is None:
         raise InputError(OPTION, word, f"{total} is not made of pieces, leave {EACH} out")
     count = getattr(screen, counter)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, Self, get_args
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
@@ -31,6 +33,11 @@ Measured = Literal["standing", "drawn"]
 Rotation = Literal["with-flow", "counter-flow"]
 TemperatureOf = Literal["rubber", "air"]
 _FACTORS = ("stiffness_factor", "damping_factor", "stop_stiffness_factor", "stop_damping_factor")
+# Fields that a load changes.
+LOADED = (
+    "main_mass", "floating_mass", "shear_stiffness", "shear_damping", "stop_stiffness",
+    "stop_damping",
+)  # fmt: skip
 DEGREES = "give a finite number of degrees Celsius, or None"
 
 
@@ -196,19 +203,9 @@ class FlipFlowScreen:
         that hung there before stays where it was measured: the factors are dynamic ones.
         """
         checked_kind("load", load, Load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
-        factor = load.stiffness_factor * self.temperature_stiffness_factor(load.temperature)
-        stiffness = self.shear_stiffness * factor
-        stop_factor = load.stop_stiffness_factor * self.stop_temperature_stiffness_factor(
-            load.temperature
-        )
         return self.replace(
-            main_mass=self.main_mass + load.main_mass,
-            floating_mass=self.floating_mass + load.floating_mass,
-            shear_stiffness=stiffness,
-            shear_damping=self.shear_damping * load.damping_factor,
-            stop_stiffness=self.stop_stiffness * stop_factor,
-            stop_damping=self.stop_damping * load.stop_damping_factor,
-            measured_shift=self._shift_under(load, stiffness),
+            **loaded_values(self, load, {name: getattr(self, name) for name in LOADED}),
+            measured_shift=self._shift_under(load),
         )
 
     @property
@@ -229,9 +226,10 @@ class FlipFlowScreen:
         """Whether it is known what the weight does to the gaps."""
         return self.deck_angle is not None
 
-    def _shift_under(self, load: Load, stiffness: float) -> float | None:
+    def _shift_under(self, load: Load) -> float | None:
         """The shift under a load; None where the machine still stands as it was measured."""
-        shift = self.gap_shift + self._sag(load.floating_mass, stiffness)
+        springs = loaded_values(self, load, {"shear_stiffness": self.shear_stiffness})
+        shift = self.gap_shift + self._sag(load.floating_mass, springs["shear_stiffness"])
         measured = self.measured_shift is None and self.clearance_measured == "standing"
         return None if measured and shift == 0.0 else shift
 
@@ -306,6 +304,48 @@ def _equations(screen: FlipFlowScreen) -> MechanicalSystem:
         excitation=Unbalance([screen.eccentric_moment, 0.0]),
         coordinates={"main": (1.0, 0.0), "floating": (0.0, 1.0), "relative": (1.0, -1.0)},
     )
+
+
+def loaded_values(screen: FlipFlowScreen, load: Load, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of fields of a screen, numbers or arrays in SI, as they are under a load."""
+    carried = {"main_mass": load.main_mass, "floating_mass": load.floating_mass}
+    stop = screen.stop_temperature_stiffness_factor(load.temperature)
+    factors = {
+        "shear_stiffness": load.stiffness_factor
+        * screen.temperature_stiffness_factor(load.temperature),
+        "shear_damping": load.damping_factor,
+        "stop_stiffness": load.stop_stiffness_factor * stop,
+        "stop_damping": load.stop_damping_factor,
+    }
+    changed = {name: values[name] + mass for name, mass in carried.items() if name in values}
+    changed |= {name: values[name] * f for name, f in factors.items() if name in values}
+    return dict(values) | changed
+
+
+def loaded_columns(
+    screen: FlipFlowScreen, load: Load, columns: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Columns of values of many screens as they are under a load, beside ``screen.loaded(load)``.
+
+    Where a varied field moves the rest between the stops, a column of ``measured_shift`` is added.
+    """
+    found = loaded_values(screen, load, columns)
+    moving = {"floating_mass", "shear_stiffness", "deck_angle"} & set(columns)
+    drawn = screen.measured_shift is None and screen.clearance_measured == "drawn"
+    if not moving or not (drawn or load.floating_mass):
+        return found
+
+    def column(name: str) -> NDArray[np.float64]:
+        own = columns.get(name, getattr(screen, name))
+        values = np.asarray(own, float)
+        return np.where(np.isnan(values), 0.0, values)  # a deck whose angle is not known is flat
+
+    fall, stiffness = GRAVITY * np.sin(column("deck_angle")), column("shear_stiffness")
+    springs = loaded_values(screen, load, {"shear_stiffness": stiffness})["shear_stiffness"]
+    before = column("floating_mass") * fall / stiffness if drawn else screen.gap_shift
+    shift = np.asarray(before + load.floating_mass * fall / springs)
+    rows = len(next(iter(columns.values())))
+    return found | {"measured_shift": np.broadcast_to(shift, (rows,)).copy()}
 
 
 def _factor_at(table: tuple[tuple[float, float], ...], temperature: float, whose: str) -> float:

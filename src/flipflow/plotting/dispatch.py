@@ -31,7 +31,9 @@ from flipflow.plotting.ramp import ramp_figure
 from flipflow.plotting.response import branch_figure, cases_figure, linear_figure
 from flipflow.plotting.section import section_figure, spectrum_figure
 from flipflow.plotting.sensitivity import sensitivity_figure
+from flipflow.plotting.study import study_figure
 from flipflow.plotting.sweep import sweep_figure
+from flipflow.plotting.tolerance import tolerance_figure
 from flipflow.plotting.transient import run_up_figure
 from flipflow.plotting.units import in_units, units_for
 from flipflow.studies.assessment import Assessment
@@ -47,6 +49,8 @@ from flipflow.studies.poincare import Section, Spectrum
 from flipflow.studies.ramp import Ramp
 from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import Tolerance
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -75,6 +79,8 @@ OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
     JumpRisk: jump_risk_figure,
     Comparison: comparison_figure,
     FoundationLoads: foundation_figure,
+    Study: study_figure,
+    Tolerance: tolerance_figure,
 }
 
 

@@ -20,7 +20,7 @@ from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 Real = NDArray[np.float64]
 SHOWN: Mapping[str, float] = {
     "mm": MM, "rpm": RPM, "kN": KN, "kW": 1e-3, "deg": DEGREES, "g": 1.0 / GRAVITY, "%": 100.0,
-    "": 1.0,
+    "h": 1.0 / 3600.0, **dict.fromkeys(("", "N", "W", "K", "m/s", "rad"), 1.0),
 }  # fmt: skip
 INDEX_AXIS = (-0.05, 1.05)
 

@@ -8,6 +8,7 @@ from flipflow.report import (  # noqa: F401  they register sections
     foundation,
     parts,
     sensitivity,
+    study,
     transients,
     weight,
 )

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flipflow.errors import MissingExtra
 from flipflow.plotting.plotly import START, element, library
-from flipflow.report.blocks import Block
+from flipflow.report.blocks import Block, TitleBlock
 from flipflow.report.registry import blocks_of
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.compare import Comparison
+from flipflow.studies.study import Study
 
 if TYPE_CHECKING:
     import jinja2
@@ -71,6 +72,13 @@ def comparison_html(found: Comparison) -> str:
         kind="comparison",
         footer=f"flipflow {found.version}, inputs {inputs}",
     )
+
+
+def study_html(found: Study, blocks: Iterable[Block], title: str, name: str) -> str:
+    """The page of a study as text; its blocks are those of :mod:`flipflow.report.study`."""
+    head = TitleBlock(title, (("Study", name),))
+    footer = f"flipflow {found.version}, study {name}"
+    return page((head, *blocks), title=title, kind="study", footer=footer)
 
 
 def title_of(assessment: Assessment) -> str:

@@ -20,7 +20,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from flipflow.errors import StoreError
-from flipflow.results.store import because, checked_place, refused, write_beside, write_file
+from flipflow.results.store import (
+    because,
+    checked_place,
+    refused,
+    sync_folder,
+    write_beside,
+    write_file,
+)
 
 MOST_KEPT = 1000  # other files of a folder that are carried along
 ABANDONED = 10.0  # s after which files aside that nobody holds are those of a killed command
@@ -106,13 +113,13 @@ class Stage:
         folder = self._folder
         if folder is None:
             raise StoreError(f"{self._field}: files are written, but no folder is named.")
-        _sweep(folder)
+        sweep(folder)
         name = f".{folder.name}-{uuid.uuid4().hex}.part"
         for place in (folder.parent / name, folder / name):
             with contextlib.suppress(OSError):
                 place.mkdir()
                 with contextlib.suppress(OSError):  # a file system without locks
-                    self._lock = _held(place)
+                    self._lock = held(place)
                 return place
         raise refused(self._field, self._named or "", "nothing can be written there, name another")
 
@@ -144,14 +151,14 @@ class Stage:
                 else:
                     (new / entry.name).chmod(stat.S_IMODE(entry.stat().st_mode))
             new.chmod(stat.S_IMODE(old.stat().st_mode))
-            _sync(new)
+            sync_folder(new)
             if not _exchange(new, old):
                 return False
         except OSError:
             return False
         finally:
             self._forget_links(own)
-        _sync(old.parent)
+        sync_folder(old.parent)
         return True
 
     def _forget_links(self, own: set[str]) -> None:
@@ -200,7 +207,7 @@ def _take_places(parts: list[tuple[Path, Path]]) -> None:
             if copy is not None:
                 copy.unlink(missing_ok=True)
     for folder in {place.parent for _, place in parts}:
-        _sync(folder)
+        sync_folder(folder)
 
 
 def _copy_of(place: Path) -> Path | None:
@@ -241,17 +248,7 @@ def _exchange(one: Path, other: Path) -> bool:
     return swap is not None and swap(HERE, bytes(one), HERE, bytes(other), EXCHANGE) == 0
 
 
-def _sync(folder: Path) -> None:
-    """See that the names in a folder are on the disk; some file systems cannot."""
-    with contextlib.suppress(OSError):
-        number = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(number)
-        finally:
-            os.close(number)
-
-
-def _held(folder: Path) -> int:
+def held(folder: Path) -> int:
     """The number of an open folder that other commands see to be held.
 
     Raises
@@ -268,11 +265,11 @@ def _held(folder: Path) -> int:
     return number
 
 
-def _sweep(folder: Path) -> None:
+def sweep(folder: Path) -> None:
     """Remove what killed commands left aside."""
     for room in (folder.parent, folder):
         for left in room.glob(f".{glob.escape(folder.name)}-*.part"):
             with contextlib.suppress(OSError):
                 if time.time() - left.stat().st_mtime > ABANDONED:
-                    os.close(_held(left))
+                    os.close(held(left))
                     shutil.rmtree(left)

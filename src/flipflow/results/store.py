@@ -5,6 +5,7 @@ Nothing here loads numpy, so that the command line refuses a file before it load
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import stat
@@ -148,6 +149,16 @@ def write_beside(place: Path, content: bytes | str) -> Path:
         part.unlink(missing_ok=True)
         raise
     return part
+
+
+def sync_folder(folder: Path) -> None:
+    """See that the names in a folder are on the disk; some file systems cannot."""
+    with contextlib.suppress(OSError):
+        number = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
 
 
 def as_bytes(content: bytes | str) -> bytes:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.batch.lane_path import FORBIDDEN, FOUND, NOT_RUN
 from flipflow.batch.lane_readings import Asked, Readings
+from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED
 from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
 from flipflow.batch.variants import Batch, batches
 from flipflow.dynamics.normal import normal_amplitude
@@ -83,9 +83,9 @@ def lane_values(
     """
     rows = len(next(iter(columns.values())))
     values = {one.name: np.full((rows, omega.size), np.nan) for one in quantities}
-    reason = np.full((rows, omega.size), NOT_RUN)
+    reason = np.full((rows, omega.size), NOT_COMPUTED)
     groups, allowed = batches(machine, columns)
-    reason[~allowed] = FORBIDDEN
+    reason[~allowed] = REFUSED
     for batch in groups:
         question = _Question(machine, columns, tuple(quantities), batch, threads, tell)
         found, why = question.rising(omega)

@@ -148,19 +148,31 @@ def values_of(question: Question, machine: Machine) -> Iterator[float | None]:
     if quantity.of == "response":
         yield RESPONSE_VALUES[quantity.name](Response(machine, question.span))
         return
-    for working in _workings(question, machine):
+    for working in workings(question, machine):
         yield None if working is None else working.value_of(quantity)
 
 
-def _workings(question: Question, machine: Machine) -> Iterator[Working | None]:
-    """The motion that is meant at each frequency."""
+def workings(
+    question: Question, machine: Machine, response: Response | None = None
+) -> Iterator[Working | None]:
+    """The motion that is meant at each frequency; of a ``response`` where its branch is known.
+
+    Raises
+    ------
+    InputError
+        For a machine without any damping.
+    IncompleteError
+        When a branch could not be followed.
+    """
     omega = question.omega.tolist()
     below = question.branch == "from-below"
     narrow = below and not question.quantity.of_folds
-    if narrow and len(omega) == 1:
+    if response is None and narrow and len(omega) == 1:
         yield _reached(machine, omega[0])
         return
-    branch = Response(machine, (min(omega), max(omega)) if narrow else question.span).branch
+    if response is None:
+        response = Response(machine, (min(omega), max(omega)) if narrow else question.span)
+    branch = response.branch
     for one in omega:
         if below:
             yield working_motion(machine, branch, one)

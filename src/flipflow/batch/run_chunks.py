@@ -1,0 +1,131 @@
+"""Chunks of work on any executor: threads, processes, or a cluster of dask.distributed.
+
+An executor is what the standard library calls one; ``dask.distributed.Client.get_executor()`` is
+one, too. How many workers there are shapes neither the chunks nor what they return.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager
+from typing import Any
+
+from flipflow.errors import IncompleteError, InputError
+
+WINDOW = 256  # chunks handed out at once: enough for a cluster, few to hold
+MOST_LOST = 10  # times that the worker of one chunk may be lost
+
+
+@contextmanager
+def executor_or_threads(executor: object, threads: int) -> Iterator[Executor]:
+    """The executor that was given, left as it is; else threads, which end with the block.
+
+    Raises
+    ------
+    InputError
+        For what is no executor.
+    """
+    if executor is None:
+        own = ThreadPoolExecutor(threads)
+        try:
+            yield own
+        finally:
+            own.shutdown(cancel_futures=True)
+        return
+    if not isinstance(executor, Executor):
+        remedy = "give an executor of concurrent.futures, as client.get_executor() of dask is one"
+        raise InputError("executor", executor, remedy)
+    yield executor
+
+
+def run_chunks(
+    executor: Executor,
+    work: Callable[..., Any],
+    tasks: Iterable[tuple[int, tuple[Any, ...]]],
+) -> Iterator[tuple[int, Any]]:
+    """Yield (index, ``work(*arguments)``) of each task, in the order in which they end.
+
+    A chunk whose worker is lost is handed out again. When the caller stops, what has not begun is
+    not begun.
+
+    Raises
+    ------
+    IncompleteError
+        When a chunk loses its worker again and again, or the executor is gone.
+    """
+    waiting: dict[Future[Any], tuple[int, tuple[Any, ...]]] = {}
+    lost: dict[int, int] = {}
+    todo = iter(tasks)
+    try:
+        while True:
+            for task in _some(todo, WINDOW - len(waiting)):
+                waiting[_submitted(executor, work, task, 0)] = task
+            if not waiting:
+                return
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                index, arguments = waiting.pop(future)
+                if _is_lost(future, index, lost):
+                    again = index, arguments
+                    waiting[_submitted(executor, work, again, lost[index])] = again
+                else:
+                    yield index, future.result()
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _some(todo: Iterator[tuple[int, tuple[Any, ...]]], count: int) -> Iterator[Any]:
+    for _ in range(count):
+        task = next(todo, None)
+        if task is None:
+            return
+        yield task
+
+
+def _submitted(
+    executor: Executor, work: Callable[..., Any], task: tuple[int, tuple[Any, ...]], lost: int
+) -> Future[Any]:
+    try:
+        return executor.submit(_attempt, lost, work, *task[1])
+    except RuntimeError as error:  # so a broken executor says, too
+        raise IncompleteError(f"The workers are gone ({error}).") from None
+
+
+def _attempt(_lost: int, work: Callable[..., Any], *arguments: Any) -> Any:
+    """The work; to dask, which knows tasks by their arguments, every attempt is one of its own."""
+    return work(*arguments)
+
+
+def _is_lost(future: Future[Any], index: int, lost: dict[int, int]) -> bool:
+    """Whether a chunk has to be handed out again, because its worker ended before it did."""
+    try:
+        error = future.exception()
+    except CancelledError:
+        raise IncompleteError("The scheduler is gone, and with it the chunks on the way.") from None
+    if isinstance(error, BrokenExecutor):
+        raise IncompleteError(f"The workers are gone ({error}).")
+    if not isinstance(error, _killed()):
+        return False
+    lost[index] = lost.get(index, 0) + 1
+    if lost[index] > MOST_LOST:
+        told = f"Chunk {index} ended its worker {MOST_LOST} times: has it memory enough?"
+        raise IncompleteError(told)
+    return True
+
+
+def _killed() -> tuple[type[BaseException], ...]:
+    """What dask raises of a task whose workers ended; none where dask is not loaded."""
+    distributed = sys.modules.get("distributed")
+    known: Mapping[str, Any] = vars(distributed) if distributed is not None else {}
+    return (known["KilledWorker"],) if "KilledWorker" in known else ()

@@ -1,0 +1,68 @@
+"""Where a study is computed: threads of this process, worker processes, or a cluster of dask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+SCHEDULER, WORKERS = "--scheduler", "--workers"
+PATIENCE = 20.0  # s to wait for a scheduler
+QUIET = 50  # level of logging at which dask tells of failures alone
+
+
+@contextmanager
+def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor | None]:
+    """The executor that options ask for; None: threads.
+
+    Raises
+    ------
+    InputError
+        For both options together, and where no scheduler answers.
+    MissingExtra
+        When dask.distributed is not installed.
+    """
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    if workers is None and scheduler is None:
+        yield None
+        return
+    if workers is not None and scheduler is not None:
+        remedy = f"{SCHEDULER} has workers of its own, leave one of the two out"
+        raise InputError(WORKERS, workers, remedy)
+    distributed = _distributed()
+    if scheduler is not None:
+        with _client(distributed, scheduler) as client:
+            yield client.get_executor()
+        return
+    cluster = distributed.LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0",
+        silence_logs=QUIET,
+    )  # fmt: skip
+    with cluster, distributed.Client(cluster) as client:
+        yield client.get_executor()
+
+
+def _client(distributed: Any, scheduler: str) -> Any:
+    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
+
+    try:
+        return distributed.Client(scheduler, timeout=PATIENCE)
+    except (OSError, ValueError, TimeoutError) as error:
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
+        remedy = f"no scheduler answers there ({reason}), give the address that dask shows"
+        raise InputError(SCHEDULER, scheduler, remedy) from None
+
+
+def _distributed() -> Any:
+    from flipflow.errors import MissingExtra  # noqa: PLC0415  keeps --help quick
+
+    try:
+        import distributed  # noqa: PLC0415  an extra
+    except ImportError as error:
+        told = "Worker processes need dask.distributed: pip install 'flipflow[study]'."
+        raise MissingExtra(told) from error
+    return distributed

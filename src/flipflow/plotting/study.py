@@ -1,0 +1,446 @@
+"""Studies drawn: maps with contours, curves over one field, tornado, parallel coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.batch.reasons import FOUND
+from flipflow.errors import InputError, MissingExtra
+from flipflow.model.arguments import checked_index, checked_word
+from flipflow.model.fields import FIELD
+from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.parameters import value_of
+from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.palette import case_colour, case_symbol
+from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace
+from flipflow.plotting.scales import MM, RPM
+from flipflow.plotting.sensitivity import SHOWN, tornado_figure
+from flipflow.studies.sensitivity import OneAtATime
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import FOLDS, jumped_motions
+
+Real = NDArray[np.float64]
+LEVELS = 7  # contours of a map, about
+MOST_AXES = 10  # of parallel coordinates: the fields, then quantities
+MOST_LINES = 300  # machines of parallel coordinates
+FIELD_SCALES = {"mm": MM, "kN/m": 1e-3, "kN s/m": 1e-3, "kg mm": 1e3}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Which load case and which frequency of a study is drawn, by their indices."""
+
+    case: int = 0
+    at: int = 0
+
+
+def study_figure(study: Study) -> Figure:
+    """A map of a grid of two fields, curves over one, else parallel coordinates.
+
+    Parameters
+    ----------
+    study
+        What :func:`flipflow.study` returns.
+    """
+    if study.sampling == "grid":
+        wide = wide_fields(study)
+        if len(wide) >= 2:
+            return map_figure(study)
+        if wide:
+            return curves_figure(study, wide[0])
+    return parallel_figure(study)
+
+
+def map_figure(
+    study: Study,
+    quantity: str | None = None,
+    limits: Limits | None = None,
+    place: Place | None = None,
+) -> Figure:
+    """Contours of a quantity over the first two fields of a grid, with folds and limits.
+
+    Other fields stay at the value next to the machine's own.
+
+    Parameters
+    ----------
+    study
+        What :func:`flipflow.study` returns of a grid.
+    quantity
+        Which of the study's quantities; None: the first.
+    limits
+        Where they are met is shaded; their own contours are drawn, too.
+    place
+        Load case and frequency.
+
+    Raises
+    ------
+    InputError
+        For a study that is no grid of two fields, and for a quantity that it did not ask for.
+    MissingExtra
+        When contourpy, which comes with matplotlib, is not installed.
+    """
+    place = place or Place()
+    name = checked_word("quantity", quantity or study.quantities[0], study.quantities)
+    across, up = _two_fields(study)
+    grid = _Grid(study, across, up, place)
+    one = quantity_named(name, study.machine)
+    traces = list(_contours(grid, one))
+    cells: tuple[Cells, ...] = ()
+    if limits is not None:
+        traces += _limit_contours(grid, limits)
+        cells = (_met_cells(grid, limits),)
+    traces += _fold_contours(grid)
+    notes = tuple(_level_notes(traces))
+    panel = Panel(
+        _field_axis(study, across, grid.x), _field_axis(study, up, grid.y),
+        tuple(trace for trace in traces if trace.x.size), cells=cells, notes=notes,
+        title=_where(study, place, one),
+    )  # fmt: skip
+    shaded = " Shaded: every limit is met." if cells else ""
+    jumps = (
+        " Dashed: beyond this line the machine has jumped, and no contour leads across. Dotted: "
+        "from this line on two motions are possible."
+        if any(trace.dash and trace.x.size for trace in traces)
+        else ""
+    )
+    caption = f"Contours of the {one.label} in {one.shown_unit or 'plain numbers'}.{shaded}{jumps}"
+    title = f"{one.label[:1].upper()}{one.label[1:]} over {symbol_of(across)} and {symbol_of(up)}"
+    return Figure(title, caption, (panel,), height=440)
+
+
+def curves_figure(study: Study, field: str) -> Figure:
+    """Every quantity over the one field of a grid, a line for each load case."""
+    keep = _others_nearest(study, (field,))
+    x = np.asarray(study.columns[field], float)[keep] * _field_scale(study, field)
+    panels = []
+    for k, name in enumerate(study.quantities):
+        one = quantity_named(name, study.machine)
+        values = _at(study, name, 0)[keep] * SHOWN[one.shown_unit]
+        traces = tuple(
+            Trace(
+                case, x, values[:, c], colour=case_colour(c), symbol=case_symbol(c), legend=k == 0
+            )
+            for c, case in enumerate(study.cases)
+        )
+        panels.append(Panel(_field_axis(study, field, x), Axis(one.label, one.shown_unit), traces))
+    title = f"{symbol_of(field)} varied{_speed_words(study, 0)}"
+    caption = "Each line: a load case. Where a line is broken the quantity has no value."
+    return Figure(title, caption, tuple(panels), height=230 * len(panels) + 60)
+
+
+def study_tornado(study: Study, quantity: str, place: Place | None = None) -> Figure:
+    """Change of a quantity when one field alone moves to the low or high end of its range.
+
+    Parameters
+    ----------
+    study
+        What :func:`flipflow.study` returns.
+    quantity
+        One of its quantities.
+    place
+        Load case and frequency.
+    """
+    place = place or Place()
+    checked_word("quantity", quantity, study.quantities)
+
+    def read(table: Real) -> Real:
+        whole = study.values[quantity].ndim == 2
+        return table[..., place.case] if whole else table[..., place.case, place.at]
+
+    found = OneAtATime(
+        machine=study.machine,
+        quantity=quantity,
+        names=study.names,
+        distributions=study.distributions,
+        omega=float(study.omega[place.at]),
+        nominal=float(read(study.nominal[quantity])),
+        at_low=np.asarray(read(study.at_low[quantity])),
+        at_high=np.asarray(read(study.at_high[quantity])),
+        own=tuple(value_of(study.machine, name) for name in study.names),
+    )
+    return tornado_figure(found)
+
+
+def parallel_figure(
+    study: Study, passing: NDArray[np.bool_] | None = None, place: Place | None = None
+) -> Figure:
+    """Each machine a line across its fields and quantities.
+
+    Parameters
+    ----------
+    study
+        What :func:`flipflow.study` returns.
+    passing
+        Which machines meet every limit, (S,); the others are drawn in another colour.
+    place
+        Load case and frequency.
+    """
+    place = place or Place()
+    fine = np.ones(study.size, bool) if passing is None else np.asarray(passing)
+    columns = list(_axes(study, place))[:MOST_AXES]
+    rows = np.linspace(0, study.size - 1, min(study.size, MOST_LINES)).astype(int)
+    heights = np.stack([_share(values) for _, values in columns], axis=1)[rows]
+    groups = [("meets every limit", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
+    if passing is None:
+        groups = [("machine", fine[rows], "main")]
+    x = np.arange(len(columns) + 1.0)
+    x[-1] = np.nan  # parts the line of one machine from the next
+    traces = []
+    for name, chosen, colour in groups[::-1]:
+        count = int(chosen.sum())
+        broken = np.concatenate([heights[chosen], np.full((count, 1), np.nan)], axis=1)
+        if count:
+            traces.append(Trace(f"{name}", np.tile(x, count), broken.ravel(), colour=colour))
+    ticks = tuple((float(k), label) for k, (label, _) in enumerate(columns))
+    notes = tuple(_end_notes(columns))
+    uprights = tuple(Line("x", float(k), "", "mark", "solid") for k in range(len(columns)))
+    panel = Panel(
+        Axis("", "", (-0.4, len(columns) - 0.6), ticks),
+        Axis("share of the range", "", (-0.12, 1.12), ((0.0, "low"), (1.0, "high"))),
+        tuple(traces), lines=uprights, notes=notes, title=_where(study, place, None),
+    )  # fmt: skip
+    shown = f" {rows.size} of {study.size} machines are drawn." if rows.size < study.size else ""
+    caption = (
+        "Each line is a machine: its fields, then what it does; the ends of every axis are the "
+        f"least and the greatest value.{shown}"
+    )
+    return Figure("Machines of the study", caption, (panel,), height=400)
+
+
+class _Grid:
+    """Two fields of a grid as axes in shown units, and quantities over them."""
+
+    def __init__(self, study: Study, across: str, up: str, place: Place) -> None:
+        self.study, self.place = study, place
+        self._keep = _others_nearest(study, (across, up))
+        first, second = (np.asarray(study.columns[n], float)[self._keep] for n in (across, up))
+        x, y = np.unique(first), np.unique(second)
+        self._order = np.lexsort((first, second))
+        self._shape = y.size, x.size
+        self.x, self.y = x * _field_scale(study, across), y * _field_scale(study, up)
+
+    def values(self, name: str) -> Real:
+        """A quantity, (rows of y, columns of x), SI."""
+        table = _at(self.study, name, self.place.at)[self._keep, self.place.case]
+        return np.asarray(table[self._order].reshape(self._shape))
+
+    def lines(self, z: Real, level: float, *, parted: bool = True) -> Iterator[tuple[Real, Real]]:
+        """Where z takes a level; ``parted`` by the jump for what is of a motion."""
+        try:
+            from contourpy import contour_generator  # noqa: PLC0415  comes with an extra
+        except ImportError as error:
+            told = "Maps need contourpy: pip install 'flipflow[report]'."
+            raise MissingExtra(told) from error
+        for side in self._sides if parted else (np.ones(self._shape, bool),):
+            hidden = np.ma.masked_where(~np.isfinite(z) | ~side, z)
+            if hidden.count():
+                for line in contour_generator(self.x, self.y, hidden).lines(level):
+                    yield np.asarray(line[:, 0]), np.asarray(line[:, 1])
+
+    @cached_property
+    def _sides(self) -> tuple[NDArray[np.bool_], ...]:
+        """Machines before and beyond their jump: no line leads from one motion to the other."""
+        everywhere = np.ones(self._shape, bool)
+        if not _has_folds(self.study):
+            return (everywhere,)
+        jumped = jumped_motions(self.study)[self._keep, self.place.case, self.place.at]
+        beyond = jumped[self._order].reshape(self._shape)
+        return ~beyond, beyond
+
+
+def _contours(grid: _Grid, one: Quantity) -> Iterator[Trace]:
+    z = grid.values(one.name) * SHOWN[one.shown_unit]
+    finite = z[np.isfinite(z)]
+    if finite.size == 0 or finite.min() == finite.max():
+        return
+    for level in _round_levels(float(finite.min()), float(finite.max())):
+        yield _joined(f"{level:.4g}", grid.lines(z, level), "main", legend=False)
+
+
+def _limit_contours(grid: _Grid, limits: Limits) -> Iterator[Trace]:
+    for name in limits.given:
+        if name not in grid.study.values:
+            continue
+        one = QUANTITIES[name]
+        z = np.where(np.isposinf(values := grid.values(name)), 1e30, values)
+        for bound in limit_bounds(limits, name):
+            if np.isfinite(bound):
+                yield _joined(f"limit on {one.label}", grid.lines(z, bound), "limit", bold=True)
+
+
+def _fold_contours(grid: _Grid) -> Iterator[Trace]:
+    omega = float(grid.study.omega[grid.place.at])
+    for name, dash in zip(FOLDS, ("dot", "dash"), strict=True):
+        if name in grid.study.values and np.isfinite(omega):
+            lines = grid.lines(grid.values(name), omega, parted=False)
+            yield _joined(
+                f"{QUANTITIES[name].label} = {omega * RPM:.4g} rpm", lines, "jump", dash=dash
+            )
+
+
+def _met_cells(grid: _Grid, limits: Limits) -> Cells:
+    """Machines that meet every limit, as cells around the points of the grid."""
+    met = np.ones((grid.y.size, grid.x.size), bool)
+    for name in limits.given:
+        if name in grid.study.values:
+            low, high = limit_bounds(limits, name)
+            values = grid.values(name)
+            met &= (values >= low) & (values <= high)
+    return Cells(_edges(grid.x), _edges(grid.y), met.astype(np.int64), ("none", "case 3"))
+
+
+def _joined(
+    name: str, lines: Iterator[tuple[Real, Real]], colour: str, *, bold: bool = False,
+    dash: str = "", legend: bool = True,
+) -> Trace:  # fmt: skip
+    """All parts of a contour as one line with gaps."""
+    x, y = [np.zeros(0)], [np.zeros(0)]
+    for one, other in lines:
+        x += [one, np.array([np.nan])]
+        y += [other, np.array([np.nan])]
+    return Trace(name, np.concatenate(x), np.concatenate(y), colour=colour, bold=bold, dash=dash,
+                 legend=legend)  # fmt: skip
+
+
+def _level_notes(traces: Sequence[Trace]) -> Iterator[Note]:
+    """The level of a contour at the middle of its longest part."""
+    for trace in traces:
+        if trace.legend or trace.x.size == 0:
+            continue
+        ends = np.flatnonzero(np.isnan(trace.x))
+        begins = np.concatenate([[0], ends[:-1] + 1])
+        k = int(np.argmax(ends - begins))
+        middle = (begins[k] + ends[k]) // 2
+        yield Note(float(trace.x[middle]), float(trace.y[middle]), trace.name, "center", "main")
+
+
+def _round_levels(low: float, high: float) -> Real:
+    """Round numbers between two, about as many as wanted."""
+    raw = (high - low) / LEVELS
+    step = 10.0 ** np.floor(np.log10(raw))
+    step *= next(m for m in (1.0, 2.0, 5.0, 10.0) if m * step >= raw)
+    return np.asarray(step * np.arange(np.floor(low / step) + 1.0, np.ceil(high / step)))
+
+
+def _edges(middles: Real) -> Real:
+    inner = (middles[1:] + middles[:-1]) / 2.0
+    return np.concatenate([[2.0 * middles[0] - inner[0]], inner, [2.0 * middles[-1] - inner[-1]]])
+
+
+def wide_fields(study: Study) -> list[str]:
+    """Fields with several numbers, in the order given."""
+    return [
+        name
+        for name, column in study.columns.items()
+        if column.dtype.kind == "f" and np.unique(column).size > 1
+    ]
+
+
+def _two_fields(study: Study) -> tuple[str, str]:
+    wide = wide_fields(study) if study.sampling == "grid" else []
+    if len(wide) < 2:
+        remedy = "a map needs a grid of two fields with several values each"
+        raise InputError("study", study.sampling, remedy)
+    return wide[0], wide[1]
+
+
+def _others_nearest(study: Study, shown: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Machines whose other fields are at the value next to the machine's own."""
+    keep = np.ones(study.size, bool)
+    for name, column in study.columns.items():
+        if name in shown:
+            continue
+        values, own = np.unique(column), value_of(study.machine, name)
+        if column.dtype.kind == "f" and isinstance(own, float) and np.isfinite(own):
+            numbers = np.asarray(values, float)
+            keep &= column == numbers[np.abs(numbers - own).argmin()]
+        else:
+            keep &= column == (own if own in values else values[0])
+    return keep
+
+
+def _at(study: Study, name: str, at: int) -> Real:
+    """A quantity at a frequency, (S, C)."""
+    checked_index("at", at, study.omega.size, "give the index of a frequency of the study")
+    table = study.values[name]
+    return np.asarray(table if table.ndim == 2 else table[:, :, at])
+
+
+def _has_folds(study: Study) -> bool:
+    return all(name in study.values for name in FOLDS)
+
+
+def _axes(study: Study, place: Place) -> Iterator[tuple[str, Real]]:
+    """Label and values of every axis of parallel coordinates, in shown units."""
+    for name, column in study.columns.items():
+        if column.dtype.kind == "f":
+            yield _axis_words(study, name), np.asarray(column, float) * _field_scale(study, name)
+    for name in study.quantities:
+        one = quantity_named(name, study.machine)
+        values = _at(study, name, place.at)[:, place.case] * SHOWN[one.shown_unit]
+        unit = f", {one.shown_unit}" if one.shown_unit else ""
+        known = study.reason[:, place.case, place.at] == FOUND
+        yield f"{one.symbol}{unit}", np.where(known & np.isfinite(values), values, np.nan)
+
+
+def _share(values: Real) -> Real:
+    finite = values[np.isfinite(values)]
+    if finite.size == 0 or np.ptp(finite) == 0.0:
+        return np.where(np.isfinite(values), 0.5, np.nan)
+    return np.asarray((values - finite.min()) / np.ptp(finite))
+
+
+def _end_notes(columns: Sequence[tuple[str, Real]]) -> Iterator[Note]:
+    for k, (_, values) in enumerate(columns):
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            yield Note(float(k), -0.06, f"{finite.min():.4g}", "center", "mark")
+            yield Note(float(k), 1.06, f"{finite.max():.4g}", "center", "mark")
+
+
+def symbol_of(field: str) -> str:
+    """Symbol of a field of a screen; the name of any other."""
+    return FIELD[field].symbol if field in FIELD else field
+
+
+def _field_scale(study: Study, field: str) -> float:
+    return FIELD_SCALES.get(_field_unit(study, field), 1.0)
+
+
+def _field_unit(study: Study, field: str) -> str:
+    if field not in FIELD or not isinstance(study.machine, FlipFlowScreen):
+        return ""
+    known = FIELD[field]
+    return known.file_unit if known.file_unit in FIELD_SCALES else known.unit
+
+
+def _axis_words(study: Study, field: str) -> str:
+    unit = _field_unit(study, field)
+    return f"{symbol_of(field)}, {unit}" if unit else symbol_of(field)
+
+
+def _field_axis(study: Study, field: str, shown: Real) -> Axis:
+    words = f"{field.replace('_', ' ')} ({symbol_of(field)})" if field in FIELD else field
+    return Axis(words, _field_unit(study, field), (float(shown.min()), float(shown.max())))
+
+
+def _where(study: Study, place: Place, one: Quantity | None) -> str:
+    """Load case and speed of a panel."""
+    case = f"load case {study.cases[place.case]}" if len(study.cases) > 1 else ""
+    whole = one is not None and one.of == "response"
+    speed = "" if whole else _speed_words(study, place.at).removeprefix(" ")
+    return " ".join(filter(None, (case, speed)))
+
+
+def _speed_words(study: Study, at: int) -> str:
+    omega = float(study.omega[at])
+    if not np.isfinite(omega):
+        return ""
+    return f" at {omega * RPM:.4g} rpm"

@@ -1,0 +1,68 @@
+"""What tolerances cost, drawn: the share of machines that pass against their width."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flipflow.model.arguments import checked_index
+from flipflow.plotting.figure import Figure
+from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
+from flipflow.plotting.study import symbol_of
+from flipflow.studies.tolerance import Tolerance
+
+
+def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
+    """The share that passes against the width of all tolerances, and with each of them halved.
+
+    Parameters
+    ----------
+    found
+        What :func:`flipflow.tolerance` returns.
+    at
+        Index of the frequency.
+    """
+    checked_index("at", at, found.omega.size, "give the index of a frequency of the study")
+    known = np.isfinite(found.scaled[:, at])
+    factors, share = found.factors[known], 100.0 * found.scaled[known, at]
+    low, high = (100.0 * found.scaled_interval[known, at, k] for k in (0, 1))
+    own, interval = 100.0 * found.share[at], 100.0 * found.share_interval[at]
+    if not known.any():
+        factors, share, low, high = np.ones(1), own[None], interval[:1], interval[1:]
+    band = Trace("95 % confidence", factors, high, "case band", "case band", lower=low)
+    line = Trace("share that meets every limit", factors, share, colour="relative", bold=True)
+    above = Panel(
+        Axis("all tolerances times", ""), Axis("machines that pass", "%", (0.0, 102.0)),
+        (band, line), lines=(Line("x", 1.0, "as given", "mark"),),
+    )  # fmt: skip
+    rows = [i for i in range(len(found.names)) if np.isfinite(found.halved[i, at])]
+    order = sorted(rows, key=lambda i: -found.gain[i, at])
+    panels: tuple[Panel, ...] = (above,)
+    if order:
+        bars = tuple(_bar(found, i, at, float(len(order) - 1 - k)) for k, i in enumerate(order))
+        ticks = tuple(
+            (float(len(order) - 1 - k), symbol_of(found.names[i])) for k, i in enumerate(order)
+        )
+        reach = [bar.low for bar in bars] + [bar.high for bar in bars]
+        margin = max(0.25 * (max(reach) - min(reach)), 2.0)
+        panels += (
+            Panel(
+                Axis("machines that pass with one tolerance halved", "%",
+                     (max(min(reach) - margin, 0.0), max(reach) + margin)),
+                Axis("", "", (-0.6, len(order) - 0.4), ticks), bars=bars,
+                lines=(Line("x", own, "as given", "mark", "solid"),),
+            ),
+        )  # fmt: skip
+    caption = (
+        "Above: the share of built machines that meet every limit in every load case, against a "
+        "factor on all tolerances. Below: the same with one tolerance alone half as wide; the "
+        "longest bar to the right is the tolerance that costs most."
+    )
+    return Figure("What tolerances cost", caption, panels, height=300 + 60 + 30 * len(order))
+
+
+def _bar(found: Tolerance, field: int, at: int, height: float) -> Bar:
+    """From the share as given to that with the tolerance of one field halved."""
+    low, high = sorted(100.0 * share for share in (found.share[at], found.halved[field, at]))
+    colour = "allowed" if found.gain[field, at] >= 0.0 else "limit"
+    words = f"{100.0 * found.halved[field, at]:.1f} %"
+    return Bar("", height, low, high, 0.5, colour, text=words)

@@ -1,0 +1,270 @@
+"""What a study and its tolerances become in a report and in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow.batch.reasons import FOUND
+from flipflow.model.fields import FIELD
+from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
+from flipflow.model.vary import Choice, Distribution, Normal
+from flipflow.plotting.study import (
+    Place,
+    curves_figure,
+    map_figure,
+    parallel_figure,
+    study_tornado,
+    wide_fields,
+)
+from flipflow.plotting.tolerance import tolerance_figure
+from flipflow.report.blocks import (
+    Block,
+    Column,
+    FigureBlock,
+    Heading,
+    Note,
+    Table,
+    Text,
+    Values,
+    cells,
+)
+from flipflow.report.numbers import NOTHING, bounds, quantity, rpm
+from flipflow.report.registry import Part, section
+from flipflow.studies.study import Study
+from flipflow.studies.tolerance import FOLDS, Tolerance, jumped_motions
+
+Real = NDArray[np.float64]
+QUANTILES = (0.025, 0.5, 0.975)
+WORDS = {
+    "grid": "every combination",
+    "list": "a list",
+    "sobol": "Sobol's sequence",
+    "latin-hypercube": "Latin hypercube",
+    "monte-carlo": "independent draws",
+}
+MOST_FIGURES = 4  # maps or tornado charts of one report
+
+
+@section(Study, Part.FIRST_PAGE, 10, brief=True)
+def summary_of_study(found: Study) -> Iterator[Block]:
+    """What was looked at, and what varies."""
+    rows = [
+        ("Machines", f"{found.size}, {WORDS[found.sampling]}"),
+        ("Load cases", ", ".join(found.cases)),
+    ]
+    if np.isfinite(found.omega).all():
+        rows.append(("Speed", _speeds(found.omega)))
+    if found.sample is not None:
+        rows.append(("Seed", str(found.sample.seed)))
+    yield Values(tuple(rows))
+    columns = (Column("Field"), Column("Symbol", brief=False), Column("Varies"))
+    shown = [
+        cells(name, FIELD[name].symbol if name in FIELD else NOTHING, _range(name, one))
+        for name, one in zip(found.names, found.distributions, strict=True)
+    ]
+    yield Table("What varies", columns, tuple(shown))
+    yield from (Note(text) for text in found.notes)
+
+
+@section(Study, Part.FIRST_PAGE, 20)
+def spread_of_study(found: Study) -> Iterator[Block]:
+    """The spread of every quantity."""
+    yield spread_table(found)
+
+
+def study_blocks(
+    found: Study, judged: Tolerance | None = None, limits: Limits | None = None
+) -> Iterator[Block]:
+    """A whole report: what passes, what was looked at, figures.
+
+    Parameters
+    ----------
+    found
+        The study.
+    judged
+        Its tolerances, where limits are judged.
+    limits
+        Limits that maps show.
+    """
+    if judged is not None:
+        yield from yield_of_machines(judged)
+    yield Heading("The study", 1, new_page=False)
+    yield from summary_of_study(found)
+    yield spread_table(found)
+    if judged is not None:
+        yield from cost_of_tolerances(judged)
+    yield from _figures(found, judged, limits)
+
+
+@section(Study, Part.DETAILS, 10)
+def figures_of_study(found: Study) -> Iterator[Block]:
+    """Maps of a grid, curves over one field; of a sample tornado charts and all machines."""
+    yield from _figures(found, None, None)
+
+
+def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> Iterator[Block]:
+    wide = wide_fields(found)
+    motions = [n for n in found.quantities if n not in FOLDS] or list(found.quantities)
+    if found.sampling == "grid" and len(wide) == 1:
+        yield FigureBlock(curves_figure(found, wide[0]))
+        return
+    if found.sampling == "grid" and len(wide) > 1:
+        yield Heading("Maps", 1, new_page=False)
+        for name in motions[:MOST_FIGURES]:
+            yield FigureBlock(map_figure(found, name, limits))
+        return
+    yield Heading("What moves each quantity", 1, new_page=False)
+    for name in motions[:MOST_FIGURES]:
+        if np.isfinite(found.nominal[name]).all():
+            yield FigureBlock(study_tornado(found, name, Place()))
+    yield FigureBlock(parallel_figure(found, None if judged is None else judged.passing[:, 0]))
+
+
+@section(Tolerance, Part.FIRST_PAGE, 10, brief=True)
+def yield_of_machines(found: Tolerance) -> Iterator[Block]:
+    """The share that passes at each speed, each limit, and which tolerance costs most."""
+    yield Heading("Machines that meet every limit", 1, new_page=False)
+    for j, omega in enumerate(found.omega):
+        share, (low, high) = found.share[j], found.share_interval[j]
+        speed = f" at {rpm(omega)} rpm" if np.isfinite(omega) else ""
+        yield Text(
+            f"of {found.size} machines{speed} meet every limit in every load case "
+            f"({_share(low)} to {_share(high)} with 95 % confidence)."
+            f"{_jump_words(found, j)}{_cost_words(found, j)}",
+            lead=_share(share),
+        )
+    columns = (
+        Column("Limit"), Column("Allowed"), *(
+            Column(f"{rpm(omega)} rpm" if np.isfinite(omega) else "Met", "%", numeric=True)
+            for omega in found.omega[:4]
+        ),
+    )  # fmt: skip
+    rows = [
+        cells(QUANTITIES[name].label, _bounds(found, name), *_percents(found.by_limit[b]))
+        for b, name in enumerate(found.checked)
+    ]
+    rows += [
+        cells(f"all, case {case}", "", *_percents(found.by_case[c]))
+        for c, case in enumerate(found.cases)
+    ]
+    rows.append(cells("all, every case", "", *_percents(found.share)))
+    yield Table("Machines that meet each limit", columns, tuple(rows))
+    yield from (Note(text) for text in found.notes)
+
+
+@section(Tolerance, Part.DETAILS, 10)
+def cost_of_tolerances(found: Tolerance) -> Iterator[Block]:
+    """The share against the width of the tolerances."""
+    for j in range(min(found.omega.size, MOST_FIGURES)):
+        yield FigureBlock(tolerance_figure(found, j))
+
+
+def spread_table(found: Study) -> Table:
+    """Quantiles of every quantity in every case; before and after the jump are two rows."""
+    columns = (
+        Column("Quantity"), Column("Case"), Column("Nominal", numeric=True),
+        Column("2.5 %", numeric=True), Column("Median", numeric=True),
+        Column("97.5 %", numeric=True), Column("Machines", numeric=True),
+    )  # fmt: skip
+    rows = []
+    for name in found.quantities:
+        one = quantity_named(name, found.machine)
+        for c, case in enumerate(found.cases):
+            for words, values in _groups(found, one, c):
+                nominal = np.atleast_1d(found.nominal[name][c])[0]
+                numbers = [nominal, *_quantiles(values)]
+                texts = [_value(one, float(x)) for x in numbers]
+                rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
+    caption = "At the first speed. Machines that have jumped are never counted with the others."
+    return Table("What the machines do", columns, tuple(rows), caption)
+
+
+def _groups(found: Study, one: Quantity, case: int) -> Iterator[tuple[str, Real]]:
+    """Values of a quantity that belong to one side of the jump, with words for it."""
+    table = found.values[one.name]
+    if one.of == "response":
+        yield "", table[:, case][np.isfinite(table[:, case])]
+        return
+    values = table[:, case, 0]
+    known = (found.reason[:, case, 0] == FOUND) & ~np.isnan(values)
+    if not all(name in found.values for name in FOLDS):
+        yield "", values[known]
+        return
+    beyond = jumped_motions(found)[:, case, 0]
+    for words, side in (("", ~beyond), (", jumped", beyond)):
+        if (known & side).any() or not words:
+            yield words, values[known & side]
+
+
+def _value(one: Quantity, value: float) -> str:
+    """A value with its unit; a margin to a jump that does not exist says so."""
+    if one.name == "jump_margin" and np.isinf(value):
+        return "no jump"
+    return quantity(value, one.shown_unit, one.unit)
+
+
+def _quantiles(values: Real) -> list[float]:
+    if values.size == 0:
+        return [np.nan] * len(QUANTILES)
+    return [float(x) for x in np.quantile(values, QUANTILES, method="inverted_cdf")]
+
+
+def _range(name: str, one: Distribution) -> str:
+    """How a field varies, in words."""
+    unit, shown = (FIELD[name].unit, FIELD[name].file_unit) if name in FIELD else ("", "")
+
+    def words(value: object) -> str:
+        return quantity(value, shown, unit) if isinstance(value, float) else str(value)
+
+    if isinstance(one, Normal):
+        return f"{words(one.mean)} +/- {words(one.std)}"
+    if isinstance(one, Choice) and len(one.values) <= 4:
+        return ", ".join(map(words, one.values))
+    low, high = one.ends
+    count = f", {len(one.values)} values" if isinstance(one, Choice) else ""
+    return f"{words(low)} to {words(high)}{count}"
+
+
+def _speeds(omega: Real) -> str:
+    if omega.size <= 4:
+        return f"{', '.join(rpm(float(one)) for one in omega)} rpm"
+    return f"{rpm(float(omega.min()))} to {rpm(float(omega.max()))} rpm, {omega.size} speeds"
+
+
+def _jump_words(found: Tolerance, j: int) -> str:
+    share = found.jump_share[j]
+    if not share > 0.0:
+        return ""
+    low, high = found.jump_interval[j]
+    return (
+        f" {_share(share)} ({_share(low)} to {_share(high)}) jump where the nominal machine does "
+        "not, or do not where it does."
+    )
+
+
+def _cost_words(found: Tolerance, j: int) -> str:
+    name = found.costliest(j)
+    if name is None:
+        return ""
+    i = found.names.index(name)
+    return (
+        f" The tolerance of {name} costs most: half of it would bring the share to "
+        f"{_share(found.halved[i, j])}."
+    )
+
+
+def _bounds(found: Tolerance, name: str) -> str:
+    one = QUANTITIES[name]
+    return bounds(*limit_bounds(found.limits, name), one.shown_unit, one.unit)
+
+
+def _percents(shares: Real) -> list[str]:
+    return [f"{100.0 * one:.1f}" for one in shares[:4]]
+
+
+def _share(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

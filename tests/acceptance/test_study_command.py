@@ -1,0 +1,279 @@
+"""``flipflow study`` and ``flipflow store info``: file, report, store, Ctrl-C, resume, workers."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.io.study_file import read_study_file
+from flipflow.studies.study import go_on
+
+pytest.importorskip("zarr")
+SPREAD = """
+machine = "ffs0827"
+
+[vary]
+clearance = "5.4 mm..6.6 mm"
+shear_stiffness = "2700 kN/m +/- 90 kN/m"
+stop_stiffness = "8100 kN/m +/- 300 kN/m"
+floating_mass = "+-3 %"
+
+[study]
+quantities = ["relative_amplitude", "stop_force"]
+load_cases = ["empty", "hot"]
+samples = 32
+seed = 4
+correlation = [["shear_stiffness", "stop_stiffness", 0.6]]
+"""
+MAP = """
+machine = "ffs0827"
+[vary]
+clearance = {from = "5 mm", to = "7 mm", values = 3}
+stops.stiffness = ["8 MN/m", "9 MN/m"]
+[study]
+quantities = ["relative_amplitude"]
+speeds = ["850 rpm", "900 rpm"]
+load_cases = ["empty"]
+"""
+LONG = """
+machine = "ffs0827"
+[vary]
+clearance = "5.4 mm..6.6 mm"
+[study]
+quantities = ["relative_amplitude"]
+load_cases = ["empty"]
+samples = 16384
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("spread", SPREAD), ("map", MAP), ("long", LONG)):
+        (tmp_path / f"{name}.toml").write_text(text)
+    return tmp_path
+
+
+def files(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes()
+            for path in folder.rglob("*") if path.is_file()}  # fmt: skip
+
+
+def test_a_file_says_what_a_call_says(here):
+    one = read_study_file(here / "spread.toml")
+    assert one.vary == {
+        "clearance": pytest.approx((5.4e-3, 6.6e-3)),
+        "shear_stiffness": ff.Normal(2.7e6, 9e4),
+        "stop_stiffness": ff.Normal(8.1e6, 3e5),
+        "floating_mass": pytest.approx((0.97 * 310.0, 1.03 * 310.0)),
+    }
+    covariance = np.array(one.sampling.covariance)
+    assert covariance[1, 2] == pytest.approx(0.6 * 9e4 * 3e5)
+    assert (one.sampling.n, one.sampling.seed, one.sampling.method) == (32, 4, "sobol")
+    assert [load.name for load in one.load_cases] == ["empty", "hot"]
+    assert one.omega == pytest.approx([850.0 * np.pi / 30.0])
+
+
+def test_a_study_and_its_report(command, here):
+    code, out, err = command("study", "spread.toml", "--json", "found.json")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
+    assert "of 32 machines at 850 rpm meet every limit in every load case" in " ".join(out.split())
+    names = sorted(path.name for path in (here / "spread-flipflow").iterdir())
+    assert names == ["machines.csv", "report.html", "results.json", "study.html", "tolerance.html"]
+    page = (here / "spread-flipflow/report.html").read_text()
+    for words in (
+        "Machines that meet every limit",
+        "What tolerances cost",
+        "Machines of the study",
+    ):
+        assert words in page
+    result, found = ff.open_result(here / "found.json"), ff.open_study("spread.zarr")
+    assert isinstance(result, ff.Tolerance)
+    assert result.size == found.size == 32
+    assert result.checked == ("relative_amplitude", "speed", "stop_force")
+    rows = (here / "spread-flipflow/machines.csv").read_text().splitlines()
+    assert len(rows) == 33
+    before = files(here / "spread.zarr")
+    code, _, err = command("study", "spread.toml")
+    assert code == 2
+    assert "it exists; go on with --resume spread.zarr" in err
+    code, again, _ = command("study", "spread.toml", "--resume", "spread.zarr")
+    assert code == 0
+    assert "32 machines at 850 rpm" in " ".join(again.split())
+    assert files(here / "spread.zarr") == before
+    code, _, _ = command("study", "--resume", "spread.zarr", "-o", "other")
+    assert code == 0
+    assert "What the machines do" in (here / "other/report.html").read_text()
+
+
+def test_a_grid_is_drawn_as_a_map(command, here):
+    code, out, _ = command("study", "map.toml")
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    names = {path.name for path in (here / "map-flipflow").iterdir()}
+    assert {"map.html", "report.html"} <= names
+    assert ff.open_study("map.zarr").grid_shape == (3, 2)
+
+
+def test_store_info(command, here):
+    command("study", "map.toml")
+    code, out, _ = command("store", "info", "map.zarr")
+    assert code == 0
+    assert "clearance, stop_stiffness" in out
+    assert "Chunks      1 of 1 finished" in out
+    assert max(map(len, out.splitlines())) <= 80
+    (here / "map.zarr/reason/c.0.0.0").unlink()
+    code, out, err = command("store", "info", "map.zarr")
+    assert code == 4
+    assert "chunk 0 (reason/c.0.0.0 is missing)" in out
+    assert err.count("\n") == 1
+    code, out, _ = command("study", "--resume", "map.zarr")
+    assert code == 0
+    assert "computed again: chunk 0" in " ".join(out.split())
+    code, _, err = command("store", "info", "none.zarr")
+    assert code == 2
+    assert "no such folder" in err
+
+
+def test_worker_processes_find_the_same(command, here):
+    pytest.importorskip("distributed")
+    assert command("study", "map.toml", "--store", "one")[0] == 0
+    code, _, err = command("study", "map.toml", "--store", "two", "--workers", "2")
+    assert (code, err) == (0, "")
+    assert files(here / "one") == files(here / "two")
+
+
+def started(*words, folder, **more):
+    call = [sys.executable, "-m", "flipflow.cli.main", *words]
+    environment = os.environ | {"COLUMNS": "80"}
+    return subprocess.Popen(call, cwd=folder, env=environment, stdout=subprocess.PIPE, **more)
+
+
+def until(holds, seconds=180.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_it_keeps_what_is_finished_and_goes_on(command, here, number):
+    run = started("study", "long.toml", folder=here, stderr=subprocess.PIPE, text=True)
+    until(lambda: len(list(here.glob("long.zarr/checksum/c.*"))) >= 2)
+    run.send_signal(number)
+    _, error = run.communicate(timeout=60.0)
+    assert run.returncode == 130
+    finished = len(list(here.glob("long.zarr/checksum/c.*")))
+    assert error == (
+        f"Stopped by the user; {finished} of 256 chunks are in long.zarr, and flipflow study "
+        "--resume long.zarr goes on.\n"
+    )
+    assert 2 <= finished < 256
+    half = ff.open_study(here / "long.zarr")
+    assert (half.reason != -1).sum() == 64 * finished
+    code, _, err = command("store", "info", "long.zarr")
+    assert (code, err) == (0, "")
+
+    def tell(sentence, _share):
+        raise ff.Cancelled(sentence)
+
+    with pytest.raises(ff.Cancelled, match=f"^study: {finished} of 256 chunks$"):
+        go_on(here / "long.zarr", monitor=tell)
+
+
+def test_a_terminal_sees_the_time_left(here):
+    reads, writes = pty.openpty()
+    run = started("study", "long.toml", folder=here, stderr=writes)
+    os.close(writes)
+    seen = b""
+    while b" left" not in seen:
+        seen += os.read(reads, 4096)
+    assert b"of 256 chunks, " in seen
+    run.kill()
+    run.communicate()
+    os.close(reads)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("machine = ", "machin = "), ("[machin]", "'machine'")),
+        (('"ffs0827"', '"none.toml"'), ("machine file", "no such file")),
+        (("clearance =", "clearence ="), ("vary.clearence", "'clearance'")),
+        (('"5.4 mm..6.6 mm"', '"5.4 mm"'), ("vary.clearance", "5.4 mm..6.6 mm")),
+        (('"5.4 mm..6.6 mm"', "5.4"), ("vary.clearance = 5.4", "a list of values")),
+        (('"5.4 mm..6.6 mm"', '["5 mm"]'), ("vary.clearance",)),
+        (('"5.4 mm..6.6 mm"', '["5 mm", "6 kg"]'), ("vary.clearance", "6 kg")),
+        (('"5.4 mm..6.6 mm"', '{from = "5 mm", to = "6 mm"}'), ("vary.clearance.values",)),
+        (("samples = 32", "samples = 1"), ("study.samples = 1",)),
+        (("samples = 32", 'sampling = "grid"'), ("study.seed", "draws nothing")),
+        (("seed = 4", "seed = -4"), ("study.seed = -4",)),
+        (('"hot"]', '"cold"]'), ("study.load_cases = 'cold'", "'hot'")),
+        (('"stop_force"]', '"size"]'), ("quantity = 'size'",)),
+        ((", 0.6]", ", 1.6]"), ("study.correlation",)),
+        (('["shear_stiffness", "stop', '["clearance", "stop'), ("study.correlation",)),
+        (("seed = 4", 'speed = "850"'), ("study.speed", "unit")),
+        (("seed = 4", "sead = 4"), ("study.sead", "'seed'")),
+        (("seed = 4", 'branch = "middle"'), ("study.branch", "from-below")),
+        (("[study]", "[[study]]"), ("study", "[study] on a line of its own")),
+    ],
+)
+def test_bad_files(command, here, change, words):
+    assert change[0] in SPREAD
+    (here / "bad.toml").write_text(SPREAD.replace(*change))
+    code, out, err = command("study", "bad.toml")
+    assert code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err
+    assert not (here / "bad.zarr").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ((), ("FILE", "left out")),
+        (("long.toml", "--workers", "0"), ("--workers = '0'",)),
+        (
+            ("long.toml", "--workers", "2", "--scheduler", "tcp://x:1"),
+            ("leave one of the two out",),
+        ),
+        (("long.toml", "--store", "a", "--resume", "b"), ("leave one of the two out",)),
+        (("long.toml", "--resume", "none.zarr"), ("no such folder",)),
+        (("long.toml", "--scheduler", "nonsense"), ("--scheduler = 'nonsense'",)),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_bad_options(command, options, words):
+    code, out, err = command("study", *options)
+    assert code == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    for word in words:
+        assert word in err
+
+
+def test_the_file_of_a_store_is_held_against_it(command, here):
+    assert command("study", "map.toml")[0] == 0
+    (here / "map.toml").write_text(MAP.replace("5 mm", "4 mm"))
+    code, _, err = command("study", "map.toml", "--resume", "map.zarr")
+    assert code == 4
+    assert "holds a study of other inputs: vary.clearance.values" in err
+
+
+def test_results_of_a_study_document(here, command):
+    assert command("study", "map.toml", "--json", "-")[0] == 0
+    document = json.loads((here / "map-flipflow/results.json").read_text())
+    assert document["schema"] == "flipflow/study/1"
+    assert document["name"] == "FFS0827"

@@ -1,0 +1,306 @@
+"""The store of a study: damaged, on a full disk, read-only, held by another, of other inputs."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.errors import StoreError
+
+zarr = pytest.importorskip("zarr")
+VARY = {"shear_stiffness": (2.5e6, 2.9e6), "main_mass": ff.Normal(916.0, 20.0)}
+OMEGA = (60.0, 89.0)
+
+
+def study(store, machine=None, **changes):
+    words = {"sampling": ff.Sample(n=256), "store": store} | changes
+    return ff.study(
+        machine or ff.load("ffs0827-linear"), VARY, "relative_amplitude", OMEGA, **words
+    )
+
+
+def files(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes()
+            for path in folder.rglob("*") if path.is_file()}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole") / "study.zarr"
+    study(folder)
+    return folder
+
+
+@pytest.fixture
+def copy(whole, tmp_path):
+    return shutil.copytree(whole, tmp_path / "study.zarr")
+
+
+class Stop(Exception):  # noqa: N818
+    """Ends a study from its monitor."""
+
+
+def stopping(after):
+    """A monitor that ends the work once some chunks are finished."""
+
+    def tell(sentence, _share):
+        if sentence.startswith(f"study: {after} of"):
+            raise Stop
+
+    return tell
+
+
+def test_a_store_is_what_is_found_in_memory(whole):
+    kept, found = ff.open_study(whole), study(None)
+    assert kept.complete
+    for name in ("values", "nominal", "at_low", "at_high", "columns"):
+        first, second = getattr(kept, name), getattr(found, name)
+        assert first.keys() == second.keys()
+        for key in first:
+            np.testing.assert_array_equal(first[key], second[key])
+    np.testing.assert_array_equal(kept.reason, found.reason)
+    assert (kept.machine, kept.sample, kept.distributions) == (
+        found.machine, found.sample, found.distributions,
+    )  # fmt: skip
+
+
+def test_xarray_opens_it_by_itself(whole):
+    xarray = pytest.importorskip("xarray")
+    with xarray.open_zarr(whole, consolidated=False) as data:
+        assert dict(data.sizes)["sample"] == 256
+        assert data.relative_amplitude.attrs["units"] == "m"
+        own = ff.open_study(whole).values["relative_amplitude"]
+        np.testing.assert_array_equal(data.relative_amplitude, own)
+
+
+def test_a_chunk_that_is_not_there_does_not_read_as_a_value(tmp_path):
+    with pytest.raises(Stop):
+        study(tmp_path / "s", monitor=stopping(2))
+    half = ff.open_study(tmp_path / "s")
+    assert not half.complete
+    missing = (half.reason == -1).all(axis=(1, 2))
+    assert missing.sum() == 128
+    assert np.isnan(half.values["relative_amplitude"][missing]).all()
+    assert half.reasons == {"not computed yet": 256}
+    assert half.notes == ("128 of 256 machines are not computed yet.",)
+    assert half.failed == 0.0
+
+
+def test_what_was_stopped_goes_on_and_ends_bit_for_bit_the_same(whole, tmp_path):
+    for after in (1, 3):
+        with pytest.raises(Stop):
+            study(tmp_path / "s", monitor=stopping(after))
+    told = []
+    study(tmp_path / "s", monitor=lambda sentence, _: told.append(sentence))
+    assert told[0] == "study: 3 of 4 chunks"
+    assert told[-1] == "study: 4 of 4 chunks"
+    assert files(tmp_path / "s") == files(whole)
+
+
+def truncate(path):
+    path.write_bytes(path.read_bytes()[:-9])
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("harm", "name", "words"),
+    [
+        (truncate, "relative_amplitude/c.1.0.0", "is damaged"),
+        (flip, "relative_amplitude/c.1.0.0", "is damaged"),
+        (os.remove, "relative_amplitude/c.1.0.0", "is missing"),
+        (flip, "reason/c.1.0.0", "is damaged"),
+        (os.remove, "reason/c.1.0.0", "is missing"),
+        (flip, "checksum/c.1.0.0", "is damaged"),
+        (truncate, "checksum/c.1.0.0", "is damaged"),
+    ],
+)
+def test_a_damaged_chunk_is_found_named_and_redone(copy, whole, harm, name, words):
+    harm(copy / name)
+    with pytest.raises(StoreError, match=rf"chunk 1 \({name} {words}\); resume the study"):
+        ff.open_study(copy)
+    redone = study(copy)
+    assert redone.notes == (f"Damaged, and computed again: chunk 1 ({name} {words}).",)
+    assert files(copy) == files(whole)
+    assert ff.open_study(copy).notes == ()
+
+
+def test_a_chunk_without_its_checksum_is_not_finished(copy, whole):
+    (copy / "checksum/c.2.0.0").unlink()
+    half = ff.open_study(copy)
+    assert (half.reason == -1).all(axis=(1, 2)).sum() == 64
+    assert np.isnan(half.values["relative_amplitude"]).all(axis=(1, 2)).sum() == 64
+    assert study(copy).complete
+    assert files(copy) == files(whole)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "zarr.json",
+        "relative_amplitude/zarr.json",
+        "main_mass/c.0",
+        "nominal_relative_amplitude/c.0.0",
+    ],
+)
+@pytest.mark.parametrize("harm", [truncate, flip])
+def test_a_damaged_beginning_is_named(copy, name, harm):
+    harm(copy / name)
+    for call in (ff.open_study, study):
+        with pytest.raises(StoreError, match=rf"is damaged: {name}"):
+            call(copy)
+
+
+def test_what_is_no_store(tmp_path):
+    with pytest.raises(StoreError, match="is no store of flipflow"):
+        ff.open_study(tmp_path)
+    with pytest.raises(StoreError, match="is no store of flipflow"):
+        study(tmp_path)
+    with pytest.raises(ff.InputError, match="there is no such folder"):
+        ff.open_study(tmp_path / "none")
+    with pytest.raises(StoreError, match="there is no folder"):
+        study(tmp_path / "none" / "s")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"machine": ff.load("ffs0827-linear").replace(shear_damping=2600.0)},
+         "machine.shear_damping is 2605.0 there and 2600.0 here"),
+        ({"sampling": ff.Sample(n=256, seed=1)}, "sample.seed is 0 there and 1 here"),
+        ({"sampling": ff.Sample(n=512)}, "sample.n is 256 there and 512 here"),
+        ({"branch": "upper"}, "branch is from-below there and upper here"),
+        ({"load_cases": [ff.Load(name="full", floating_mass=10.0)]}, "load_cases"),
+    ],
+)  # fmt: skip
+def test_other_inputs_are_refused_with_the_difference(copy, whole, changes, words):
+    with pytest.raises(StoreError, match="holds a study of other inputs: ") as refused:
+        study(copy, **changes)
+    assert words in str(refused.value)
+    assert files(copy) == files(whole)
+
+
+def test_another_version_is_refused(copy, monkeypatch):
+    monkeypatch.setattr("flipflow.studies.study_plan.__version__", "9.0.0")
+    with pytest.raises(StoreError, match=r"flipflow is 0\.1\.0 there and 9\.0\.0 here"):
+        study(copy)
+
+
+HOLDER = """
+import sys
+from pathlib import Path
+from flipflow.batch.chunk_store import ChunkStore
+with ChunkStore(Path(sys.argv[1])).writing():
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+
+
+def test_a_second_writer_is_refused(copy):
+    """Another process that is at work; and once it is killed, nobody."""
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(copy)],
+                              stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # fmt: skip
+    try:
+        assert holder.stdout.readline() == b"held\n"
+        with pytest.raises(StoreError, match="another run writes to it"):
+            study(copy)
+        assert ff.open_study(copy).complete
+    finally:
+        holder.kill()
+        holder.communicate()
+    assert study(copy).complete
+
+
+def test_a_second_writer_of_the_same_process_is_refused(tmp_path):
+    refused = []
+
+    def tell(sentence, _share):
+        if sentence.startswith("study: 2 of"):
+            with pytest.raises(StoreError, match="another run writes to it"):
+                study(tmp_path / "s")
+            refused.append(sentence)
+
+    assert study(tmp_path / "s", monitor=tell).complete
+    assert refused
+
+
+def mounted(disk, *options):
+    disk.mkdir(exist_ok=True)
+    words = ["mount", *options, "tmpfs", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(words, check=False).returncode:
+        pytest.skip("no disk can be mounted here")
+    return disk
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    disk = mounted(tmp_path / "disk", "-t", "tmpfs", "-o", "size=400k")
+    yield disk
+    subprocess.run(["umount", disk], check=True)
+
+
+def fill(path):
+    """Write until the disk is full."""
+    with suppress(OSError), path.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+
+
+def test_a_full_disk_keeps_what_is_finished(whole, small_disk):
+    """A file takes all but a little; once it is gone the study goes on."""
+    taken = small_disk / "taken"
+    with pytest.raises(Stop):
+        study(small_disk / "s", monitor=stopping(1))
+    fill(taken)
+    with pytest.raises(StoreError, match="No space left"):
+        study(small_disk / "s")
+    assert (ff.open_study(small_disk / "s").reason != -1).any(axis=(1, 2)).sum() == 64
+    taken.unlink()
+    assert study(small_disk / "s").complete
+    assert files(small_disk / "s") == files(whole)
+
+
+def test_a_disk_that_is_full_from_the_beginning(small_disk):
+    fill(small_disk / "taken")
+    with pytest.raises(StoreError, match="No space left"):
+        study(small_disk / "s")
+    assert [path.name for path in small_disk.iterdir()] == ["taken"]
+
+
+@pytest.fixture
+def read_only(whole, tmp_path):
+    disk = mounted(tmp_path / "disk", "-t", "tmpfs", "-o", "size=4m")
+    shutil.copytree(whole, disk / "whole")
+    shutil.copytree(whole, disk / "half")
+    (disk / "half/checksum/c.0.0.0").unlink()
+    subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+    yield disk
+    subprocess.run(["umount", disk], check=True)
+
+
+def test_a_read_only_folder_opens_and_is_not_written(read_only):
+    assert ff.open_study(read_only / "whole").complete
+    assert not ff.open_study(read_only / "half").complete
+    for name in ("half", "new"):
+        with pytest.raises(StoreError, match="cannot be written"):
+            study(read_only / name)
+
+
+def test_the_manifest_says_what_was_asked(whole):
+    attributes = json.loads((whole / "zarr.json").read_text())["attributes"]
+    manifest = attributes["manifest"]
+    assert manifest["flipflow"] == ff.__version__
+    assert manifest["sample"] == {"n": 256, "method": "sobol", "seed": 0, "covariance": None}
+    assert len(attributes["digest"]) == len(manifest["values"]) == 64

@@ -1,0 +1,153 @@
+"""Tolerances: shares against closed forms, against narrower studies, and machines that jump."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import flipflow as ff
+from flipflow.report.study import spread_table
+from flipflow.studies.tolerance import confidence_interval
+
+pytestmark = pytest.mark.numerical
+OMEGA = 89.0
+
+
+@pytest.fixture(scope="module")
+def linear():
+    return ff.load("ffs0827-linear")
+
+
+def amplitude(machine):
+    return float(ff.linear_response(machine, [OMEGA]).amplitude("relative")[0])
+
+
+def judged(machine, vary, most, n=4096, **sampling):
+    """Amplitude without stop is proportional to the eccentric moment."""
+    found = ff.study(
+        machine, vary, "relative_amplitude", OMEGA, sampling=ff.Sample(n=n, **sampling)
+    )
+    return ff.tolerance(found, ff.Limits(relative_amplitude=(0.0, most)))
+
+
+def test_a_uniform_tolerance_passes_its_share(linear):
+    """The limit lies 40 % of the half width above the middle: 70 %, at half the width 90 %."""
+    m = linear.eccentric_moment
+    found = judged(linear, {"eccentric_moment": (0.9 * m, 1.1 * m)}, 1.04 * amplitude(linear))
+    assert found.share[0] == pytest.approx(0.7, abs=2e-3)
+    assert found.halved[0, 0] == pytest.approx(0.9, abs=2e-3)
+    assert found.gain[0, 0] == pytest.approx(0.2, abs=3e-3)
+    assert found.costliest() == "eccentric_moment"
+    expected = np.clip(0.5 + 0.2 / found.factors, 0.0, 1.0)
+    np.testing.assert_allclose(found.scaled[:, 0], expected, atol=5e-3)
+    low, high = found.share_interval[0]
+    assert low < 0.7 < high
+
+
+def test_a_normal_tolerance_passes_its_share(linear):
+    m = linear.eccentric_moment
+    vary = {"eccentric_moment": ff.Normal(m, 0.05 * m)}
+    found = judged(linear, vary, 1.04 * amplitude(linear))
+    assert found.share[0] == pytest.approx(stats.norm.cdf(0.8), abs=2e-3)
+    assert found.halved[0, 0] == pytest.approx(stats.norm.cdf(1.6), abs=3e-3)
+    known = np.isfinite(found.scaled[:, 0])
+    assert known.sum() > 10
+    expected = stats.norm.cdf(0.8 / found.factors[known])
+    np.testing.assert_allclose(found.scaled[known, 0], expected, atol=5e-3)
+
+
+def test_halved_is_what_a_study_of_half_the_tolerance_finds(linear):
+    """Of fields that vary together, one deviation halved and the correlation kept."""
+    k2, m2 = linear.shear_stiffness, linear.floating_mass
+    most = 1.05 * amplitude(linear)
+
+    def of(half):
+        s, t = 0.04 * k2 * half, 0.04 * m2
+        covariance = [[s * s, 0.5 * s * t], [0.5 * s * t, t * t]]
+        vary = {"shear_stiffness": ff.Normal(k2, s), "floating_mass": ff.Normal(m2, t)}
+        return judged(linear, vary, most, covariance=covariance)
+
+    wide, narrow = of(1.0), of(0.5)
+    assert 0.5 < wide.share[0] < 0.95
+    assert wide.halved[0, 0] == pytest.approx(narrow.share[0], abs=0.012)
+    low, high = wide.halved_interval[0, 0]
+    assert low < narrow.share[0] < high
+    assert abs(narrow.share[0] - wide.share[0]) > 0.02
+
+
+def test_intervals_are_those_of_clopper_and_pearson():
+    for passing, count in ((0, 40), (1, 40), (17, 40), (39, 40), (40, 40)):
+        expected = stats.binomtest(passing, count).proportion_ci(method="exact")
+        found = confidence_interval(np.array([float(passing)]), float(count))
+        np.testing.assert_allclose(found[0], expected, rtol=1e-8, atol=1e-12)
+
+
+def test_every_limit_in_every_case(screen):
+    loads = [ff.Load(name="empty"), ff.Load(name="full", stiffness_factor=1.3)]
+    vary, asked = {"clearance": (5e-3, 7e-3)}, ("relative_amplitude", "stop_force")
+    found = ff.study(screen, vary, asked, OMEGA, load_cases=loads, sampling=ff.Sample(n=64))
+    limits = ff.Limits(relative_amplitude=(5e-3, 7.2e-3), stop_force=8e3, speed=(80.0, 95.0))
+    result = ff.tolerance(found, limits)
+    size, force = (found.values[name][:, :, 0] for name in found.quantities)
+    fine = (size >= 5e-3) & (size <= 7.2e-3) & (force <= 8e3)
+    np.testing.assert_array_equal(result.passing[:, 0], fine.all(axis=1))
+    assert result.share[0] == fine.all(axis=1).mean()
+    np.testing.assert_array_equal(result.by_case[:, 0], fine.mean(axis=0))
+    assert result.by_limit[2, 0] == (force <= 8e3).all(axis=1).mean()
+    assert result.checked == ("relative_amplitude", "speed", "stop_force")
+    assert result.by_limit[result.checked.index("speed"), 0] == 1.0
+    assert 0.0 < result.share[0] < 1.0
+    slow = ff.tolerance(found, replace(limits, speed=(90.0, 95.0)))
+    assert slow.share[0] == 0.0
+    assert math.isnan(result.jump_share[0])
+    assert any("ask the study for omega_lb and omega_ub" in note for note in result.notes)
+
+
+def test_a_fold_that_moves_through_the_speed_is_a_share_that_jumps(screen):
+    """At the upper jump speed of the nominal machine about half of its like have jumped."""
+    vary = {"stop_stiffness": ff.Normal(8.1e6, 2e5), "clearance": (5.8e-3, 6.2e-3)}
+    nominal = ff.frequency_response(screen, (150.0, 230.0))
+    omega = max(fold.omega for fold in nominal.folds) - 0.5
+    asked = ("relative_amplitude", "omega_lb", "omega_ub")
+    found = ff.study(screen, vary, asked, omega, sampling=ff.Sample(n=64))
+    result = ff.tolerance(found, ff.Limits(relative_amplitude=(0.0, 0.02)))
+    beyond = omega > found.values["omega_ub"][:, 0]
+    np.testing.assert_array_equal(result.jumped[:, 0], beyond)
+    assert result.jump_share[0] == beyond.mean()
+    assert 0.2 < beyond.mean() < 0.8
+    low, high = result.jump_interval[0]
+    assert low < beyond.mean() < high
+    size = found.values["relative_amplitude"][:, 0, 0]
+    assert size[beyond].max() < 0.5 * size[~beyond].min()
+    rows = [[cell.text for cell in row] for row in spread_table(found).rows]
+    first, second = (row for row in rows if row[0] == "relative amplitude")
+    assert (first[1], second[1]) == ("empty", "empty, jumped")
+    assert (int(first[-1]), int(second[-1])) == ((~beyond).sum(), beyond.sum())
+    assert {row[1] for row in rows if row[0] == "upper jump speed"} == {"empty"}
+
+
+def test_what_is_refused(linear):
+    grid = ff.study(linear, {"main_mass": np.array([900.0, 930.0])}, "stroke", OMEGA)
+    with pytest.raises(ff.InputError, match="not built by chance"):
+        ff.tolerance(grid, ff.Limits(relative_amplitude=(0.0, 1.0)))
+    drawn = ff.study(linear, {"main_mass": (900.0, 930.0)}, "stroke", OMEGA,
+                     sampling=ff.Sample(n=4))  # fmt: skip
+    with pytest.raises(ff.InputError, match="did not ask for relative_amplitude"):
+        ff.tolerance(drawn, ff.Limits(relative_amplitude=(0.0, 1.0)))
+    with pytest.raises(ff.InputError, match="none can be checked"):
+        ff.tolerance(drawn, ff.Limits())
+
+
+def test_a_list_has_a_share_and_no_tolerance(linear):
+    masses = np.linspace(880.0, 950.0, 8)
+    found = ff.study(linear, {"main_mass": masses}, "relative_amplitude", OMEGA, sampling="list")
+    result = ff.tolerance(found, ff.Limits(relative_amplitude=(0.0, amplitude(linear))))
+    assert (
+        result.share[0] == (found.values["relative_amplitude"][:, 0, 0] <= amplitude(linear)).mean()
+    )
+    assert np.isnan(result.halved).all()
+    assert result.costliest() is None
