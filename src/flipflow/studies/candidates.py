@@ -25,9 +25,11 @@ from flipflow.studies.study_values import evaluate_loaded
 
 Real = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
-TARGET, MOTION = "target amplitude", "a stable motion"
+TARGET, MOTION, EVEN = "target amplitude", "a stable motion", "a motion that does not lean"
 STRAIN, FORCE = "strain of the catalogue", "force of the catalogue"
-AMPLITUDE = "relative_amplitude"
+AMPLITUDE, OFFSET = "relative_amplitude", "relative_offset"
+MET = 1e-6  # excess up to which a constraint counts as met: a polish ends on what binds
+LEAN = 1e-2  # share of the amplitude by which equal gaps may be left to one side
 READ: Mapping[Objective, str] = {
     "acceleration": "floating_frame_acceleration",
     "stop force": "stop_force",
@@ -49,13 +51,13 @@ class Gene:
         """Values of the field at shares (C,)."""
         if self.values:
             last = len(self.values) - 1
-            return np.asarray(self.values)[self.index(u).clip(0, last)]
-        return self.low + u * (self.high - self.low)
+            return np.asarray(np.asarray(self.values)[self.index(u).clip(0, last)])
+        return np.asarray(self.low + u * (self.high - self.low))
 
     def index(self, u: Real) -> NDArray[np.int64]:
         """Which of the values a share stands for."""
         count = len(self.values)
-        return np.minimum((u * count).astype(np.int64), count - 1)
+        return np.asarray(np.minimum((u * count).astype(np.int64), count - 1))
 
     def share_of(self, value: Any) -> float:
         """The share that stands for a value, kept within the gene's ends."""
@@ -96,7 +98,7 @@ class Judged:
     @property
     def fits(self) -> NDArray[np.bool_]:
         """Whether every constraint is met."""
-        return np.asarray((self.excess <= 0.0).all(axis=1))
+        return np.asarray((self.excess <= MET).all(axis=1))
 
     def objective(self, name: Objective) -> Real:
         """What is to be small, (C,)."""
@@ -160,7 +162,7 @@ class Space:
     @property
     def constraints(self) -> tuple[str, ...]:
         """Names of what must be met, in the order of ``excess``."""
-        return (TARGET, MOTION, *self.limited, *(name for name, _, _ in self._of_springs))
+        return (TARGET, MOTION, EVEN, *self.limited, *(name for name, _, _ in self._of_springs))
 
     @cached_property
     def _of_springs(self) -> tuple[tuple[str, str, str], ...]:
@@ -232,7 +234,7 @@ class Space:
 
     def judge_columns(self, columns: Columns, count: int) -> Judged:
         """What machines with these fields are like, (C,) each, but for a catalogue's limits."""
-        wanted = {AMPLITUDE, *self.limited}
+        wanted = {AMPLITUDE, OFFSET, *self.limited}
         wanted |= {READ[one] for one in self.objectives if one != "steadiness"}
         wanted |= {name for _, _, name in self._of_springs}
         names = sorted(wanted)
@@ -243,14 +245,14 @@ class Space:
             )
             parts.append((values, reason))
         tables = {
-            name: np.concatenate(
-                [values[name].reshape(count, -1) for values, _ in parts], axis=1
-            )
+            name: np.concatenate([values[name].reshape(count, -1) for values, _ in parts], axis=1)
             for name in names
         }
         reasons = np.concatenate([why.reshape(count, -1) for _, why in parts], axis=1)
         worst = {name: _greatest(table) for name, table in tables.items()}
+        lean = _greatest(tables[OFFSET] / tables[AMPLITUDE]) - LEAN
         excess = [self._off_target(tables[AMPLITUDE]), (reasons != FOUND).mean(axis=1)]
+        excess.append(lean if self._even else np.full(count, -1.0))
         for name in self.limited:
             low, high = limit_bounds(self.duty.bounds, name)
             over = worst[name] / high - 1.0 if np.isfinite(high) else np.full(count, -1.0)
@@ -258,6 +260,12 @@ class Space:
             under = 1.0 - least / low if np.isfinite(low) and low > 0.0 else np.full(count, -1.0)
             excess.append(np.maximum(over, under))
         return Judged(tables[AMPLITUDE], worst, np.stack(excess, axis=1))
+
+    @cached_property
+    def _even(self) -> bool:
+        """Whether the machine is the same on both sides under every load."""
+        loaded = (self.screen.loaded(load) for load in self.duty.loads)
+        return all(one.system().symmetric for one in loaded)
 
     def _off_target(self, amplitude: Real) -> Real:
         """By how much the farthest amplitude misses the tolerance, as a share of the target."""

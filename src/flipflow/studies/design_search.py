@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
 from flipflow.errors import Cancelled, MissingExtra
-from flipflow.studies.candidates import TARGET, Judged, Space
+from flipflow.studies.candidates import Judged, Space
 
 Real = NDArray[np.float64]
 Tell = Callable[[float], None]
@@ -111,19 +111,24 @@ def _front(space: Space, judged: Judged) -> NDArray[np.int64]:
         missed = np.maximum(judged.excess, 0.0).sum(axis=1)
         return np.array([int(np.argmin(missed))])
     F = np.stack([judged.objective(one)[fit] for one in space.objectives], axis=1)
-    beaten = [
-        bool(((F <= one).all(axis=1) & (F < one).any(axis=1)).any()) for one in F
-    ]
-    return fit[~np.array(beaten)]
+    beaten = [bool(((one >= F).all(axis=1) & (one > F).any(axis=1)).any()) for one in F]
+    return np.asarray(fit[~np.array(beaten)])
 
 
-def recommended(space: Space, front: Front) -> int:
-    """Of a Pareto set the candidate that is taken: near the best in what comes first, and so on."""
-    left = np.arange(front.u.shape[0])
-    for one in space.objectives:
-        value = front.judged.objective(one)[left]
-        left = left[value <= value.min() * (1.0 + CLOSE)]
-    return int(left[0])
+def by_preference(space: Space, front: Front) -> list[int]:
+    """Candidates of a Pareto set as they are preferred.
+
+    Near the best in what comes first, the best in what comes next, and so on.
+    """
+    left, order = list(range(front.u.shape[0])), []
+    while left:
+        near = np.array(left)
+        for one in space.objectives:
+            value = front.judged.objective(one)[near]
+            near = near[value <= value.min() * (1.0 + CLOSE)]
+        order.append(int(near[0]))
+        left.remove(order[-1])
+    return order
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +168,7 @@ def _descended(
         judged = space.judge(at(x)[None])
         A = judged.amplitude[0] / target
         met = np.concatenate([x[-1] - A, A - x[-2], -judged.excess[0]])
-        return np.nan_to_num(met, nan=-1.0, posinf=HUGE, neginf=-HUGE)
+        return np.asarray(np.nan_to_num(met, nan=-1.0, posinf=HUGE, neginf=-HUGE))
 
     def slope(x: Real) -> Real:
         return _slopes(space, at(x), moving, target)
@@ -230,9 +235,7 @@ def _prices(space: Space, u: Real, moving: NDArray[np.int64]) -> dict[str, float
     ends = np.concatenate([np.eye(moving.size), -np.eye(moving.size)])
     at_end = np.concatenate([u[moving] <= STEP, u[moving] >= 1.0 - STEP])
     active = np.flatnonzero(np.abs(slack) <= ACTIVE)
-    rows = np.concatenate(
-        [J[active], np.pad(ends[at_end], ((0, 0), (0, 2)))]
-    )
+    rows = np.concatenate([J[active], np.pad(ends[at_end], ((0, 0), (0, 2)))])
     width = np.zeros(moving.size + 2)
     width[-2:] = -1.0, 1.0
     factors, _ = nnls(rows.T, width)
@@ -250,6 +253,3 @@ def _prices(space: Space, u: Real, moving: NDArray[np.int64]) -> dict[str, float
         if factor > 0.0:
             found[f"{end} {name}"] = factor * target
     return found
-
-
-__all__ = ["TARGET", "Front", "Polished", "polish", "recommended", "search"]

@@ -285,6 +285,10 @@ class _LaneMotions:
     def phase(self, which: Any) -> Real:
         return np.angle(self.read.first[..., self._place(which)])
 
+    def offset(self) -> Real:
+        g = self._place("relative")
+        return np.abs(0.5 * (self.read.high[..., g] + self.read.low[..., g]))
+
     def reach(self) -> Real:
         g = self._place("relative")
         return np.maximum(self.read.high[..., g], -self.read.low[..., g])

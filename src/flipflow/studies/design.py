@@ -1,0 +1,280 @@
+"""The machine for a duty: chosen among thousands, and proved as one that was drawn by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow import __version__
+from flipflow.errors import Cancelled, InputError
+from flipflow.model.arguments import checked_count, checked_monitor
+from flipflow.model.duty import Duty, SpringType
+from flipflow.model.monitor import Monitor
+from flipflow.model.project import Project
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.results.result import Result
+from flipflow.studies.assessment import FAIL, Assessment, assess
+from flipflow.studies.candidates import MET, TARGET, Judged, Space
+from flipflow.studies.design_search import (
+    GENERATIONS,
+    Polished,
+    by_preference,
+    polish,
+    search,
+)
+
+Real = NDArray[np.float64]
+SEARCHED, POLISHED = 0.7, 0.8  # shares of the work that are done then
+TRIED = 3  # machines proved before it is said that none passes
+COEXISTING = 1e-3  # share by which the amplitude of another stable motion may differ
+
+
+@dataclass(frozen=True, eq=False)
+class Trial(Result):
+    """One machine as a duty sees it.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+    screen
+        The machine.
+    amplitude
+        Relative amplitude in m under every load case, at every corner of the scatter and every
+        speed, (J,); NaN where there is no stable motion.
+    """
+
+    name: str
+    screen: FlipFlowScreen
+    amplitude: Real
+
+    @property
+    def band(self) -> float:
+        """Greatest less least relative amplitude in m; infinite where one has none."""
+        if np.isnan(self.amplitude).any():
+            return math.inf
+        return float(np.ptp(self.amplitude))
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal(Result):
+    """What :func:`flipflow.design` returns.
+
+    Parameters
+    ----------
+    duty
+        What was asked.
+    fields
+        Free fields of the Pareto set, SI, (P,) each.
+    objectives
+        What was to be small, (P,) each, by name.
+    chosen
+        The machine that is recommended, or that misses the duty least.
+    beside
+        The machine of the file, and the same without stops.
+    possible
+        Whether the duty can be done.
+    excess
+        By what the chosen machine misses each constraint, as a share of it; at most 0 where met.
+    prices
+        By binding constraint, how much the band in m falls for each share of it that is given more.
+    springs
+        The catalogue's spring and how many of them; None without a catalogue.
+    assessment
+        The chosen machine judged as ``flipflow analyze`` judges: the exact solution under every
+        load case, from rest to speed with its motor, blows, other motions.
+    thrown_out
+        Machines of the set that failed this proof, and why.
+    evaluated
+        Candidates that were looked at.
+    cancelled
+        Whether the search was stopped before its end: it is the best so far.
+    version
+        Of flipflow.
+    """
+
+    duty: Duty
+    fields: Mapping[str, Real]
+    objectives: Mapping[str, Real]
+    chosen: Trial
+    beside: tuple[Trial, ...]
+    possible: bool
+    excess: Mapping[str, float]
+    prices: Mapping[str, float]
+    springs: tuple[SpringType, int] | None
+    assessment: Assessment | None
+    thrown_out: tuple[str, ...]
+    evaluated: int
+    cancelled: bool
+    version: str
+
+    def __repr__(self) -> str:
+        return f"Proposal({self.duty.name}: {self.sentence})"
+
+    @property
+    def screen(self) -> FlipFlowScreen:
+        """The machine that is recommended."""
+        return self.chosen.screen
+
+    @property
+    def project(self) -> Project:
+        """The duty's project with the chosen machine, its speed, loads and limits."""
+        return _project(self.duty, self.chosen.screen)
+
+    @cached_property
+    def factor(self) -> float:
+        """The band of the machine of the file over that of the chosen one."""
+        return self.beside[0].band / self.chosen.band
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """Constraints that the chosen machine misses, the worst first."""
+        over = {name: share for name, share in self.excess.items() if share > MET}
+        return tuple(sorted(over, key=lambda name: -over[name]))
+
+    @property
+    def sentence(self) -> str:
+        """What was found, for people."""
+        band = f"{1e3 * self.chosen.band:.3g} mm"
+        if not self.possible:
+            names = " against ".join(self.missed[:2]) or TARGET
+            return (
+                f"the duty cannot be done with what is free: {names}; the nearest machine holds "
+                f"the relative amplitude within {band}"
+            )
+        target, rpm = 1e3 * self.duty.target, self.duty.speeds.mean() * 30.0 / math.pi
+        return (
+            f"holds {target:.3g} mm at {rpm:.4g} rpm within {band} over every load case and "
+            f"scatter, {self.factor:.3g} times as steady as the machine of the file"
+        )
+
+
+def design(
+    duty: Duty, *, generations: int | None = None, monitor: Monitor | None = None
+) -> Proposal:
+    """Choose the machine for a duty and prove it.
+
+    A Pareto set of machines that meet every limit in every load case and at every corner of the
+    scatter is searched; what comes first in ``duty.prefer`` decides among them, and the band of
+    the relative amplitude of the one that is taken is made as small as it gets. It is then judged
+    as :func:`flipflow.assess` judges. One that fails is thrown out for the next.
+
+    Parameters
+    ----------
+    duty
+        What is asked, as :func:`flipflow.load_duty` reads it.
+    generations
+        How long to search; None: as long as pays.
+    monitor
+        Called with a sentence and the share done. What raises :class:`~flipflow.Cancelled` ends
+        the search, and the best so far is proposed.
+
+    Returns
+    -------
+    Proposal
+        The machine, its rivals, and what each limit costs; the nearest possible machine where the
+        duty cannot be done.
+
+    Raises
+    ------
+    InputError
+        For anything but a duty.
+    MissingExtra
+        When pymoo is not installed.
+    """
+    if not isinstance(duty, Duty):
+        remedy = 'give a duty, such as ff.load_duty("duty.toml")'
+        raise InputError("duty", type(duty).__name__, remedy)
+    checked_monitor(monitor)
+    rounds = GENERATIONS if generations is None else checked_count("generations", generations, 9999)
+    space = Space(duty)
+
+    def tell(words: str, low: float, high: float, share: float) -> None:
+        if monitor is not None:
+            monitor(words, low + (high - low) * share)
+
+    front = search(space, rounds, lambda share: tell("searching", 0.0, SEARCHED, share))
+    found, thrown, proof = None, [], None
+    for k in by_preference(space, front)[:TRIED]:
+        try:
+            found = polish(space, front.u[k], lambda s: tell("polishing", SEARCHED, POLISHED, s))
+            if not bool(found.judged.fits[0]):
+                break
+            proof = assess(_project(duty, space.machine(found.u)))
+        except Cancelled:
+            break
+        why = _why_not(proof, duty)
+        if not why:
+            break
+        thrown.append(why)
+    if found is None:
+        found = Polished(front.u[0], space.judge(front.u[:1]), {})
+    tell("done", POLISHED, 1.0, 1.0)
+    possible = bool(found.judged.fits[0]) and len(thrown) < TRIED
+    return Proposal(
+        duty=duty,
+        fields={name: np.asarray(one) for name, one in space.columns(front.u).items()},
+        objectives={one: front.judged.objective(one) for one in space.objectives},
+        chosen=Trial("proposed", space.machine(found.u), found.judged.amplitude[0]),
+        beside=_beside(space),
+        possible=possible,
+        excess=_excess(space, found.judged),
+        prices=found.price,
+        springs=space.spring_of(found.u),
+        assessment=proof,
+        thrown_out=tuple(thrown),
+        evaluated=front.evaluated,
+        cancelled=front.cancelled,
+        version=__version__,
+    )
+
+
+def _project(duty: Duty, screen: FlipFlowScreen) -> Project:
+    return replace(
+        duty.project,
+        screen=screen,
+        speed=float(duty.speeds.mean()),
+        load_cases=duty.loads,
+        limits=duty.bounds,
+        name=duty.name,
+    )
+
+
+def _why_not(proof: Assessment, duty: Duty) -> str:
+    """Why a machine fails its proof; empty where it does not."""
+    if proof.state == FAIL or proof.start_fails:
+        return proof.verdict
+    for case in proof.cases:
+        own = None if case.orbit is None else case.orbit.amplitude("relative")
+        for orbit in case.orbits:
+            size = orbit.amplitude("relative")
+            if own is not None and orbit.stable and abs(size - own) > COEXISTING * own:
+                name = case.name
+                return f"{name}: another stable motion of {1e3 * size:.3g} mm exists at speed"
+            far = abs(size - duty.target) > duty.tolerance
+            if own is None and orbit.stable and far:
+                return f"{case.name}: only a motion of {1e3 * size:.3g} mm exists at speed"
+    return ""
+
+
+def _beside(space: Space) -> tuple[Trial, ...]:
+    """The machine of the file, and the same without stops."""
+    trials = []
+    for name, screen in (
+        ("as the file has it", space.screen),
+        ("without stops", space.screen.replace(clearance=math.inf, clearance_minus=None)),
+    ):
+        alone = Space(replace(space.duty, project=replace(space.duty.project, screen=screen)))
+        # One field makes a row; the others are the machine's own.
+        own = {"main_mass": np.array([screen.main_mass])}
+        trials.append(Trial(name, screen, alone.judge_columns(own, 1).amplitude[0]))
+    return tuple(trials)
+
+
+def _excess(space: Space, judged: Judged) -> dict[str, float]:
+    return dict(zip(space.constraints, judged.excess[0].tolist(), strict=True))
