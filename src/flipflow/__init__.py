@@ -41,6 +41,7 @@ _HOME = {
     "study": "flipflow.studies.study",
     "open_study": "flipflow.studies.study",
     "tolerance": "flipflow.studies.tolerance",
+    "design": "flipflow.studies.design",
     "Sample": "flipflow.model.sampling",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
@@ -58,6 +59,8 @@ _HOME = {
     "Lump": "flipflow.model.disturbance",
     "InputError": "flipflow.errors",
     "Load": "flipflow.model.screen",
+    "Duty": "flipflow.model.duty",
+    "SpringType": "flipflow.model.duty",
     "Motor": "flipflow.model.motor",
     "Drive": "flipflow.model.drive",
     "SpeedProfile": "flipflow.model.drive",
@@ -68,6 +71,7 @@ _HOME = {
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
+    "load_duty": "flipflow.io.duty",
     "Assessment": "flipflow.studies.assessment",
     "Basins": "flipflow.studies.basins",
     "BifurcationDiagram": "flipflow.studies.bifurcation_diagram",
@@ -85,6 +89,7 @@ _HOME = {
     "Machine": "flipflow.model.system",
     "OperatingRegion": "flipflow.studies.operating_region",
     "Orbit": "flipflow.periodic.orbit",
+    "Proposal": "flipflow.studies.design",
     "Ramp": "flipflow.studies.ramp",
     "ResponseFamily": "flipflow.studies.response_family",
     "RungeKutta": "flipflow.transient.time_stepping",
@@ -96,6 +101,7 @@ _HOME = {
     "Study": "flipflow.studies.study",
     "Sweep": "flipflow.transient.sweep",
     "Tolerance": "flipflow.studies.tolerance",
+    "Trial": "flipflow.studies.design",
     "Cancelled": "flipflow.errors",
     "IncompleteError": "flipflow.errors",
     "MissingExtra": "flipflow.errors",
@@ -124,6 +130,7 @@ if TYPE_CHECKING:
     from flipflow.errors import InputError as InputError
     from flipflow.errors import MissingExtra as MissingExtra
     from flipflow.errors import StoreError as StoreError
+    from flipflow.io.duty import load_duty as load_duty
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
     from flipflow.io.results import open_result as open_result
@@ -133,6 +140,8 @@ if TYPE_CHECKING:
     from flipflow.model.disturbance import Lump as Lump
     from flipflow.model.drive import Drive as Drive
     from flipflow.model.drive import SpeedProfile as SpeedProfile
+    from flipflow.model.duty import Duty as Duty
+    from flipflow.model.duty import SpringType as SpringType
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.excitation import HarmonicForce as HarmonicForce
     from flipflow.model.excitation import MovingBase as MovingBase
@@ -165,6 +174,9 @@ if TYPE_CHECKING:
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
     from flipflow.studies.compare import Comparison as Comparison
     from flipflow.studies.compare import compare as compare
+    from flipflow.studies.design import Proposal as Proposal
+    from flipflow.studies.design import Trial as Trial
+    from flipflow.studies.design import design as design
     from flipflow.studies.foundation_loads import FoundationLoads as FoundationLoads
     from flipflow.studies.foundation_loads import foundation_loads as foundation_loads
     from flipflow.studies.jump_risk import JumpRisk as JumpRisk

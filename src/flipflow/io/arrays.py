@@ -24,7 +24,9 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
+from flipflow.studies.candidates import quantity_of
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.foundation_loads import (
     DIRECTIONS,
     CaseLoads,
@@ -588,6 +590,33 @@ def _(found: Tolerance) -> Arrays:
             "jumped": Variable(("machine", "frequency"), found.jumped),
         },
         _attributes(found, machines=found.size),
+    )
+
+
+@arrays_of.register
+def _(found: Proposal) -> Arrays:
+    excess, price = list(found.excess), list(found.prices)
+    return Arrays(
+        "Machines for a duty",
+        "candidate",
+        {
+            **{
+                name: _column("candidate", values, unit_of(found.screen, name))
+                for name, values in found.fields.items()
+            },
+            "constraint": _column("constraint", np.array(excess, str)),
+            "binding": _column("binding", np.array(price, str)),
+        },
+        {
+            **{
+                name.replace(" ", "_"): _column("candidate", values, quantity_of(name).unit)
+                for name, values in found.objectives.items()
+            },
+            "amplitude": _column("combination", found.chosen.amplitude, "m"),
+            "excess": _column("constraint", [found.excess[name] for name in excess]),
+            "price": _column("binding", [found.prices[name] for name in price], "m"),
+        },
+        _attributes(found, possible=str(found.possible), band=found.chosen.band),
     )
 
 

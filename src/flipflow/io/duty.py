@@ -115,8 +115,8 @@ def _speed(table: Table, project: Project) -> tuple[float, float]:
     return low, high
 
 
-def _free(table: Mapping[str, Any], project: Project) -> dict[str, object]:
-    found: dict[str, object] = {}
+def _free(table: Mapping[str, Any], project: Project) -> dict[str, Any]:
+    found: dict[str, Any] = {}
     for key, written in flat_keys(table).items():
         name, last = key.rpartition(".")[::2]
         if last == CHOICES:
@@ -251,7 +251,8 @@ def _sheet_rows(path: Path) -> list[list[Any]]:
     try:
         import openpyxl  # noqa: PLC0415  an extra
     except ModuleNotFoundError:
-        raise MissingExtra("a catalogue as XLSX", "report") from None
+        words = "A catalogue as XLSX needs openpyxl: pip install 'flipflow[report]'."
+        raise MissingExtra(words) from None
     book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
     return [row for row in rows if any(cell is not None for cell in row)]

@@ -26,6 +26,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
@@ -66,6 +67,7 @@ SCHEMAS: dict[type, str] = {
     Sensitivity: "flipflow/sensitivity/1",
     Study: "flipflow/study/1",
     Tolerance: "flipflow/tolerance/1",
+    Proposal: "flipflow/proposal/1",
     Assessment: "flipflow/assessment/1",
     Comparison: "flipflow/comparison/1",
     Startup: "flipflow/startup/1",

@@ -119,6 +119,7 @@ def machine_file(tables: Table, path: Path | None) -> str | Path:
 
 
 def section_of(tables: Table, name: str) -> Mapping[str, Any]:
+    """A section; empty where there is none."""
     table = tables.get(name, {})
     if not isinstance(table, dict):
         raise InputError(name, table, f"write it as a section, [{name}] on a line of its own")
@@ -167,6 +168,7 @@ def _list(label: str, written: object) -> list[Any]:
 
 
 def whole_number(written: object, label: str, least: int, most: int) -> int:
+    """A whole number as a file has it."""
     fine = isinstance(written, int) and not isinstance(written, bool)
     if not fine or not least <= int(str(written)) <= most:
         raise InputError(label, written, f"give a whole number from {least} to {most}")

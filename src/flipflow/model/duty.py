@@ -18,15 +18,18 @@ from flipflow.model.arguments import (
     checked_kind,
     checked_mapping,
     checked_number,
+    checked_pair,
     checked_positive,
+    checked_speed,
     checked_text,
     checked_word,
+    members_of,
 )
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits
 from flipflow.model.project import Project
 from flipflow.model.screen import Load
-from flipflow.model.vary import Choice, Interval, Variation, variations
+from flipflow.model.vary import LAW, Choice, Distribution, Interval, Variation, variations
 
 Real = NDArray[np.float64]
 Objective = Literal["steadiness", "acceleration", "stop force", "foundation force", "power"]
@@ -34,6 +37,7 @@ OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 LEAST_GAP = 1e-3  # m: beneath it rubber that creeps or grows in the heat closes a gap by itself
 LEAST_SHARE = 0.3  # of the machine's own shear stiffness: beneath it the stops carry the frame
 MOST_SCATTER = 0.5
+MOST_PIECES = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +119,7 @@ class Duty:
     target: float
     tolerance: float
     speed: tuple[float, float]
-    free: Mapping[str, object]
+    free: Mapping[str, Distribution | tuple[float, float]]
     load_cases: tuple[Load, ...] = ()
     temperatures: tuple[float, ...] = ()
     scatter: Mapping[str, float] = field(default_factory=dict)
@@ -134,21 +138,38 @@ class Duty:
         checked_mapping("free", self.free, 'give {"clearance": (2e-3, 9e-3)}')
         loads = checked_all("load_cases", self.load_cases, Load, "give a tuple of ff.Load")
         object.__setattr__(self, "load_cases", loads or self.project.load_cases)
-        degrees = tuple(checked_number("temperatures", one) for one in self.temperatures)
-        object.__setattr__(self, "temperatures", degrees)
+        self._take_temperatures()
         checked_kind("limits", self.limits, (Limits, type(None)), "give an ff.Limits")
-        checked_all("catalogue", self.catalogue, SpringType, "give ff.SpringType entries")
-        for one in self.prefer:
-            checked_word("prefer", one, OBJECTIVES)
+        springs = checked_all("catalogue", self.catalogue, SpringType, "give ff.SpringType entries")
+        object.__setattr__(self, "catalogue", springs)
+        self._take_preference()
+        checked_text("name", self.name)
         object.__setattr__(self, "seed", checked_count("seed", self.seed, 2**31 - 1, least=0))
         self._check_scatter()
         self._check_free()
 
     def _checked_speed(self) -> tuple[float, float]:
-        low, high = self.speed
+        low, high = checked_pair("speed", self.speed, "give (least, greatest) in rad/s")
         if low == high:
-            return (checked_positive("speed", low, "rad/s"),) * 2
-        return checked_interval("speed", self.speed)
+            return (checked_speed(low, "speed"),) * 2
+        return checked_interval("speed", (low, high))
+
+    def _take_temperatures(self) -> None:
+        remedy = "give temperatures in degrees Celsius, (-10.0, 50.0)"
+        members = members_of(self.temperatures)
+        if members is None:
+            raise InputError("temperatures", self.temperatures, remedy)
+        degrees = tuple(checked_number("temperatures", one, remedy) for one in members)
+        object.__setattr__(self, "temperatures", degrees)
+        for load in self.loads if degrees else ():
+            self.project.screen.loaded(load)
+
+    def _take_preference(self) -> None:
+        members = members_of(self.prefer)
+        if not members:
+            raise InputError("prefer", self.prefer, f"list some of {', '.join(OBJECTIVES)}")
+        words = tuple(checked_word("prefer", one, OBJECTIVES) for one in members)
+        object.__setattr__(self, "prefer", words)
 
     def _check_scatter(self) -> None:
         checked_mapping("scatter", self.scatter, 'give {"shear_stiffness": 0.15}')
@@ -165,16 +186,21 @@ class Duty:
             remedy = "the catalogue gives the shear springs; leave it out of what is free"
             raise InputError("free", "shear_stiffness", remedy)
         if self.catalogue:
-            low, high = (checked_count("pieces", one, 1000) for one in self.pieces)
-            if low > high:
-                raise InputError("pieces", self.pieces, "give (from, to), the lesser first")
+            self._take_pieces()
         for one in self.varied:
             self._check_least(one.name, one.distribution.ends[0])
 
+    def _take_pieces(self) -> None:
+        members = members_of(self.pieces) or ()
+        if len(members) != 2:
+            raise InputError("pieces", self.pieces, "give (from, to), (8, 16) for example")
+        low, high = (checked_count("pieces", one, MOST_PIECES) for one in members)
+        if low > high:
+            raise InputError("pieces", self.pieces, "give (from, to), the lesser first")
+        object.__setattr__(self, "pieces", (low, high))
+
     def _check_least(self, name: str, low: object) -> None:
         """Refuse what makes a machine steady on paper alone."""
-        if isinstance(low, str):
-            return
         value, least = float(str(low)), LEAST_SHARE * self.project.screen.shear_stiffness
         if name in ("clearance", "clearance_minus") and value < LEAST_GAP:
             least_gap = f"{1e3 * LEAST_GAP:g} mm"
@@ -194,8 +220,9 @@ class Duty:
             return ()
         found = variations(self.free, self.project.screen)
         for one in found:
-            if not isinstance(one.distribution, (Interval, Choice)):
-                raise InputError(f"free {one.name}", self.free[one.name], "give (low, high)")
+            if not isinstance(one.distribution, (Interval, Choice)) or one.name == LAW:
+                remedy = "give numbers to choose from, (low, high) or ff.Choice(values)"
+                raise InputError(f"free {one.name}", self.free[one.name], remedy)
         return found
 
     @property

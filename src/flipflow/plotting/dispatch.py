@@ -17,6 +17,7 @@ from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.bifurcation import bifurcation_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.compare import comparison_figure
+from flipflow.plotting.design import proposal_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.foundation_bars import foundation_figure
@@ -40,6 +41,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.loading import Loading
@@ -81,6 +83,7 @@ OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
     FoundationLoads: foundation_figure,
     Study: study_figure,
     Tolerance: tolerance_figure,
+    Proposal: proposal_figure,
 }
 
 

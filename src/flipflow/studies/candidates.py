@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flipflow.batch.reasons import FOUND
 from flipflow.model.duty import Duty, Objective, SpringType
 from flipflow.model.limits import limit_bounds
-from flipflow.model.quantities import QUANTITIES
+from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Choice, Interval
 from flipflow.studies.study_values import evaluate_loaded
@@ -38,6 +38,11 @@ READ: Mapping[Objective, str] = {
 }
 
 
+def quantity_of(name: str) -> Quantity:
+    """The quantity of an objective; the band is one of amplitudes."""
+    return QUANTITIES[READ.get(name, AMPLITUDE)]  # type: ignore[call-overload]
+
+
 @dataclass(frozen=True)
 class Gene:
     """One number between 0 and 1, and what it stands for."""
@@ -45,13 +50,12 @@ class Gene:
     name: str
     low: float
     high: float
-    values: tuple[Any, ...] = ()
+    values: tuple[float, ...] = ()
 
-    def decoded(self, u: Real) -> NDArray[Any]:
+    def decoded(self, u: Real) -> Real:
         """Values of the field at shares (C,)."""
         if self.values:
-            last = len(self.values) - 1
-            return np.asarray(np.asarray(self.values)[self.index(u).clip(0, last)])
+            return np.asarray(np.asarray(self.values)[self.index(u)])
         return np.asarray(self.low + u * (self.high - self.low))
 
     def index(self, u: Real) -> NDArray[np.int64]:
@@ -59,12 +63,10 @@ class Gene:
         count = len(self.values)
         return np.asarray(np.minimum((u * count).astype(np.int64), count - 1))
 
-    def share_of(self, value: Any) -> float:
+    def share_of(self, value: float) -> float:
         """The share that stands for a value, kept within the gene's ends."""
         if self.values:
-            numbers = np.asarray(self.values)
-            known = numbers == value if numbers.dtype.kind == "U" else np.abs(numbers - value)
-            place = int(np.argmax(known) if numbers.dtype.kind == "U" else np.argmin(known))
+            place = int(np.argmin(np.abs(np.asarray(self.values) - value)))
             return (place + 0.5) / len(self.values)
         return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))
 
@@ -130,7 +132,8 @@ class Space:
         for one in self.duty.varied:
             given = one.distribution
             if isinstance(given, Choice):
-                found.append(Gene(one.name, 0.0, 1.0, tuple(given.values)))
+                numbers = tuple(float(value) for value in given.values)
+                found.append(Gene(one.name, 0.0, 1.0, numbers))
             elif isinstance(given, Interval):
                 found.append(Gene(one.name, given.low, given.high))
         if self.springs:

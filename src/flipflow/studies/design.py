@@ -17,6 +17,7 @@ from flipflow.model.duty import Duty, SpringType
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.assessment import FAIL, Assessment, assess
 from flipflow.studies.candidates import MET, TARGET, Judged, Space
@@ -35,7 +36,7 @@ COEXISTING = 1e-3  # share by which the amplitude of another stable motion may d
 
 
 @dataclass(frozen=True, eq=False)
-class Trial(Result):
+class Trial(Frozen):
     """One machine as a duty sees it.
 
     Parameters
@@ -62,7 +63,7 @@ class Trial(Result):
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal(Result):
+class Proposal(Frozen, Result):
     """What :func:`flipflow.design` returns.
 
     Parameters
@@ -120,6 +121,15 @@ class Proposal(Result):
     def screen(self) -> FlipFlowScreen:
         """The machine that is recommended."""
         return self.chosen.screen
+
+    @property
+    def preferred(self) -> int:
+        """Which machine of the set was polished: that nearest to the chosen one in its fields."""
+        away = np.zeros(next(iter(self.fields.values())).size)
+        for name, values in self.fields.items():
+            own = float(getattr(self.screen, name))
+            away += ((values - own) / (abs(own) or 1.0)) ** 2
+        return int(np.argmin(away))
 
     @property
     def project(self) -> Project:

@@ -59,7 +59,7 @@ def search(space: Space, generations: int, tell: Tell | None) -> Front:
         from pymoo.core.evaluator import Evaluator  # noqa: PLC0415
         from pymoo.core.problem import Problem  # noqa: PLC0415
     except ModuleNotFoundError:
-        raise MissingExtra("a design", "study") from None
+        raise MissingExtra("A design needs pymoo: pip install 'flipflow[study]'.") from None
     size, goals, rules = len(space.genes), len(space.objectives), len(space.constraints)
 
     class Candidates(Problem):  # type: ignore[misc]  # pymoo is untyped
