@@ -25,7 +25,7 @@ from flipflow.studies.study_values import evaluate_loaded
 
 Real = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
-TARGET, MOTION, EVEN = "target amplitude", "a stable motion", "a motion that does not lean"
+TARGET, MOTION, EVEN = "relative amplitude asked", "a stable motion", "a motion that does not lean"
 STRAIN, FORCE = "strain of the catalogue", "force of the catalogue"
 AMPLITUDE, OFFSET = "relative_amplitude", "relative_offset"
 MET = 1e-6  # excess up to which a constraint counts as met: a polish ends on what binds
@@ -41,6 +41,11 @@ READ: Mapping[Objective, str] = {
 def quantity_of(name: str) -> Quantity:
     """The quantity of an objective; the band is one of amplitudes."""
     return QUANTITIES[READ.get(name, AMPLITUDE)]  # type: ignore[call-overload]
+
+
+def label_of(constraint: str) -> str:
+    """A constraint in words."""
+    return QUANTITIES[constraint].label if constraint in QUANTITIES else constraint
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,9 +20,10 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.assessment import FAIL, Assessment, assess
-from flipflow.studies.candidates import MET, TARGET, Judged, Space
+from flipflow.studies.candidates import MET, Judged, Space, label_of
 from flipflow.studies.design_search import (
     GENERATIONS,
+    Front,
     Polished,
     by_preference,
     polish,
@@ -82,8 +83,11 @@ class Proposal(Frozen, Result):
         Whether the duty can be done.
     excess
         By what the chosen machine misses each constraint, as a share of it; at most 0 where met.
+    against
+        Where the duty cannot be done: the constraints that exclude each other, the dearest first.
     prices
-        By binding constraint, how much the band in m falls for each share of it that is given more.
+        By binding constraint, how much the band in m falls for each share of it that is given
+        more; of the ends of what is free, for each share of their interval.
     springs
         The catalogue's spring and how many of them; None without a catalogue.
     assessment
@@ -106,6 +110,7 @@ class Proposal(Frozen, Result):
     beside: tuple[Trial, ...]
     possible: bool
     excess: Mapping[str, float]
+    against: tuple[str, ...]
     prices: Mapping[str, float]
     springs: tuple[SpringType, int] | None
     assessment: Assessment | None
@@ -151,11 +156,16 @@ class Proposal(Frozen, Result):
     def sentence(self) -> str:
         """What was found, for people."""
         band = f"{1e3 * self.chosen.band:.3g} mm"
+        if not self.possible and self.thrown_out and not self.missed:
+            return f"no machine that was tried passes its proof: {self.thrown_out[-1]}"
         if not self.possible:
-            names = " against ".join(self.missed[:2]) or TARGET
+            names = [one for one in self.against or self.missed if one in self.excess]
+            words = " and ".join(label_of(one) for one in names)
+            low, high = 1e3 * self.chosen.amplitude.min(), 1e3 * self.chosen.amplitude.max()
             return (
-                f"the duty cannot be done with what is free: {names}; the nearest machine holds "
-                f"the relative amplitude within {band}"
+                f"the duty cannot be done with what is free: {words} "
+                f"{'exclude each other' if len(names) > 1 else 'cannot be met'}; the nearest "
+                f"machine does {low:.3g} to {high:.3g} mm"
             )
         target, rpm = 1e3 * self.duty.target, self.duty.speeds.mean() * 30.0 / math.pi
         return (
@@ -204,44 +214,78 @@ def design(
     rounds = GENERATIONS if generations is None else checked_count("generations", generations, 9999)
     space = Space(duty)
 
-    def tell(words: str, low: float, high: float, share: float) -> None:
-        if monitor is not None:
-            monitor(words, low + (high - low) * share)
-
-    front = search(space, rounds, lambda share: tell("searching", 0.0, SEARCHED, share))
-    found, thrown, proof = None, [], None
-    for k in by_preference(space, front)[:TRIED]:
-        try:
-            found = polish(space, front.u[k], lambda s: tell("polishing", SEARCHED, POLISHED, s))
-            if not bool(found.judged.fits[0]):
-                break
-            proof = assess(_project(duty, space.machine(found.u)))
-        except Cancelled:
-            break
-        why = _why_not(proof, duty)
-        if not why:
-            break
-        thrown.append(why)
-    if found is None:
-        found = Polished(front.u[0], space.judge(front.u[:1]), {})
-    tell("done", POLISHED, 1.0, 1.0)
-    possible = bool(found.judged.fits[0]) and len(thrown) < TRIED
+    front = search(space, rounds, _told(monitor, "searching", 0.0, SEARCHED))
+    outcome = _proved(space, front, monitor)
+    found = outcome.found
+    if monitor is not None and not outcome.cancelled:
+        monitor("design, done", 1.0)
     return Proposal(
         duty=duty,
         fields={name: np.asarray(one) for name, one in space.columns(front.u).items()},
         objectives={one: front.judged.objective(one) for one in space.objectives},
         chosen=Trial("proposed", space.machine(found.u), found.judged.amplitude[0]),
         beside=_beside(space),
-        possible=possible,
+        possible=bool(found.judged.fits[0]) and not outcome.none_left,
         excess=_excess(space, found.judged),
+        against=found.against,
         prices=found.price,
         springs=space.spring_of(found.u),
-        assessment=proof,
-        thrown_out=tuple(thrown),
+        assessment=outcome.proof,
+        thrown_out=outcome.thrown,
         evaluated=front.evaluated,
-        cancelled=front.cancelled,
+        cancelled=outcome.cancelled,
         version=__version__,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """The machine that is taken, its proof, and what was thrown out before it."""
+
+    found: Polished
+    proof: Assessment | None = None
+    thrown: tuple[str, ...] = ()
+    none_left: bool = False
+    cancelled: bool = False
+
+
+def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
+    """Polish and prove machines of the set as they are preferred, until one passes."""
+    order = by_preference(space, front)[:TRIED]
+    found = Polished(front.u[order[0]], space.judge(front.u[order[:1]]), {})
+    if front.cancelled:
+        return _Outcome(found, cancelled=True)
+    proof = None
+    thrown: list[str] = []
+    try:
+        for k in order:
+            found = polish(space, front.u[k], _told(monitor, "polishing", SEARCHED, POLISHED))
+            if not bool(found.judged.fits[0]):
+                return _Outcome(found, None, tuple(thrown))
+            screen = space.machine(found.u)
+            proof = assess(_project(space.duty, screen), monitor=_of_proof(monitor))
+            why = _why_not(proof, space.duty)
+            if not why:
+                return _Outcome(found, proof, tuple(thrown))
+            thrown.append(why)
+    except Cancelled:
+        return _Outcome(found, None, tuple(thrown), cancelled=True)
+    return _Outcome(found, proof, tuple(thrown), none_left=True)
+
+
+def _of_proof(monitor: Monitor | None) -> Monitor:
+    told = _told(monitor, "proving", POLISHED, 1.0)
+    return lambda _, share: told(share)
+
+
+def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Callable[[float], None]:
+    """What tells a stage's share of the whole."""
+
+    def tell(share: float) -> None:
+        if monitor is not None:
+            monitor(f"design, {words}", low + (high - low) * share)
+
+    return tell
 
 
 def _project(duty: Duty, screen: FlipFlowScreen) -> Project:

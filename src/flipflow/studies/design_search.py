@@ -13,7 +13,7 @@ Deb and others, IEEE Transactions on Evolutionary Computation 6 (2002) 182-197.
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
 from flipflow.errors import Cancelled, MissingExtra
-from flipflow.studies.candidates import Judged, Space
+from flipflow.studies.candidates import MET, TARGET, Judged, Space
 
 Real = NDArray[np.float64]
 Tell = Callable[[float], None]
@@ -133,45 +133,115 @@ def by_preference(space: Space, front: Front) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class Polished:
-    """A candidate after its polish: shares (D,), and what each binding limit costs.
+    """A candidate after its polish.
 
-    ``price`` is by constraint how much the band in m falls for each share of it that is given more.
+    Parameters
+    ----------
+    u
+        Its shares, (D,).
+    judged
+        What it is like.
+    price
+        By binding constraint, how much the band in m falls for each share of it that is given
+        more; of the ends of what is free, for each share of their interval.
+    against
+        Where nothing fits: the constraints that exclude each other, the dearest first.
     """
 
     u: Real
     judged: Judged
     price: Mapping[str, float]
+    against: tuple[str, ...] = ()
 
 
 def polish(space: Space, u: Real, tell: Tell | None = None) -> Polished:
-    """Make the band of a candidate as small as it gets near it, within all constraints."""
-    moving = np.flatnonzero([not gene.values for gene in space.genes])
-    best, judged = u, space.judge(u[None])
-    if moving.size and np.isfinite(judged.band[0]):
-        best, judged = _descended(space, u, moving, tell)
-    return Polished(best, judged, _prices(space, best, moving))
+    """Make the band of a candidate as small as it gets near it, within all constraints.
+
+    One that does not fit is brought as near to fitting as it gets: its greatest excess is made
+    small instead.
+    """
+    around = _Around(space, u, _moving(space))
+    judged = space.judge(u[None])
+    if not around.moving.size or not np.isfinite(judged.band[0]):
+        return Polished(u, judged, {}, _missed(space, judged))
+    best, found = _least_excess(around, tell) if not judged.fits[0] else (u, judged)
+    if not found.fits[0]:
+        return Polished(best, found, {}, _against(around, best))
+    around = _Around(space, best, around.moving)
+    best, found = _least_band(around, tell)
+    return Polished(best, found, _prices(around, best))
 
 
-def _descended(
-    space: Space, u: Real, moving: NDArray[np.int64], tell: Tell | None
-) -> tuple[Real, Judged]:
-    """SLSQP on shares and on the two ends of the band, in units of the target."""
-    target = space.duty.target
-    done = 0
+def _moving(space: Space) -> NDArray[np.int64]:
+    """Places of what has values between."""
+    return np.flatnonzero([not gene.values for gene in space.genes])
 
-    def at(x: Real) -> Real:
-        full = u.copy()
-        full[moving] = x[:-2].clip(0.0, 1.0)
+
+def _missed(space: Space, judged: Judged) -> tuple[str, ...]:
+    order = np.argsort(-judged.excess[0], kind="stable").tolist()
+    return tuple(space.constraints[g] for g in order if judged.excess[0, g] > MET)
+
+
+class _Around:
+    """Amplitudes and excesses near a candidate, with their slopes in what moves.
+
+    A point and the sides of its central differences are lanes of one call; the last is kept.
+    """
+
+    def __init__(self, space: Space, u: Real, moving: NDArray[np.int64]) -> None:
+        self.space, self.u, self.moving = space, u, moving
+        self.target = space.duty.target
+        self._last: tuple[bytes, Real, Real] | None = None
+
+    def full(self, x: Real) -> Real:
+        """The whole candidate, (D,)."""
+        full = self.u.copy()
+        full[self.moving] = x[: self.moving.size].clip(0.0, 1.0)
         return full
 
+    def at(self, u: Real) -> tuple[Real, Real]:
+        """Values (J + G,), amplitudes over the target and excesses, and slopes (J + G, M)."""
+        key = u.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, *self._looked(u))
+        return self._last[1:]
+
+    def _looked(self, u: Real) -> tuple[Real, Real]:
+        rows = np.repeat(u[None], 1 + 2 * self.moving.size, axis=0)
+        for k, d in enumerate(self.moving):
+            rows[1 + 2 * k, d] = min(u[d] + STEP, 1.0)
+            rows[2 + 2 * k, d] = max(u[d] - STEP, 0.0)
+        judged = self.space.judge(rows)
+        table = np.concatenate([judged.amplitude / self.target, judged.excess], axis=1)
+        widths = [rows[1 + 2 * k, d] - rows[2 + 2 * k, d] for k, d in enumerate(self.moving)]
+        with np.errstate(invalid="ignore"):
+            slopes = (table[1::2] - table[2::2]) / np.array(widths)[:, None]
+        return table[0], np.nan_to_num(slopes, nan=0.0, posinf=0.0, neginf=0.0).T
+
+    @property
+    def combinations(self) -> int:
+        """How many amplitudes come before the excesses."""
+        return self.at(self.u)[0].size - len(self.space.constraints)
+
+
+def _solved(
+    around: _Around, more: Real, sides: Real, shift: Real, width: Real, tell: Tell | None
+) -> Real:
+    """Minimise ``width`` times further unknowns y, where no ``sides`` v + ``shift`` exceeds y.
+
+    Rows of ``sides`` (C, J + G + Y) take values, then the further unknowns, whose start is
+    ``more``; returned are the shares of what moves, (M,).
+    """
+    known, count, done = around.at(around.u)[0].size, around.moving.size, 0
+    of_values, of_more = sides[:, :known], sides[:, known:]
+
     def inside(x: Real) -> Real:
-        judged = space.judge(at(x)[None])
-        A = judged.amplitude[0] / target
-        met = np.concatenate([x[-1] - A, A - x[-2], -judged.excess[0]])
-        return np.asarray(np.nan_to_num(met, nan=-1.0, posinf=HUGE, neginf=-HUGE))
+        values = around.at(around.full(x))[0]
+        values = np.nan_to_num(values, nan=HUGE, posinf=HUGE, neginf=-HUGE)
+        return np.asarray(shift + of_values @ values + of_more @ x[count:])
 
     def slope(x: Real) -> Real:
-        return _slopes(space, at(x), moving, target)
+        return np.hstack([of_values @ around.at(around.full(x))[1], of_more])
 
     def step(_: Real) -> None:
         nonlocal done
@@ -179,77 +249,130 @@ def _descended(
         if tell is not None:
             tell(min(done / ROUNDS, 1.0))
 
-    first = space.judge(u[None])
-    A = first.amplitude[0] / target
-    start = np.concatenate([u[moving], [A.min(), A.max()]])
-    width = np.zeros(start.size)
-    width[-2:] = -1.0, 1.0
+    gradient = np.concatenate([np.zeros(count), width])
     found = minimize(
-        lambda x: x[-1] - x[-2],
-        start,
-        jac=lambda _: width,
+        lambda x: float(gradient @ x),
+        np.concatenate([around.u[around.moving], more]),
+        jac=lambda _: gradient,
         method="SLSQP",
-        bounds=[(0.0, 1.0)] * moving.size + [(0.0, 2.0 * float(A.max()))] * 2,
+        bounds=[(0.0, 1.0)] * count + [(-HUGE, HUGE)] * more.size,
         constraints={"type": "ineq", "fun": inside, "jac": slope},
         callback=step,
         options={"maxiter": ROUNDS, "ftol": 1e-9},
     )
-    polished = at(found.x)
+    return np.asarray(found.x[:count])
+
+
+def _least_band(around: _Around, tell: Tell | None) -> tuple[Real, Judged]:
+    """The band in units of the target between two further unknowns, within all constraints."""
+    J = around.combinations
+    A = around.at(around.u)[0][:J]
+    rules = len(around.space.constraints)
+    one, zero = np.eye(J), np.zeros((J, rules))
+    first, last = np.tile([1.0, 0.0], (J, 1)), np.tile([0.0, 1.0], (J, 1))
+    sides = np.vstack(
+        [
+            np.hstack([-one, zero, last]),
+            np.hstack([one, zero, -first]),
+            np.hstack([zero.T, -np.eye(rules), np.zeros((rules, 2))]),
+        ]
+    )
+    ends = np.array([A.min(), A.max()])
+    x = _solved(around, ends, sides, np.zeros(sides.shape[0]), np.array([-1.0, 1.0]), tell)
+    return _better(around, x, lambda judged: float(judged.band[0]))
+
+
+def _least_excess(around: _Around, tell: Tell | None) -> tuple[Real, Judged]:
+    """The greatest excess made small."""
+    sides, shift = _excesses(around)
+    values = around.at(around.u)[0]
+    worst = float((-(shift + sides[:, :-1] @ values)).max())
+    x = _solved(around, np.array([worst]), sides, shift, np.array([1.0]), tell)
+    return _better(around, x, lambda judged: float(judged.excess[0].max()))
+
+
+def _excesses(around: _Around) -> tuple[Real, Real]:
+    """Rows of further unknown less excess; that of the target one for each side of each case."""
+    J, rules = around.combinations, len(around.space.constraints)
+    share = around.space.duty.tolerance / around.target
+    one, zero = np.eye(J), np.zeros((J, rules))
+    sides = np.vstack(
+        [
+            np.hstack([-one, zero]),
+            np.hstack([one, zero]),
+            np.hstack([zero.T, -np.eye(rules)])[1:],
+        ]
+    )
+    shift = np.concatenate([np.full(J, 1.0 + share), np.full(J, share - 1.0), np.zeros(rules - 1)])
+    return np.hstack([sides, np.ones((sides.shape[0], 1))]), shift
+
+
+def _better(around: _Around, x: Real, size: Callable[[Judged], float]) -> tuple[Real, Judged]:
+    """The candidate found, where it is better and misses no more; else that it began with."""
+    space, first = around.space, around.space.judge(around.u[None])
+    polished = around.full(x)
     judged = space.judge(polished[None])
-    allowed = np.maximum(first.excess[0], 0.0) + 1e-6
-    better = judged.band[0] < first.band[0] and bool((judged.excess[0] <= allowed).all())
-    return (polished, judged) if better else (u, first)
+    allowed = max(float(first.excess[0].max()), 0.0) + MET
+    better = size(judged) < size(first) and float(judged.excess[0].max()) <= allowed
+    return (polished, judged) if better else (around.u, first)
 
 
-def _slopes(space: Space, u: Real, moving: NDArray[np.int64], target: float) -> Real:
-    """Jacobian of what must be positive, by central differences of lanes, one-sided at an end."""
-    sides = np.repeat(u[None], 2 * moving.size, axis=0)
-    for k, d in enumerate(moving):
-        sides[2 * k, d] = min(u[d] + STEP, 1.0)
-        sides[2 * k + 1, d] = max(u[d] - STEP, 0.0)
-    judged = space.judge(sides)
-    combos, rules = judged.amplitude.shape[1], judged.excess.shape[1]
-    J = np.zeros((2 * combos + rules, moving.size + 2))
-    for k, d in enumerate(moving):
-        width = sides[2 * k, d] - sides[2 * k + 1, d]
-        A = (judged.amplitude[2 * k] - judged.amplitude[2 * k + 1]) / (target * width)
-        g = (judged.excess[2 * k] - judged.excess[2 * k + 1]) / width
-        J[:, k] = np.nan_to_num(np.concatenate([-A, A, -g]), nan=0.0, posinf=0.0, neginf=0.0)
-    J[:combos, -1], J[combos : 2 * combos, -2] = 1.0, -1.0
-    return J
+def _against(around: _Around, u: Real) -> tuple[str, ...]:
+    """Constraints whose excesses cannot all fall: of the greatest, those with a multiplier.
+
+    Where the greatest excess is least, a sum of slopes of the excesses that are as great, none with
+    a wrong sign, is zero, but for what is free at its end.
+    """
+    values, slopes = around.at(u)
+    sides, shift = _excesses(around)
+    excess = -(shift + sides[:, :-1] @ values)
+    active = np.flatnonzero(excess >= excess.max() - ACTIVE)
+    rows = np.hstack([-(sides[active, :-1] @ slopes), np.ones((active.size, 1))])
+    low, high = _at_ends(around, u)
+    ends = np.vstack([-np.eye(around.moving.size)[low], np.eye(around.moving.size)[high]])
+    rows = np.vstack([rows, np.pad(ends, ((0, 0), (0, 1)))])
+    goal = np.zeros(around.moving.size + 1)
+    goal[-1] = 1.0
+    factors, _ = nnls(rows.T, goal)
+    J, total = around.combinations, Counter[str]()
+    for place, factor in zip(active.tolist(), factors[: active.size].tolist(), strict=True):
+        name = TARGET if place < 2 * J else around.space.constraints[place - 2 * J + 1]
+        total[name] += factor
+    names = [around.space.genes[d].name for d in around.moving.tolist()]
+    at_end = [f"least {names[k]}" for k in low] + [f"greatest {names[k]}" for k in high]
+    total.update(dict(zip(at_end, factors[active.size :].tolist(), strict=True)))
+    return tuple(name for name, factor in total.most_common() if factor > 0.0)
 
 
-def _prices(space: Space, u: Real, moving: NDArray[np.int64]) -> dict[str, float]:
-    """Multipliers of the binding constraints by non-negative least squares, as m a share of each.
+def _at_ends(around: _Around, u: Real) -> tuple[list[int], list[int]]:
+    """Which of what moves is at its least, and which at its greatest."""
+    own = u[around.moving]
+    return np.flatnonzero(own <= STEP).tolist(), np.flatnonzero(own >= 1.0 - STEP).tolist()
+
+
+def _prices(around: _Around, u: Real) -> dict[str, float]:
+    """Multipliers of what binds by non-negative least squares, as m of band a share of each.
 
     At the optimum the gradient of the band is a sum of those of what binds, none with a wrong sign.
     """
-    judged = space.judge(u[None])
-    target = space.duty.target
-    if not moving.size or not math.isfinite(judged.band[0]):
-        return {}
-    A = judged.amplitude[0] / target
-    combos = A.size
-    J = _slopes(space, u, moving, target)
-    slack = np.concatenate([A.max() - A, A - A.min(), -judged.excess[0]])
-    ends = np.concatenate([np.eye(moving.size), -np.eye(moving.size)])
-    at_end = np.concatenate([u[moving] <= STEP, u[moving] >= 1.0 - STEP])
-    active = np.flatnonzero(np.abs(slack) <= ACTIVE)
-    rows = np.concatenate([J[active], np.pad(ends[at_end], ((0, 0), (0, 2)))])
-    width = np.zeros(moving.size + 2)
-    width[-2:] = -1.0, 1.0
-    factors, _ = nnls(rows.T, width)
-    found: dict[str, float] = {}
-    for place, factor in zip(active.tolist(), factors[: active.size].tolist(), strict=True):
-        if place >= 2 * combos and factor > 0.0:
-            found[space.constraints[place - 2 * combos]] = factor * target
-    names = [space.genes[d].name for d in moving.tolist()]
-    bounds = [(name, end) for end in ("least", "greatest") for name in names]
-    for (name, end), factor in zip(
-        [one for one, there in zip(bounds, at_end.tolist(), strict=True) if there],
-        factors[active.size :].tolist(),
-        strict=True,
-    ):
-        if factor > 0.0:
-            found[f"{end} {name}"] = factor * target
-    return found
+    values, slopes = around.at(u)
+    J, M = around.combinations, around.moving.size
+    A, excess = values[:J], values[J:]
+    top, bottom = (np.flatnonzero(side <= ACTIVE) for side in (A.max() - A, A - A.min()))
+    binding = np.flatnonzero(excess >= -ACTIVE)
+    low, high = _at_ends(around, u)
+    rows = np.vstack(
+        [
+            np.hstack([-slopes[top], np.tile([0.0, 1.0], (top.size, 1))]),
+            np.hstack([slopes[bottom], np.tile([-1.0, 0.0], (bottom.size, 1))]),
+            np.pad(-slopes[J + binding], ((0, 0), (0, 2))),
+            np.pad(np.eye(M)[low], ((0, 0), (0, 2))),
+            np.pad(-np.eye(M)[high], ((0, 0), (0, 2))),
+        ]
+    )
+    goal = np.concatenate([np.zeros(M), [-1.0, 1.0]])
+    factors = nnls(rows.T, goal)[0][top.size + bottom.size :] * around.target
+    names = [around.space.genes[d].name for d in around.moving.tolist()]
+    words = [around.space.constraints[g] for g in binding.tolist()]
+    words += [f"least {names[k]}" for k in low] + [f"greatest {names[k]}" for k in high]
+    return {word: one for word, one in zip(words, factors.tolist(), strict=True) if one > 0.0}
