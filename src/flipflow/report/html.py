@@ -15,6 +15,7 @@ from flipflow.report.registry import blocks_of
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.study import Study
 
 if TYPE_CHECKING:
@@ -79,6 +80,24 @@ def study_html(found: Study, blocks: Iterable[Block], title: str, name: str) -> 
     head = TitleBlock(title, (("Study", name),))
     footer = f"flipflow {found.version}, study {name}"
     return page((head, *blocks), title=title, kind="study", footer=footer)
+
+
+def proposal_html(found: Proposal) -> str:
+    """The page of a design as text."""
+    return page(proposal_blocks(found), **proposal_head(found))
+
+
+def proposal_blocks(found: Proposal) -> tuple[Block, ...]:
+    """The blocks of a design's report, its head first."""
+    rows = (("Duty", found.duty.name), ("Machine to begin with", found.duty.project.name))
+    return (TitleBlock(found.duty.name, rows), *blocks_of(found))
+
+
+def proposal_head(found: Proposal) -> dict[str, str]:
+    """What a design's report is called, and what stands at its foot."""
+    name = found.duty.name
+    footer = f"flipflow {found.version}, duty {name}, seed {found.duty.seed}"
+    return {"title": name, "kind": "design", "footer": footer}
 
 
 def title_of(assessment: Assessment) -> str:

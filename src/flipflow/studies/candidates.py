@@ -27,6 +27,7 @@ Real = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 TARGET, MOTION, EVEN = "relative amplitude asked", "a stable motion", "a motion that does not lean"
 STRAIN, FORCE = "strain of the catalogue", "force of the catalogue"
+JUMP = "jump_margin"
 AMPLITUDE, OFFSET = "relative_amplitude", "relative_offset"
 MET = 1e-6  # excess up to which a constraint counts as met: a polish ends on what binds
 LEAN = 1e-2  # share of the amplitude by which equal gaps may be left to one side
@@ -170,7 +171,14 @@ class Space:
     @property
     def constraints(self) -> tuple[str, ...]:
         """Names of what must be met, in the order of ``excess``."""
-        return (TARGET, MOTION, EVEN, *self.limited, *(name for name, _, _ in self._of_springs))
+        of_springs = (name for name, _, _ in self._of_springs)
+        return (TARGET, MOTION, EVEN, *self.limited, *of_springs, *self._of_jumps)
+
+    @cached_property
+    def _of_jumps(self) -> tuple[str, ...]:
+        """The limit on the distance to the jump, where one is given."""
+        given = self.duty.bounds.jump_margin is not None
+        return (JUMP,) if given and not QUANTITIES[JUMP].missing(self.screen) else ()
 
     @cached_property
     def _of_springs(self) -> tuple[tuple[str, str, str], ...]:
@@ -227,18 +235,38 @@ class Space:
                 found.append(gene.share_of(getattr(screen, gene.name)))
         return np.array(found)
 
-    def judge(self, u: Real) -> Judged:
-        """What candidates (C, D) are like."""
-        found = self.judge_columns(self.columns(u), u.shape[0])
-        if not self._of_springs:
-            return found
+    def judge(self, u: Real, *, margins: bool = False) -> Judged:
+        """What candidates (C, D) are like.
+
+        With ``margins`` the distance to the jump is looked at, too, of the drawings of those that
+        fit else: it takes whole responses, where all others are motions at one speed. Without, it
+        counts as met.
+        """
+        columns = self.columns(u)
+        found = self.judge_columns(columns, u.shape[0])
         springs = [self.spring_of(one) for one in u]
         over = [found.excess]
         for _, field, name in self._of_springs:
             allowed = [getattr(one[0], field) if one else None for one in springs]
             most = np.array([np.inf if one is None else one for one in allowed])
             over.append((found.worst[name] / most - 1.0)[:, None])
-        return Judged(found.amplitude, found.worst, np.concatenate(over, axis=1))
+        if self._of_jumps:
+            over.append(np.full((u.shape[0], 1), -1.0))
+        excess = np.concatenate(over, axis=1)
+        fit = np.flatnonzero((excess <= MET).all(axis=1))
+        if self._of_jumps and margins and fit.size:
+            excess[fit, -1] = self._nearness({name: one[fit] for name, one in columns.items()})
+        return Judged(found.amplitude, found.worst, excess)
+
+    def _nearness(self, columns: Columns) -> Real:
+        """By how much drawings come too near to the jump under any load, as a share, (C,)."""
+        least = self.duty.bounds.jump_margin
+        tables = [
+            evaluate_loaded(self.screen, columns, load, [JUMP], self.duty.speeds, "from-below")[0]
+            for load in self.duty.loads
+        ]
+        margins = np.concatenate([table[JUMP] for table in tables], axis=1)
+        return np.asarray(1.0 - _least(margins) / (least or 1.0))
 
     def judge_columns(self, columns: Columns, count: int) -> Judged:
         """What machines with these fields are like, (C,) each, but for a catalogue's limits."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,11 +14,12 @@ from flipflow import __version__
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.arguments import checked_count, checked_monitor
 from flipflow.model.duty import Duty, SpringType
+from flipflow.model.fields import FIELD
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Result, above
 from flipflow.studies.assessment import FAIL, Assessment, assess
 from flipflow.studies.candidates import MET, Judged, Space, label_of
 from flipflow.studies.design_search import (
@@ -141,6 +142,13 @@ class Proposal(Frozen, Result):
         """The duty's project with the chosen machine, its speed, loads and limits."""
         return _project(self.duty, self.chosen.screen)
 
+    @property
+    def machine_file(self) -> str:
+        """The chosen machine as a machine file, which says where its new values come from."""
+        own = dict.fromkeys(self.fields, f"chosen for the duty {self.duty.name}")
+        sources = {FIELD[name].key: words for name, words in own.items()}
+        return str(above("io.machine_text", "machine_text")(self.project, sources))
+
     @cached_property
     def factor(self) -> float:
         """The band of the machine of the file over that of the chosen one."""
@@ -259,18 +267,28 @@ def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
     thrown: list[str] = []
     try:
         for k in order:
-            found = polish(space, front.u[k], _told(monitor, "polishing", SEARCHED, POLISHED))
-            if not bool(found.judged.fits[0]):
-                return _Outcome(found, None, tuple(thrown))
-            screen = space.machine(found.u)
-            proof = assess(_project(space.duty, screen), monitor=_of_proof(monitor))
-            why = _why_not(proof, space.duty)
-            if not why:
-                return _Outcome(found, proof, tuple(thrown))
-            thrown.append(why)
+            if not front.judged.fits[k]:
+                found = polish(space, front.u[k], _told(monitor, "polishing", SEARCHED, POLISHED))
+                if not bool(found.judged.fits[0]):
+                    return _Outcome(found, None, tuple(thrown))
+            # A polish may end too near to a jump, of which it knows nothing.
+            for found in _versions(space, front.u[k], monitor):
+                proof = assess(
+                    _project(space.duty, space.machine(found.u)), monitor=_of_proof(monitor)
+                )
+                why = _why_not(proof, space.duty)
+                if not why:
+                    return _Outcome(found, proof, tuple(thrown))
+                thrown.append(why)
     except Cancelled:
         return _Outcome(found, None, tuple(thrown), cancelled=True)
     return _Outcome(found, proof, tuple(thrown), none_left=True)
+
+
+def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polished]:
+    """A candidate after its polish, then as it was found."""
+    yield polish(space, u, _told(monitor, "polishing", SEARCHED, POLISHED))
+    yield Polished(u, space.judge(u[None], margins=True), {})
 
 
 def _of_proof(monitor: Monitor | None) -> Monitor:

@@ -64,7 +64,7 @@ def search(space: Space, generations: int, tell: Tell | None) -> Front:
 
     class Candidates(Problem):  # type: ignore[misc]  # pymoo is untyped
         def _evaluate(self, x: Real, out: dict[str, Any], *_: Any, **__: Any) -> None:
-            judged = space.judge(x)
+            judged = space.judge(x, margins=True)
             values = [judged.objective(one) for one in space.objectives]
             out["F"] = np.minimum(np.stack(values, axis=1), HUGE * SCALE)
             out["G"] = np.minimum(judged.excess, HUGE)
@@ -82,7 +82,7 @@ def search(space: Space, generations: int, tell: Tell | None) -> Front:
     except Cancelled:
         cancelled = True
     u = np.unique(np.array(algorithm.pop.get("X"), float), axis=0)
-    judged = space.judge(u)
+    judged = space.judge(u, margins=True)
     kept = _front(space, judged)
     return Front(u[kept], _rows(judged, kept), cancelled, algorithm.evaluator.n_eval)
 
