@@ -62,7 +62,7 @@ def machine_text(project: Project, sources: Mapping[str, str] | None = None) -> 
         "document": [(e.key, json.dumps(getattr(project.document, e.key), ensure_ascii=False))
                      for e in SECTIONS["document"]],
         **_screen(project.screen),
-        "operation": [("speed", quantity_text(speed, SPEED)) for speed in (project.speed,) if speed],
+        "operation": [("speed", quantity_text(w, SPEED)) for w in (project.speed,) if w],
         "drive": [(key.removeprefix(DRIVE), _plain(value)) for key, value in written.items()],
         **_limits(project),
     }  # fmt: skip
