@@ -32,7 +32,7 @@ from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.errors import FlipflowError
-from flipflow.model.arguments import members_of
+from flipflow.model.arguments import members_of, real
 from flipflow.model.project import Document
 from flipflow.paper.reproduce import Reproduction
 from flipflow.periodic.orbit import Orbit
@@ -245,6 +245,26 @@ def project() -> ff.Project:
 
 
 @cache
+def duty() -> ff.Duty:
+    """A duty of one field on the machine without stops."""
+    return ff.Duty(
+        project=project(), target=2e-3, tolerance=1e-3, speed=(OMEGA, OMEGA),
+        free={"eccentric_moment": (3.0, 5.0)},
+    )  # fmt: skip
+
+
+@cache
+def duty_file() -> Path:
+    """The same as a file."""
+    place = folder() / "duty.toml"
+    place.write_text(
+        'machine = "ffs0827-linear"\n[duty]\nrelative_amplitude = "2 mm"\ntolerance = "1 mm"\n'
+        '[free]\neccentric_moment = "3 kg m..5 kg m"\n'
+    )
+    return place
+
+
+@cache
 def functions() -> tuple[Call, ...]:
     """Functions of the public face."""
     narrow, around = (80.0, 82.0), (95.0, 105.0)
@@ -338,6 +358,9 @@ def functions() -> tuple[Call, ...]:
               "sampling": ff.Sample(n=4), "branch": "from-below", "store": None,
               "executor": None, "threads": 1, "monitor": None}, (Study,)),
         Call("open_study", ff.open_study, {"path": stored()}, (Study,)),
+        Call("design", ff.design, {"duty": duty(), "generations": 1, "monitor": None},
+             (ff.Proposal,), {"generations": lambda n: n is None or (real(n) or 0.0) > 3.0}),
+        Call("load_duty", ff.load_duty, {"path": duty_file(), "force": False}, (ff.Duty,)),
         Call("tolerance", ff.tolerance,
              {"study": ff.open_study(stored()), "limits": ff.Limits(relative_amplitude=(0.0, 1.0))},
              (Tolerance,)),
@@ -357,6 +380,11 @@ def classes() -> tuple[Call, ...]:
             "harmonics": 3, "samples": 256, "sharpness": 1e6, "points": 300,
         },
         ff.RungeKutta: {"formula": "dopri5", "tolerance": 1e-8, "step": None},
+        ff.Duty: {name: getattr(duty(), name) for name in ff.Duty.__dataclass_fields__},
+        ff.SpringType: {
+            "name": "A", "stiffness": 2e5, "loss_factor": 0.1, "height": 0.05, "strain": None,
+            "force": None, "price": 10.0,
+        },
         ff.Sample: {"n": 8, "method": "sobol", "seed": 0, "covariance": None},
         ff.Choice: {"values": (1.0, 2.0)},
         ff.Normal: {"mean": 1.0, "std": 0.1},

@@ -43,6 +43,7 @@ _HOME = {
     "study": "flipflow.studies.study",
     "open_study": "flipflow.studies.study",
     "tolerance": "flipflow.studies.tolerance",
+    "design": "flipflow.studies.design",
     "Sample": "flipflow.model.sampling",
     "Choice": "flipflow.model.vary",
     "Normal": "flipflow.model.vary",
@@ -60,6 +61,8 @@ _HOME = {
     "Lump": "flipflow.model.disturbance",
     "InputError": "flipflow.errors",
     "Load": "flipflow.model.screen",
+    "Duty": "flipflow.model.duty",
+    "SpringType": "flipflow.model.duty",
     "Motor": "flipflow.model.motor",
     "Drive": "flipflow.model.drive",
     "SpeedProfile": "flipflow.model.drive",
@@ -70,6 +73,7 @@ _HOME = {
     "Project": "flipflow.model.project",
     "load": "flipflow.io.project",
     "load_project": "flipflow.io.project",
+    "load_duty": "flipflow.io.duty",
     "Assessment": "flipflow.studies.assessment",
     "Basins": "flipflow.studies.basins",
     "BifurcationCurve": "flipflow.continuation.bifurcation_curve",
@@ -89,6 +93,7 @@ _HOME = {
     "Machine": "flipflow.model.system",
     "OperatingRegion": "flipflow.studies.operating_region",
     "Orbit": "flipflow.periodic.orbit",
+    "Proposal": "flipflow.studies.design",
     "Ramp": "flipflow.studies.ramp",
     "ResponseFamily": "flipflow.studies.response_family",
     "RungeKutta": "flipflow.transient.time_stepping",
@@ -100,6 +105,7 @@ _HOME = {
     "Study": "flipflow.studies.study",
     "Sweep": "flipflow.transient.sweep",
     "Tolerance": "flipflow.studies.tolerance",
+    "Trial": "flipflow.studies.design",
     "Cancelled": "flipflow.errors",
     "IncompleteError": "flipflow.errors",
     "MissingExtra": "flipflow.errors",
@@ -132,6 +138,7 @@ if TYPE_CHECKING:
     from flipflow.errors import InputError as InputError
     from flipflow.errors import MissingExtra as MissingExtra
     from flipflow.errors import StoreError as StoreError
+    from flipflow.io.duty import load_duty as load_duty
     from flipflow.io.project import load as load
     from flipflow.io.project import load_project as load_project
     from flipflow.io.results import open_result as open_result
@@ -141,6 +148,8 @@ if TYPE_CHECKING:
     from flipflow.model.disturbance import Lump as Lump
     from flipflow.model.drive import Drive as Drive
     from flipflow.model.drive import SpeedProfile as SpeedProfile
+    from flipflow.model.duty import Duty as Duty
+    from flipflow.model.duty import SpringType as SpringType
     from flipflow.model.elements import ClearanceSpring as ClearanceSpring
     from flipflow.model.excitation import HarmonicForce as HarmonicForce
     from flipflow.model.excitation import MovingBase as MovingBase
@@ -173,6 +182,9 @@ if TYPE_CHECKING:
     from flipflow.studies.bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
     from flipflow.studies.compare import Comparison as Comparison
     from flipflow.studies.compare import compare as compare
+    from flipflow.studies.design import Proposal as Proposal
+    from flipflow.studies.design import Trial as Trial
+    from flipflow.studies.design import design as design
     from flipflow.studies.design_map import DesignMap as DesignMap
     from flipflow.studies.design_map import design_map as design_map
     from flipflow.studies.foundation_loads import FoundationLoads as FoundationLoads

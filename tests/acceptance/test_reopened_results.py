@@ -30,6 +30,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
@@ -46,7 +47,7 @@ from flipflow.transient.history import History
 from flipflow.transient.startup import Peak, RunUp
 from flipflow.transient.sweep import Sweep
 
-NOT_RESULTS = {ff.FlipFlowScreen, ff.Project, Figure}
+NOT_RESULTS = {ff.FlipFlowScreen, ff.Project, ff.Duty, Figure}
 DRIVE = ff.Drive(inertia=0.9, motor=ff.Motor(synchronous_speed=157.0, rated_power=5500.0))
 
 
@@ -80,6 +81,28 @@ def response() -> Branch:
 def assessed() -> Assessment:
     project = ff.load_project("ffs0827")
     return ff.assess(dataclasses.replace(project, load_cases=project.load_cases[:2]))
+
+
+def proposed() -> Proposal:
+    """A machine from a catalogue, whose fields are an interval and a choice."""
+    springs = (
+        ff.SpringType(name="soft", stiffness=1.5e5, loss_factor=0.1, strain=0.3, price=40.0),
+        ff.SpringType(name="hard", stiffness=2.5e5, loss_factor=0.1, height=0.05),
+    )
+    project = ff.load_project("ffs0827")
+    return ff.design(
+        ff.Duty(
+            project=dataclasses.replace(project, load_cases=project.load_cases[:2]),
+            target=7e-3,
+            tolerance=2e-3,
+            speed=(83.8, 83.8),
+            free={"clearance": (2e-3, 9e-3), "eccentric_moment": ff.Choice((3.0, 5.0))},
+            scatter={"shear_stiffness": 0.1},
+            catalogue=springs,
+            pieces=(8, 12),
+        ),
+        generations=2,
+    )
 
 
 def studied() -> Study:
@@ -184,6 +207,7 @@ MADE: dict[type, list[Callable[[], object]]] = {
         ),
     ],
     Tolerance: [lambda: ff.tolerance(studied(), ff.Limits(relative_amplitude=(5e-3, 9e-3)))],
+    Proposal: [proposed],
     Assessment: [assessed],
     Reproduction: [lambda: ff.reproduce(figures=("1", "3", "5"))],
 }

@@ -88,6 +88,18 @@ MADE: dict[str, Callable[[], object]] = {
     "Tolerance": lambda: ff.tolerance(made("Study"), ff.Limits(relative_amplitude=(5e-3, 9e-3))),
     "Comparison": lambda: ff.compare([screen(), screen().replace(clearance=5e-3)], omega=89.0),
     "FoundationLoads": lambda: ff.foundation_loads({"empty": branch().orbits_at(89.0)[0]}),
+    "Proposal": lambda: ff.design(
+        ff.Duty(
+            project=ff.load_project("ffs0827"),
+            target=7e-3,
+            tolerance=2e-3,
+            speed=(83.8, 83.8),
+            free={"clearance": (2e-3, 9e-3), "eccentric_moment": ff.Choice((3.0, 4.0, 5.0))},
+            load_cases=(ff.Load(), ff.Load(stiffness_factor=1.1, name="full")),
+            limits=ff.Limits(),
+        ),
+        generations=2,
+    ),
     "Assessment": lambda: ff.assess(ff.load_project("ffs0827")),
 }
 made = cache(lambda name: MADE[name]())

@@ -18,6 +18,7 @@ from flipflow.cli.analyze import analyze
 from flipflow.cli.basins import basins
 from flipflow.cli.check import check
 from flipflow.cli.compare import compare
+from flipflow.cli.design import design
 from flipflow.cli.destination import NOTHING, STOPPED
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
@@ -53,6 +54,7 @@ COMMANDS = (
     startup,
     sensitivity,
     study,
+    design,
     reproduce,
 )
 

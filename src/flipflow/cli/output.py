@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 COLUMNS = 80
 TERMINAL = "-"
 JSON, OUTPUT = "--json", "--output"
+IMPOSSIBLE = 6  # exit code of a duty that cannot be done with what is free
 DOES_NOT_START = 5  # exit code of a start that fails, or a drive that does not fit, as given
 
 

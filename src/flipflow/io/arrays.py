@@ -27,7 +27,7 @@ from flipflow.io.labelled import (
     unit_of,
     units_of,
 )
-from flipflow.io.study_arrays import study_arrays, tolerance_arrays
+from flipflow.io.study_arrays import proposal_arrays, study_arrays, tolerance_arrays
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.orbit import Orbit
@@ -35,6 +35,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram, Direction
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import (
     FoundationLoads,
@@ -546,3 +547,4 @@ arrays_of.register(Tolerance)(tolerance_arrays)
 arrays_of.register(Assessment)(assessment_arrays)
 arrays_of.register(Comparison)(comparison_arrays)
 arrays_of.register(FoundationLoads)(foundation_arrays)
+arrays_of.register(Proposal)(proposal_arrays)

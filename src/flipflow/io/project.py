@@ -88,7 +88,7 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
     speed = _speed(tables.get("operation", {}), notes)
     project = Project(
         screen=screen,
-        limits=_limits(tables, notes),
+        limits=read_limits(tables, notes),
         load_cases=read_load_cases(cases, screen, notes),
         speed=speed,
         drive=read_drive(tables.get("drive"), screen, speed, notes),
@@ -145,7 +145,8 @@ def _check_format(tables: Mapping[str, object], notes: Notes) -> None:
         raise InputError("format", written, f"this version of flipflow reads format = {FORMAT}")
 
 
-def _limits(tables: Tables, notes: Notes) -> Limits:
+def read_limits(tables: Tables, notes: Notes) -> Limits:
+    """Limits of the sections ``limits``, ``limits.start``, ``limits.stop``."""
     passing: dict[str, Any] = {
         passage: PassingLimits(
             **_limit_values(tables.get(f"limits.{passage}", {}), PASSING_FIELDS[passage], notes)

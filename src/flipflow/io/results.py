@@ -28,6 +28,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.design_map import DesignMap
 from flipflow.studies.documents import CODEC
 from flipflow.studies.foundation_loads import FoundationLoads
@@ -71,6 +72,7 @@ SCHEMAS: dict[type, str] = {
     Sensitivity: "flipflow/sensitivity/1",
     Study: "flipflow/study/1",
     Tolerance: "flipflow/tolerance/1",
+    Proposal: "flipflow/proposal/1",
     Assessment: "flipflow/assessment/1",
     Comparison: "flipflow/comparison/1",
     Startup: "flipflow/startup/1",

@@ -1,11 +1,13 @@
-"""Studies and their tolerances as labelled arrays."""
+"""Studies, their tolerances and designs as labelled arrays."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from flipflow.io.labelled import Arrays, Variable, column
+from flipflow.io.labelled import Arrays, Variable, attributes, column
 from flipflow.model.quantities import quantity_named
+from flipflow.studies.candidates import quantity_of
+from flipflow.studies.design import Proposal
 from flipflow.studies.study import Study
 from flipflow.studies.study_plan import unit_of
 from flipflow.studies.tolerance import Tolerance
@@ -76,4 +78,31 @@ def tolerance_arrays(found: Tolerance) -> Arrays:
             "jumped": Variable(("machine", "frequency"), found.jumped),
         },
         {"flipflow_version": found.version, "machines": found.size},
+    )
+
+
+def proposal_arrays(found: Proposal) -> Arrays:
+    """The Pareto set of a duty, and what the chosen machine misses and would pay."""
+    excess, price = list(found.excess), list(found.prices)
+    return Arrays(
+        "Machines for a duty",
+        "candidate",
+        {
+            **{
+                name: column("candidate", values, unit_of(found.screen, name))
+                for name, values in found.fields.items()
+            },
+            "constraint": column("constraint", np.array(excess, str)),
+            "binding": column("binding", np.array(price, str)),
+        },
+        {
+            **{
+                name.replace(" ", "_"): column("candidate", values, quantity_of(name).unit)
+                for name, values in found.objectives.items()
+            },
+            "amplitude": column("combination", found.chosen.amplitude, "m"),
+            "excess": column("constraint", [found.excess[name] for name in excess]),
+            "price": column("binding", [found.prices[name] for name in price], "m"),
+        },
+        attributes(found, possible=str(found.possible), band=found.chosen.band),
     )

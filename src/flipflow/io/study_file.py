@@ -86,13 +86,13 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
     if source.tables.get("format", FORMAT) != FORMAT:
         remedy = f"this version of flipflow reads format = {FORMAT}"
         raise InputError("format", source.tables["format"], remedy)
-    project = load_project(_machine(source.tables, source.path), force=force)
-    table = _section(source.tables, "study")
+    project = load_project(machine_file(source.tables, source.path), force=force)
+    table = section_of(source.tables, "study")
     refuse_unknown(table, STUDY, place="study.")
     vary = {
         name: given
-        for key, written in _flat(_section(source.tables, "vary")).items()
-        for name, given in _varied(key, written, project).items()
+        for key, written in flat_keys(section_of(source.tables, "vary")).items()
+        for name, given in varied_field(key, written, project).items()
     }
     if not vary:
         raise InputError("vary", LEFT_OUT, 'say what varies, clearance = "5.4 mm..6.6 mm"')
@@ -101,14 +101,14 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
         vary=vary,
         quantities=_quantities(table, project),
         omega=_speeds(table, project),
-        load_cases=_load_cases(table, project),
+        load_cases=chosen_cases(table, project),
         sampling=_sampling(table, vary),
         branch=_word(table, "branch", get_args(BranchWord), "from-below"),
         name=source.name,
     )
 
 
-def _machine(tables: Table, path: Path | None) -> str | Path:
+def machine_file(tables: Table, path: Path | None) -> str | Path:
     """The machine's bundled name, or its file beside the study's."""
     written = tables.get("machine", LEFT_OUT)
     if not isinstance(written, str):
@@ -118,23 +118,24 @@ def _machine(tables: Table, path: Path | None) -> str | Path:
     return path.parent / written
 
 
-def _section(tables: Table, name: str) -> Mapping[str, Any]:
+def section_of(tables: Table, name: str) -> Mapping[str, Any]:
+    """A section; empty where there is none."""
     table = tables.get(name, {})
     if not isinstance(table, dict):
         raise InputError(name, table, f"write it as a section, [{name}] on a line of its own")
     return table
 
 
-def _flat(table: Mapping[str, Any], within: str = "") -> dict[str, Any]:
+def flat_keys(table: Mapping[str, Any], within: str = "") -> dict[str, Any]:
     """Keys as they are written; TOML reads ``stops.clearance`` as a table in a table."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
         nested = isinstance(value, dict) and not set(RANGE) & set(value)
-        flat |= _flat(value, f"{within}{key}.") if nested else {f"{within}{key}": value}
+        flat |= flat_keys(value, f"{within}{key}.") if nested else {f"{within}{key}": value}
     return flat
 
 
-def _varied(key: str, written: object, project: Project) -> dict[str, object]:
+def varied_field(key: str, written: object, project: Project) -> dict[str, object]:
     """A field and how it varies."""
     label = f"vary.{key}"
     try:
@@ -149,7 +150,7 @@ def _varied(key: str, written: object, project: Project) -> dict[str, object]:
     if isinstance(written, dict):
         refuse_unknown(written, RANGE, place=f"{label}.")
         low, high = (_number(label, written.get(end, LEFT_OUT), field.name) for end in RANGE[:2])
-        count = _whole(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
+        count = whole_number(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
         return {field.name: np.linspace(low, high, count)}
     numbers = [_number(label, one, field.name) for one in _list(label, written)]
     return {field.name: np.array(numbers)}
@@ -166,7 +167,8 @@ def _list(label: str, written: object) -> list[Any]:
     return written
 
 
-def _whole(written: object, label: str, least: int, most: int) -> int:
+def whole_number(written: object, label: str, least: int, most: int) -> int:
+    """A whole number as a file has it."""
     fine = isinstance(written, int) and not isinstance(written, bool)
     if not fine or not least <= int(str(written)) <= most:
         raise InputError(label, written, f"give a whole number from {least} to {most}")
@@ -208,7 +210,7 @@ def _speeds(table: Table, project: Project) -> Real:
             ends = [
                 read_number(written.get(end, LEFT_OUT), SPEED, label=label) for end in RANGE[:2]
             ]
-            count = _whole(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
+            count = whole_number(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
             return np.linspace(ends[0], ends[1], count)
         if not isinstance(written, list) or not written:
             remedy = (
@@ -224,7 +226,7 @@ def _speeds(table: Table, project: Project) -> Real:
     return np.array([project.speed])
 
 
-def _load_cases(table: Table, project: Project) -> tuple[Load, ...]:
+def chosen_cases(table: Table, project: Project) -> tuple[Load, ...]:
     """The load cases that the file names, else all of the machine's."""
     if "load_cases" not in table:
         return project.load_cases
@@ -249,8 +251,8 @@ def _sampling(table: Table, vary: Mapping[str, object]) -> str | Sample | None:
         for key, written in drawn.items():
             raise InputError(f"study.{key}", written, f"a {word} draws nothing, leave it out")
         return str(word)
-    n = _whole(drawn.get("samples", 1024), "study.samples", 2, 2**24)
-    seed = _whole(drawn.get("seed", 0), "study.seed", 0, 2**63 - 1)
+    n = whole_number(drawn.get("samples", 1024), "study.samples", 2, 2**24)
+    seed = whole_number(drawn.get("seed", 0), "study.seed", 0, 2**63 - 1)
     covariance = _covariance(drawn["correlation"], vary) if "correlation" in drawn else None
     return Sample(n=n, method=word, seed=seed, covariance=covariance)
 

@@ -43,13 +43,15 @@ def template() -> str:
     return "\n".join([_HEAD, *sections, _load_cases(), _sources()])
 
 
-def write_template(path: str | os.PathLike[str]) -> Path:
+def write_template(path: str | os.PathLike[str], text: str | None = None) -> Path:
     """Write the template to a new file.
 
     Parameters
     ----------
     path
         Path that ends in ``.toml``; an existing file is never overwritten.
+    text
+        What to write; None: the template of a machine file.
 
     Returns
     -------
@@ -66,7 +68,7 @@ def write_template(path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix != ".toml":
         raise InputError("file", str(target), "let the name end in .toml")
-    write_file(target, template(), "file", fresh=True)
+    write_file(target, template() if text is None else text, "file", fresh=True)
     return target
 
 

@@ -137,6 +137,10 @@ _ALL = (
         "Half the peak-to-peak motion of the floating frame along the surface.",
     ),
     Quantity(
+        "relative_offset", "offset of the relative motion", "|mean x2|", "m", "mm",
+        "How far the middle of the motion between the frames lies beside the middle of the gaps.",
+    ),
+    Quantity(
         "relative_phase", "relative phase", "phi2", "rad", "deg",
         "First harmonic of the relative motion against the unbalance force; positive: it leads.",
     ),

@@ -19,6 +19,7 @@ from flipflow.plotting.bifurcation import bifurcation_figure
 from flipflow.plotting.bifurcation_curves import curves_figure
 from flipflow.plotting.branches import branches_figure, field_branch_figure
 from flipflow.plotting.compare import comparison_figure
+from flipflow.plotting.design import proposal_figure
 from flipflow.plotting.design_map import design_map_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
@@ -43,6 +44,7 @@ from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.design_map import DesignMap
 from flipflow.studies.foundation_loads import FoundationLoads
 from flipflow.studies.jump_risk import JumpRisk
@@ -87,6 +89,7 @@ OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
     FoundationLoads: foundation_figure,
     Study: study_figure,
     Tolerance: tolerance_figure,
+    Proposal: proposal_figure,
 }
 
 

@@ -3,6 +3,7 @@
 from flipflow.report import (  # noqa: F401  they register sections
     appendix,
     compare,
+    design,
     details,
     first_page,
     foundation,

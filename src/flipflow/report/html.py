@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from flipflow.errors import MissingExtra
 from flipflow.plotting.figure import Figure
@@ -19,6 +19,7 @@ from flipflow.report.registry import blocks_of
 from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.study import Study
 
 if TYPE_CHECKING:
@@ -30,6 +31,14 @@ KIND = "vibration report"
 LONG = 15  # letters of a word from which on it can be broken anywhere in a table
 SHORT = 8  # rows of a table that is not cut across two pages
 NARROW = 360.0  # pixels for a figure on a telephone
+
+
+class Head(TypedDict):
+    """What a report is called, its kind, and what stands at its foot."""
+
+    title: str
+    kind: str
+    footer: str
 
 
 def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
@@ -85,6 +94,24 @@ def study_html(found: Study, blocks: Iterable[Block], title: str, name: str) -> 
     head = TitleBlock(title, (("Study", name),))
     footer = f"flipflow {found.version}, study {name}"
     return page((head, *blocks), title=title, kind="study", footer=footer)
+
+
+def proposal_html(found: Proposal) -> str:
+    """The page of a design as text."""
+    return page(proposal_blocks(found), **proposal_head(found))
+
+
+def proposal_blocks(found: Proposal) -> tuple[Block, ...]:
+    """The blocks of a design's report, its head first."""
+    rows = (("Duty", found.duty.name), ("Machine to begin with", found.duty.project.name))
+    return (TitleBlock(found.duty.name, rows), *blocks_of(found))
+
+
+def proposal_head(found: Proposal) -> Head:
+    """What a design's report is called, and what stands at its foot."""
+    name = found.duty.name
+    footer = f"flipflow {found.version}, duty {name}, seed {found.duty.seed}"
+    return {"title": name, "kind": "design", "footer": footer}
 
 
 def title_of(assessment: Assessment) -> str:

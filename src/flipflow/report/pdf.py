@@ -13,9 +13,18 @@ from flipflow.errors import InputError, MissingExtra
 from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
-from flipflow.report.html import KIND, LONG, SHORT, footer_of, title_of
+from flipflow.report.html import (
+    KIND,
+    LONG,
+    SHORT,
+    footer_of,
+    proposal_blocks,
+    proposal_head,
+    title_of,
+)
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment
+from flipflow.studies.design import Proposal
 
 # The name that typst has for a paper, and the height in points that a figure may have on it.
 PAPERS: Mapping[str, tuple[str, float]] = MappingProxyType(
@@ -49,6 +58,11 @@ def pdf(assessment: Assessment, paper: str = "a4") -> bytes:
         footer=footer_of(assessment),
         paper=paper,
     )
+
+
+def proposal_pdf(found: Proposal, paper: str = "a4") -> bytes:
+    """The report of a design as a PDF; arguments and errors are those of :func:`pdf`."""
+    return sheets(proposal_blocks(found), **proposal_head(found), paper=paper)
 
 
 def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper: str) -> bytes:

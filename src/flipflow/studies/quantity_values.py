@@ -55,6 +55,10 @@ class Motions(Protocol):
         """Phase of the first harmonic against the exciting force in rad; positive: it leads."""
         ...
 
+    def offset(self) -> Values:
+        """How far the middle of the relative motion lies beside zero, in m."""
+        ...
+
     def reach(self) -> Values:
         """Greatest size of the relative displacement in m."""
         ...
@@ -108,6 +112,7 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     "stroke": lambda m: 2.0 * m.amplitude("relative"),
     "main_amplitude": lambda m: m.amplitude("main"),
     "floating_amplitude": lambda m: m.amplitude("floating"),
+    "relative_offset": lambda m: m.offset(),
     "relative_phase": lambda m: m.phase("relative"),
     "main_frame_acceleration": lambda m: m.peak_acceleration("main"),
     "floating_frame_acceleration": lambda m: m.peak_acceleration("floating"),
@@ -218,8 +223,11 @@ class Working(Frozen):
     def phase(self, which: Coordinate) -> float:
         return self.orbit.phase(which)
 
+    def offset(self) -> float:
+        return abs(self.orbit.mean("relative"))
+
     def reach(self) -> float:
-        return self.orbit.amplitude("relative") + abs(self.orbit.mean("relative"))
+        return self.orbit.amplitude("relative") + self.offset()
 
     def normal_amplitude(self) -> float:
         return math.nan if self.normal is None else self.normal.amplitude
@@ -354,6 +362,9 @@ class ContactFree(Frozen):
 
     def phase(self, which: Coordinate) -> Real:
         return np.angle(self.coordinate(which))
+
+    def offset(self) -> Real:
+        return np.zeros(self.force.shape)
 
     def reach(self) -> Real:
         return self.amplitude("relative")

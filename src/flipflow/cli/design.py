@@ -1,0 +1,90 @@
+"""``flipflow design``: from a duty file to a machine, its proof and a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flipflow.cli.options import Folder, Force, Json, whole
+
+if TYPE_CHECKING:
+    from flipflow.cli.destination import Destination
+    from flipflow.studies.design import Proposal
+
+REPORT, PDF, DATA, MACHINE, FIGURE = (
+    "report.html", "report.pdf", "proposal.json", "machine.toml", "candidates.html",
+)  # fmt: skip
+MOST_GENERATIONS = 9999
+STAGE = "design"  # the stages of a design that keep what is found
+
+
+def design(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="Duty file; see new --duty.")],
+    output: Folder = None,
+    json: Json = None,
+    generations: Annotated[
+        int | None,
+        whole("--generations", "N", 1, MOST_GENERATIONS, "How long to search."),
+    ] = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write the report as PDF, too.")] = False,
+    force: Force = False,
+) -> None:
+    """Choose the machine for a duty, and prove it.
+
+    Stopped, it keeps the best so far. Ends with code 6 where the duty cannot be done; the nearest
+    machine is then shown.
+    """
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
+    from flipflow.io.duty import load_duty  # noqa: PLC0415
+    from flipflow.report.html import require_templates  # noqa: PLC0415
+
+    duty = load_duty(file, force=force)
+    require_templates()
+    if pdf:
+        from flipflow.report.pdf import require_typst  # noqa: PLC0415
+
+        require_typst()
+    for warning in duty.project.warnings:
+        typer.echo(f"Warning: {warning}", err=True)
+    with Destination(output or Path(f"{duty.name}-flipflow"), json, [file]) as target:
+        from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
+        from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
+        from flipflow.studies.design import design as analysis  # noqa: PLC0415
+
+        with progress("starting") as tell, stoppable(tell, STAGE) as told:
+            compile_ahead(lambda s: tell(f"compiling, once per version: {s:.0f} s", 0.0))
+            found = analysis(duty, generations=generations, monitor=told)
+        _write(found, target, pdf=pdf)
+        if found.cancelled:
+            raise target.stopped(kept=True)
+    if not found.possible:
+        raise typer.Exit(IMPOSSIBLE)
+
+
+def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
+    """Report, machine file, numbers; the summary in the terminal."""
+    from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
+    from flipflow.io.results import document_of  # noqa: PLC0415
+    from flipflow.plotting.dispatch import figure  # noqa: PLC0415
+    from flipflow.report import summary  # noqa: PLC0415
+    from flipflow.report.html import proposal_html  # noqa: PLC0415
+
+    target.content(REPORT, proposal_html(found))
+    target.content(MACHINE, found.machine_file)
+    target.wrote(REPORT, MACHINE)
+    if pdf:
+        from flipflow.report.pdf import proposal_pdf  # noqa: PLC0415
+
+        target.content(PDF, proposal_pdf(found))
+        target.wrote(PDF)
+    document = document_of(found)
+    target.data(DATA, document)
+    target.picture(FIGURE, figure(found), found.duty.name)
+    target.document(document)
+    target.keep()
+    if target.spoken:
+        summary(found, console())
+    target.tell()

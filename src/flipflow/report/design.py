@@ -1,0 +1,189 @@
+"""What a proposal becomes in a report and in the terminal: the duty, the machine, its proof."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from flipflow.model.fields import FIELD
+from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
+from flipflow.model.numerals import rpm
+from flipflow.model.quantities import QUANTITIES
+from flipflow.plotting.design import band_figure, proposal_figure
+from flipflow.report.blocks import (
+    Block,
+    Column,
+    FigureBlock,
+    Heading,
+    Note,
+    Table,
+    Text,
+    Values,
+    Verdict,
+    cells,
+)
+from flipflow.report.first_page import cases, limits
+from flipflow.report.numbers import NOTHING, bounds, number, quantity
+from flipflow.report.registry import Part, section
+from flipflow.studies.assessment import FAIL, PASS
+from flipflow.studies.candidates import label_of
+from flipflow.studies.design import Proposal, Trial
+
+NOT_COVERED = (
+    "Scatter is judged at its corners and on the drawing, not between. The material moves with the "
+    "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
+    "corners. Fatigue of rubber, its wear and its creep are not computed: bounds on gap and shear "
+    "stiffness keep the search away from machines that hang on them."
+)
+
+
+@section(Proposal, Part.FIRST_PAGE, 10, brief=True)
+def verdict_of_proposal(found: Proposal) -> Iterator[Block]:
+    """What was found."""
+    yield Verdict(_sentence(found), PASS if found.possible else FAIL)
+    if found.cancelled:
+        yield Note("The search was stopped: this is the best so far, and it is not proved.")
+    for why in found.thrown_out:
+        yield Note(f"Thrown out: {why}")
+
+
+@section(Proposal, Part.FIRST_PAGE, 20)
+def duty_of_proposal(found: Proposal) -> Iterator[Block]:
+    """What was asked."""
+    duty = found.duty
+    speeds = " to ".join(dict.fromkeys(rpm(one) for one in duty.speed))
+    scatter = ", ".join(f"{name} +-{100.0 * one:.3g} %" for name, one in duty.scatter.items())
+    yield Heading("The duty", 1, new_page=False)
+    yield Values(
+        (
+            ("Relative amplitude", f"{_mm(duty.target)} within {_mm(duty.tolerance)} either way"),
+            ("Speed", f"{speeds} rpm"),
+            ("Combinations", _combinations(found)),
+            ("Loads", ", ".join(load.name or "empty" for load in duty.loads)),
+            ("Scatter of parts", scatter or "none"),
+            ("Preferred", ", ".join(duty.prefer)),
+            ("Machines looked at", f"{found.evaluated}, seed {duty.seed}"),
+        )
+    )  # fmt: skip
+
+
+@section(Proposal, Part.FIRST_PAGE, 30, brief=True)
+def machine_of_proposal(found: Proposal) -> Iterator[Block]:
+    """The parts that were chosen."""
+    yield Heading("The machine", 1, new_page=False)
+    columns = (
+        Column("Field"), Column("Of the file", numeric=True), Column("Proposed", numeric=True),
+        Column("Free", brief=False),
+    )  # fmt: skip
+    own, new, free = found.duty.project.screen, found.screen, _free(found)
+    rows = [
+        cells(name, _field(name, getattr(own, name)), _field(name, getattr(new, name)),
+              free.get(name, NOTHING))
+        for name in found.fields
+    ]  # fmt: skip
+    yield Table("Parts", columns, tuple(rows))
+    if found.springs is not None:
+        one, count = found.springs
+        price = "" if one.price is None else f", {number(count * one.price)} together"
+        yield Text(f"{count} of {one.name}{price}.", "Shear springs:")
+
+
+@section(Proposal, Part.FIRST_PAGE, 40, brief=True)
+def steadiness_of_proposal(found: Proposal) -> Iterator[Block]:
+    """The band of the machine and of those beside it."""
+    columns = (
+        Column("Machine"), Column("Least", "mm", numeric=True),
+        Column("Greatest", "mm", numeric=True),        Column("Band", "mm", numeric=True),
+    )  # fmt: skip
+    rows = [cells(one.name, *_ends(one)) for one in (found.chosen, *found.beside)]
+    yield Table("Relative amplitude over all combinations", columns, tuple(rows))
+
+
+@section(Proposal, Part.FIRST_PAGE, 50, brief=True)
+def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
+    """How far each constraint is away, and what it costs."""
+    columns = (
+        Column("Constraint"), Column("Allowed", brief=False), Column("Margin", "%", numeric=True),
+        Column("1 % more of it narrows the band by", "um", numeric=True),
+    )  # fmt: skip
+    rows = [
+        cells(label_of(name), _allowed(found, name), f"{-100.0 * share:.2f}", _price(found, name))
+        for name, share in found.excess.items()
+    ]
+    rows += [
+        cells(name, "end of what is free", "0.00", _price(found, name))
+        for name in found.prices
+        if name not in found.excess
+    ]
+    caption = (
+        "Of the relative amplitude 1 % of the target more to each side; of an end 1 % of its "
+        "interval."
+    )
+    yield Table("What binds, and what it costs", columns, tuple(rows), caption)
+
+
+@section(Proposal, Part.DETAILS, 10)
+def figures_of_proposal(found: Proposal) -> Iterator[Block]:
+    """The Pareto set and the band."""
+    yield Heading("Candidates", 1)
+    yield FigureBlock(band_figure(found))
+    yield FigureBlock(proposal_figure(found))
+
+
+@section(Proposal, Part.DETAILS, 20)
+def proof_of_proposal(found: Proposal) -> Iterator[Block]:
+    """The chosen machine judged by the exact solution, with its start and blows."""
+    yield Heading("Verification", 1)
+    if found.assessment is None:
+        yield Note("No machine was proved.")
+    else:
+        yield Verdict(found.assessment.verdict, found.assessment.state)
+        yield from limits(found.assessment)
+        yield from cases(found.assessment)
+        yield from (Note(one) for one in found.assessment.notes)
+    yield Text(NOT_COVERED, "Not covered:")
+
+
+def _sentence(found: Proposal) -> str:
+    words = found.sentence
+    return f"{words[0].upper()}{words[1:]}."
+
+
+def _combinations(found: Proposal) -> str:
+    loads, corners = len(found.duty.loads), len(found.duty.corners)
+    return f"{loads} of load and temperature, each at {corners} points of the scatter"
+
+
+def _mm(value: float) -> str:
+    return quantity(value, "mm", "m")
+
+
+def _field(name: str, value: float | None) -> str:
+    one = FIELD[name]
+    return quantity(value, one.file_unit, one.unit)
+
+
+def _free(found: Proposal) -> dict[str, str]:
+    return {
+        one.name: " to ".join(_field(one.name, float(str(end))) for end in one.distribution.ends)
+        for one in found.duty.varied
+    }
+
+
+def _ends(one: Trial) -> list[str]:
+    if np.isnan(one.amplitude).any():
+        return [NOTHING, NOTHING, "no stable motion in every combination"]
+    values = one.amplitude.min(), one.amplitude.max(), one.band
+    return [quantity(float(value), "mm", "m", with_unit=False) for value in values]
+
+
+def _allowed(found: Proposal, name: str) -> str:
+    if name not in {field.name for field in LIMIT_FIELDS}:
+        return NOTHING
+    one = QUANTITIES[name]
+    return bounds(*limit_bounds(found.duty.bounds, name), one.shown_unit, one.unit)
+
+
+def _price(found: Proposal, name: str) -> str:
+    return number(1e4 * found.prices[name]) if name in found.prices else NOTHING

@@ -1,0 +1,352 @@
+"""The machine for a duty: chosen among thousands, and proved as one that was drawn by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flipflow import __version__
+from flipflow.errors import Cancelled, InputError
+from flipflow.model.arguments import checked_count, checked_monitor
+from flipflow.model.duty import Duty, SpringType
+from flipflow.model.fields import FIELD
+from flipflow.model.monitor import Monitor
+from flipflow.model.project import Project
+from flipflow.model.screen import FlipFlowScreen
+from flipflow.results.frozen import Frozen
+from flipflow.results.result import Result, above
+from flipflow.studies.assessment import FAIL, Assessment, assess
+from flipflow.studies.candidates import MET, Judged, Space, label_of
+from flipflow.studies.design_search import (
+    GENERATIONS,
+    Front,
+    Polished,
+    by_preference,
+    polish,
+    search,
+)
+
+Real = NDArray[np.float64]
+SEARCHED, POLISHED = 0.7, 0.8  # shares of the work that are done then
+TRIED = 3  # machines proved before it is said that none passes
+COEXISTING = 1e-3  # share by which the amplitude of another stable motion may differ
+
+
+@dataclass(frozen=True, eq=False)
+class Trial(Frozen):
+    """One machine as a duty sees it.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+    screen
+        The machine.
+    amplitude
+        Relative amplitude in m under every load case, at every corner of the scatter and every
+        speed, (J,); NaN where there is no stable motion.
+    """
+
+    name: str
+    screen: FlipFlowScreen
+    amplitude: Real
+
+    @property
+    def band(self) -> float:
+        """Greatest less least relative amplitude in m; infinite where one has none."""
+        if np.isnan(self.amplitude).any():
+            return math.inf
+        return float(np.ptp(self.amplitude))
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal(Frozen, Result):
+    """What :func:`flipflow.design` returns.
+
+    Parameters
+    ----------
+    duty
+        What was asked.
+    fields
+        Free fields of the Pareto set, SI, (P,) each.
+    objectives
+        What was to be small, (P,) each, by name.
+    chosen
+        The machine that is recommended, or that misses the duty least.
+    beside
+        The machine of the file, and the same without stops.
+    possible
+        Whether the duty can be done.
+    excess
+        By what the chosen machine misses each constraint, as a share of it; at most 0 where met.
+    against
+        Where the duty cannot be done: the constraints that exclude each other, the dearest first.
+    prices
+        By binding constraint, how much the band in m falls for each share of it that is given
+        more; of the ends of what is free, for each share of their interval.
+    springs
+        The catalogue's spring and how many of them; None without a catalogue.
+    assessment
+        The chosen machine judged as ``flipflow analyze`` judges: the exact solution under every
+        load case, from rest to speed with its motor, blows, other motions.
+    thrown_out
+        Machines of the set that failed this proof, and why.
+    evaluated
+        Candidates that were looked at.
+    cancelled
+        Whether the search was stopped before its end: it is the best so far.
+    version
+        Of flipflow.
+    """
+
+    duty: Duty
+    fields: Mapping[str, Real]
+    objectives: Mapping[str, Real]
+    chosen: Trial
+    beside: tuple[Trial, ...]
+    possible: bool
+    excess: Mapping[str, float]
+    against: tuple[str, ...]
+    prices: Mapping[str, float]
+    springs: tuple[SpringType, int] | None
+    assessment: Assessment | None
+    thrown_out: tuple[str, ...]
+    evaluated: int
+    cancelled: bool
+    version: str
+
+    def __repr__(self) -> str:
+        return f"Proposal({self.duty.name}: {self.sentence})"
+
+    @property
+    def screen(self) -> FlipFlowScreen:
+        """The machine that is recommended."""
+        return self.chosen.screen
+
+    @property
+    def preferred(self) -> int:
+        """Which machine of the set was polished: that nearest to the chosen one in its fields."""
+        away = np.zeros(next(iter(self.fields.values())).size)
+        for name, values in self.fields.items():
+            own = float(getattr(self.screen, name))
+            away += ((values - own) / (abs(own) or 1.0)) ** 2
+        return int(np.argmin(away))
+
+    @property
+    def project(self) -> Project:
+        """The duty's project with the chosen machine, its speed, loads and limits."""
+        return _project(self.duty, self.chosen.screen)
+
+    @property
+    def machine_file(self) -> str:
+        """The chosen machine as a machine file, which says where its new values come from."""
+        own = dict.fromkeys(self.fields, f"chosen for the duty {self.duty.name}")
+        sources = {FIELD[name].key: words for name, words in own.items()}
+        return str(above("io.machine_text", "machine_text")(self.project, sources))
+
+    @cached_property
+    def factor(self) -> float:
+        """The band of the machine of the file over that of the chosen one."""
+        return self.beside[0].band / self.chosen.band
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """Constraints that the chosen machine misses, the worst first."""
+        over = {name: share for name, share in self.excess.items() if share > MET}
+        return tuple(sorted(over, key=lambda name: -over[name]))
+
+    @property
+    def sentence(self) -> str:
+        """What was found, for people."""
+        band = f"{1e3 * self.chosen.band:.3g} mm"
+        if not self.possible and self.thrown_out and not self.missed:
+            return f"no machine that was tried passes its proof: {self.thrown_out[-1]}"
+        if not self.possible:
+            names = [one for one in self.against or self.missed if one in self.excess]
+            words = " and ".join(label_of(one) for one in names)
+            low, high = 1e3 * self.chosen.amplitude.min(), 1e3 * self.chosen.amplitude.max()
+            return (
+                f"the duty cannot be done with what is free: {words} "
+                f"{'exclude each other' if len(names) > 1 else 'cannot be met'}; the nearest "
+                f"machine does {low:.3g} to {high:.3g} mm"
+            )
+        target, rpm = 1e3 * self.duty.target, self.duty.speeds.mean() * 30.0 / math.pi
+        return (
+            f"holds {target:.3g} mm at {rpm:.4g} rpm within {band} over every load case and "
+            f"scatter, {self.factor:.3g} times as steady as the machine of the file"
+        )
+
+
+def design(
+    duty: Duty, *, generations: int | None = None, monitor: Monitor | None = None
+) -> Proposal:
+    """Choose the machine for a duty and prove it.
+
+    A Pareto set of machines that meet every limit in every load case and at every corner of the
+    scatter is searched; what comes first in ``duty.prefer`` decides among them, and the band of
+    the relative amplitude of the one that is taken is made as small as it gets. It is then judged
+    as :func:`flipflow.assess` judges. One that fails is thrown out for the next.
+
+    Parameters
+    ----------
+    duty
+        What is asked, as :func:`flipflow.load_duty` reads it.
+    generations
+        How long to search; None: as long as pays.
+    monitor
+        Called with a sentence and the share done. What raises :class:`~flipflow.Cancelled` ends
+        the search, and the best so far is proposed.
+
+    Returns
+    -------
+    Proposal
+        The machine, its rivals, and what each limit costs; the nearest possible machine where the
+        duty cannot be done.
+
+    Raises
+    ------
+    InputError
+        For anything but a duty.
+    MissingExtra
+        When pymoo is not installed.
+    """
+    if not isinstance(duty, Duty):
+        remedy = 'give a duty, such as ff.load_duty("duty.toml")'
+        raise InputError("duty", type(duty).__name__, remedy)
+    checked_monitor(monitor)
+    rounds = GENERATIONS if generations is None else checked_count("generations", generations, 9999)
+    space = Space(duty)
+
+    front = search(space, rounds, _told(monitor, "searching", 0.0, SEARCHED))
+    outcome = _proved(space, front, monitor)
+    found = outcome.found
+    if monitor is not None and not outcome.cancelled:
+        monitor("design, done", 1.0)
+    return Proposal(
+        duty=duty,
+        fields={name: np.asarray(one) for name, one in space.columns(front.u).items()},
+        objectives={one: front.judged.objective(one) for one in space.objectives},
+        chosen=Trial("proposed", space.machine(found.u), found.judged.amplitude[0]),
+        beside=_beside(space),
+        possible=bool(found.judged.fits[0]) and not outcome.none_left,
+        excess=_excess(space, found.judged),
+        against=found.against,
+        prices=found.price,
+        springs=space.spring_of(found.u),
+        assessment=outcome.proof,
+        thrown_out=outcome.thrown,
+        evaluated=front.evaluated,
+        cancelled=outcome.cancelled,
+        version=__version__,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Outcome:
+    """The machine that is taken, its proof, and what was thrown out before it."""
+
+    found: Polished
+    proof: Assessment | None = None
+    thrown: tuple[str, ...] = ()
+    none_left: bool = False
+    cancelled: bool = False
+
+
+def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
+    """Polish and prove machines of the set as they are preferred, until one passes."""
+    order = by_preference(space, front)[:TRIED]
+    found = Polished(front.u[order[0]], space.judge(front.u[order[:1]]), {})
+    if front.cancelled:
+        return _Outcome(found, cancelled=True)
+    proof = None
+    thrown: list[str] = []
+    try:
+        for k in order:
+            if not front.judged.fits[k]:
+                found = polish(space, front.u[k], _told(monitor, "polishing", SEARCHED, POLISHED))
+                if not bool(found.judged.fits[0]):
+                    return _Outcome(found, None, tuple(thrown))
+            # A polish may end too near to a jump, of which it knows nothing.
+            for found in _versions(space, front.u[k], monitor):
+                proof = assess(
+                    _project(space.duty, space.machine(found.u)), monitor=_of_proof(monitor)
+                )
+                why = _why_not(proof, space.duty)
+                if not why:
+                    return _Outcome(found, proof, tuple(thrown))
+                thrown.append(why)
+    except Cancelled:
+        return _Outcome(found, None, tuple(thrown), cancelled=True)
+    return _Outcome(found, proof, tuple(thrown), none_left=True)
+
+
+def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polished]:
+    """A candidate after its polish, then as it was found."""
+    yield polish(space, u, _told(monitor, "polishing", SEARCHED, POLISHED))
+    yield Polished(u, space.judge(u[None], margins=True), {})
+
+
+def _of_proof(monitor: Monitor | None) -> Monitor:
+    told = _told(monitor, "proving", POLISHED, 1.0)
+    return lambda _, share: told(share)
+
+
+def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Callable[[float], None]:
+    """What tells a stage's share of the whole."""
+
+    def tell(share: float) -> None:
+        if monitor is not None:
+            monitor(f"design, {words}", low + (high - low) * share)
+
+    return tell
+
+
+def _project(duty: Duty, screen: FlipFlowScreen) -> Project:
+    return replace(
+        duty.project,
+        screen=screen,
+        speed=float(duty.speeds.mean()),
+        load_cases=duty.loads,
+        limits=duty.bounds,
+        name=duty.name,
+    )
+
+
+def _why_not(proof: Assessment, duty: Duty) -> str:
+    """Why a machine fails its proof; empty where it does not."""
+    if proof.state == FAIL or proof.start_fails:
+        return proof.verdict
+    for case in proof.cases:
+        own = None if case.orbit is None else case.orbit.amplitude("relative")
+        for orbit in case.orbits:
+            size = orbit.amplitude("relative")
+            if own is not None and orbit.stable and abs(size - own) > COEXISTING * own:
+                name = case.name
+                return f"{name}: another stable motion of {1e3 * size:.3g} mm exists at speed"
+            far = abs(size - duty.target) > duty.tolerance
+            if own is None and orbit.stable and far:
+                return f"{case.name}: only a motion of {1e3 * size:.3g} mm exists at speed"
+    return ""
+
+
+def _beside(space: Space) -> tuple[Trial, ...]:
+    """The machine of the file, and the same without stops."""
+    trials = []
+    for name, screen in (
+        ("as the file has it", space.screen),
+        ("without stops", space.screen.replace(clearance=math.inf, clearance_minus=None)),
+    ):
+        alone = Space(replace(space.duty, project=replace(space.duty.project, screen=screen)))
+        # One field makes a row; the others are the machine's own.
+        own = {"main_mass": np.array([screen.main_mass])}
+        trials.append(Trial(name, screen, alone.judge_columns(own, 1).amplitude[0]))
+    return tuple(trials)
+
+
+def _excess(space: Space, judged: Judged) -> dict[str, float]:
+    return dict(zip(space.constraints, judged.excess[0].tolist(), strict=True))
