@@ -7,6 +7,8 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flipflow.errors import MissingExtra
 from flipflow.plotting.layout import (
     CHARACTER,
@@ -242,16 +244,17 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
         beneath = trace.role == "beneath"
         style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
                   "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
-                  "markevery": _marks(trace.symbol)}  # fmt: skip
+                  "markevery": _marks(trace)}  # fmt: skip
     (handle,) = axes.plot(trace.x, trace.y, marker=MARKERS.get(trace.symbol or "", ""), **style)
     handles.setdefault(trace.name, handle)
 
 
-def _marks(symbol: str | None) -> tuple[float, float] | None:
+def _marks(trace: Trace) -> tuple[float, float] | None:
     """Where marks begin on a line, and how far apart: those of lines that coincide alternate."""
-    if not symbol:
+    drawn = np.isfinite(np.asarray(trace.x, float)) & np.isfinite(np.asarray(trace.y, float))
+    if not trace.symbol or not drawn.any():
         return None
-    return MARKS_APART * SYMBOLS.index(symbol) / len(SYMBOLS), MARKS_APART
+    return MARKS_APART * SYMBOLS.index(trace.symbol) / len(SYMBOLS), MARKS_APART
 
 
 def _draw_cells(axes: Axes, cells: Cells) -> None:
