@@ -18,7 +18,7 @@ import flipflow as ff
 from flipflow.studies.candidates import Space
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / one) for one in (".", "acceptance")]
-from test_design import duty, exact_amplitudes
+from test_design import duty, exact_amplitudes  # noqa: E402
 
 POINTS = 20  # of the grid, a field
 ROWS = 2000  # machines of one call
@@ -49,7 +49,7 @@ def in_time() -> None:
     asked = replace(
         duty(),
         project=project,
-        load_cases=project.load_cases[:3] + (ff.Load(name="heavy", floating_mass=40.0),),
+        load_cases=(*project.load_cases[:3], ff.Load(name="heavy", floating_mass=40.0)),
         temperatures=(-10.0, 20.0, 50.0),
         tolerance=2e-3,
         limits=replace(ff.Limits(), jump_margin=0.1, stop_force=60e3),

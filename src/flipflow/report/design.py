@@ -32,8 +32,8 @@ from flipflow.studies.design import Proposal, Trial
 NOT_COVERED = (
     "Scatter is judged at its corners and on the drawing, not between. The material moves with the "
     "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
-    "corners; so is the margin to the jump. Fatigue of rubber, its wear and its creep are not computed: bounds on gap and shear "
-    "stiffness keep the search away from machines that hang on them."
+    "corners; so is the margin to the jump. Fatigue of rubber, its wear and its creep are not "
+    "computed: bounds on gap and shear stiffness keep the search away from machines that hang on them."
 )
 
 
