@@ -33,7 +33,8 @@ NOT_COVERED = (
     "Scatter is judged at its corners and on the drawing, not between. The material moves with the "
     "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
     "corners; so is the margin to the jump. Fatigue of rubber, its wear and its creep are not "
-    "computed: bounds on gap and shear stiffness keep the search away from machines that hang on them."
+    "computed: bounds on gap and shear stiffness keep the search away from "
+    "machines that hang on them."
 )
 
 
