@@ -239,8 +239,8 @@ class Space:
         """What candidates (C, D) are like.
 
         With ``margins`` the distance to the jump is looked at, too, of the drawings of those that
-        fit else, under the softest and the stiffest load; the proof looks at all. It takes whole responses, where all others are motions at one speed. Without, it
-        counts as met.
+        fit else, under the softest and the stiffest load; the proof looks at all. It takes whole
+        responses, where all others are motions at one speed. Without, it counts as met.
         """
         columns = self.columns(u)
         found = self.judge_columns(columns, u.shape[0])
