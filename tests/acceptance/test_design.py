@@ -152,6 +152,18 @@ def test_the_choice_from_a_catalogue_is_the_best_of_all():
     assert found.screen.shear_stiffness == found.springs[0].stiffness * found.springs[1]
 
 
+def test_numbers_of_pieces_and_material_are_lanes_too():
+    """Many rows at once, and one alone: the same motion, the material shifting the gaps."""
+    loads = (ff.Load(name="empty"), ff.Load(floating_mass=40.0, name="heavy"))
+    asked = duty(catalogue=springs(), pieces=(8, 12), load_cases=loads, scatter={},
+                 free={"clearance": (4e-3, 8e-3)})  # fmt: skip
+    space = Space(asked)
+    u = np.stack([np.linspace(0.0, 1.0, 40), np.linspace(0.0, 1.0, 40)], axis=1)
+    together, alone = space.judge(u), space.judge(u[20:21])
+    close("amplitude", together.amplitude[20], alone.amplitude[0], rel=1e-9)
+    assert abs(together.amplitude[20, 1] - together.amplitude[20, 0]) > 1e-5
+
+
 def test_what_a_limit_costs_is_what_a_rerun_finds():
     """Must show 5: a stop force that binds, and the tolerance, each moved by 2 %."""
     best = Space(duty()).share_of(proposed().screen)

@@ -168,7 +168,7 @@ def _flat(machine: Machine) -> tuple[Real, Shapes, MechanicalSystem] | None:
 
 def _slope(machine: Machine, name: str, value: float, middle: Real) -> Real | None:
     """What one parameter adds to every number, each side of its value alike."""
-    if isinstance(machine, FlipFlowScreen) and FIELD[name].whole:
+    if isinstance(machine, FlipFlowScreen) and name in FIELD and FIELD[name].whole:
         return np.zeros_like(middle)  # numbers of pieces, of which no total is made here
     step = SLOPE * abs(value) if value != 0.0 else SLOPE
     sides = [_flat(with_values(machine, {name: value + way * step})) for way in (1.0, -1.0)]

@@ -33,8 +33,9 @@ from flipflow.studies.design import Proposal, Trial
 NOT_COVERED = (
     "Scatter is judged at its corners and on the drawing, not between. The material moves with the "
     "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
-    "corners. Fatigue of rubber, its wear and its creep are not computed: bounds on gap and shear "
-    "stiffness keep the search away from machines that hang on them."
+    "corners; so is the margin to the jump. Fatigue of rubber, its wear and its creep are not "
+    "computed: bounds on gap and shear stiffness keep the search away from "
+    "machines that hang on them."
 )
 
 
@@ -108,7 +109,9 @@ def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
         Column("1 % more of it narrows the band by", "um", numeric=True),
     )  # fmt: skip
     rows = [
-        cells(label_of(name), _allowed(found, name), f"{-100.0 * share:.2f}", _price(found, name))
+        cells(
+            label_of(name), _allowed(found, name), f"{0.0 - 100.0 * share:.2f}", _price(found, name)
+        )
         for name, share in found.excess.items()
     ]
     rows += [
@@ -120,6 +123,8 @@ def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
         "Of the relative amplitude 1 % of the target more to each side; of an end 1 % of its "
         "interval."
     )
+    if not found.prices:
+        caption = "The machine is as the search found it: costs are told of a polished one alone."
     yield Table("What binds, and what it costs", columns, tuple(rows), caption)
 
 

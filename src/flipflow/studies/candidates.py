@@ -19,7 +19,7 @@ from flipflow.batch.reasons import FOUND
 from flipflow.model.duty import Duty, Objective, SpringType
 from flipflow.model.limits import limit_bounds
 from flipflow.model.quantities import QUANTITIES, Quantity
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.vary import Choice, Interval
 from flipflow.studies.study_values import evaluate_loaded
 
@@ -239,8 +239,8 @@ class Space:
         """What candidates (C, D) are like.
 
         With ``margins`` the distance to the jump is looked at, too, of the drawings of those that
-        fit else: it takes whole responses, where all others are motions at one speed. Without, it
-        counts as met.
+        fit else, under the softest and the stiffest load; the proof looks at all. It takes whole
+        responses, where all others are motions at one speed. Without, it counts as met.
         """
         columns = self.columns(u)
         found = self.judge_columns(columns, u.shape[0])
@@ -258,12 +258,24 @@ class Space:
             excess[fit, -1] = self._nearness({name: one[fit] for name, one in columns.items()})
         return Judged(found.amplitude, found.worst, excess)
 
+    @cached_property
+    def _farthest(self) -> tuple[Load, ...]:
+        """The loads between which the jump moves farthest: softest and stiffest for its mass."""
+        loads = self.duty.loads
+
+        def own(load: Load) -> float:
+            loaded = self.screen.loaded(load)
+            return loaded.shear_stiffness / loaded.floating_mass
+
+        ends = (min(loads, key=own), max(loads, key=own))
+        return ends[:1] if ends[0] is ends[1] else ends
+
     def _nearness(self, columns: Columns) -> Real:
-        """By how much drawings come too near to the jump under any load, as a share, (C,)."""
+        """By how much drawings come too near to the jump under those loads, as a share, (C,)."""
         least = self.duty.bounds.jump_margin
         tables = [
             evaluate_loaded(self.screen, columns, load, [JUMP], self.duty.speeds, "from-below")[0]
-            for load in self.duty.loads
+            for load in self._farthest
         ]
         margins = np.concatenate([table[JUMP] for table in tables], axis=1)
         return np.asarray(1.0 - _least(margins) / (least or 1.0))

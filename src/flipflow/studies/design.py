@@ -177,8 +177,8 @@ class Proposal(Frozen, Result):
             )
         target, rpm = 1e3 * self.duty.target, self.duty.speeds.mean() * 30.0 / math.pi
         return (
-            f"holds {target:.3g} mm at {rpm:.4g} rpm within {band} over every load case and "
-            f"scatter, {self.factor:.3g} times as steady as the machine of the file"
+            f"holds {target:.3g} mm at {rpm:.4g} rpm within a band of {band} over every load case "
+            f"and scatter, {self.factor:.3g} times as steady as the machine of the file"
         )
 
 
