@@ -21,6 +21,7 @@ from flipflow.paper.reproduce import Reproduction
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.compare import Comparison
+from flipflow.studies.design import Proposal
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
@@ -83,6 +84,7 @@ COMMANDS = {
     "basins": (Basins, LINEAR, "--cells", "2"),
     "check": (Check, LINEAR),
     "compare": (Comparison, LINEAR, LINEAR, "--speed", "800 rpm"),
+    "design": (Proposal, "duty.toml", "--generations", "1"),
     "orbits": (tuple, LINEAR, "--max-periods", "1"),
     "reproduce": (Reproduction, "1"),
     "sensitivity": (Sensitivity, LINEAR, "--vary", "floating_mass=+-5 %", "--n", "2"),
@@ -99,6 +101,16 @@ floating_mass = ["300 kg", "310 kg"]
 quantities = ["relative_amplitude"]
 speed = "800 rpm"
 """
+DUTY = f"""
+machine = "{LINEAR}"
+[duty]
+relative_amplitude = "6 mm"
+tolerance = "3 mm"
+speed = "700 rpm"
+load_cases = ["empty"]
+[free]
+shear_stiffness = "2500 kN/m..2900 kN/m"
+"""
 NO_RESULT = {"new", "schema"}
 NAMED = {"basins", "orbits", "sensitivity", "simulate", "study"}
 
@@ -107,6 +119,7 @@ NAMED = {"basins", "orbits", "sensitivity", "simulate", "study"}
 def test_the_document_of_a_command_opens_as_what_was_found(command, monkeypatch, tmp_path, name):
     monkeypatch.chdir(tmp_path)
     Path("study.toml").write_text(STUDY)
+    Path("duty.toml").write_text(DUTY)
     kind, *words = COMMANDS[name]
     code, _, err = command(name, *words, "--json", "found.json")
     assert code == 0, err

@@ -227,8 +227,10 @@ class Duty:
 
     @property
     def bounds(self) -> Limits:
-        """What the machine may do."""
-        return self.project.limits if self.limits is None else self.limits
+        """What the machine may do; its relative amplitude is what the duty says."""
+        limits = self.project.limits if self.limits is None else self.limits
+        least = max(self.target - self.tolerance, 0.0)
+        return replace(limits, relative_amplitude=(least, self.target + self.tolerance))
 
     @property
     def loads(self) -> tuple[Load, ...]:

@@ -151,8 +151,12 @@ class Proposal(Frozen, Result):
 
     @cached_property
     def factor(self) -> float:
-        """The band of the machine of the file over that of the chosen one."""
-        return self.beside[0].band / self.chosen.band
+        """The band of the machine of the file over that of the chosen one.
+
+        Infinite where only the chosen one has none, NaN where neither has: under one combination.
+        """
+        before, now = self.beside[0].band, self.chosen.band
+        return before / now if now > 0.0 else math.inf if before > 0.0 else math.nan
 
     @property
     def missed(self) -> tuple[str, ...]:
@@ -176,10 +180,11 @@ class Proposal(Frozen, Result):
                 f"machine does {low:.3g} to {high:.3g} mm"
             )
         target, rpm = 1e3 * self.duty.target, self.duty.speeds.mean() * 30.0 / math.pi
-        return (
-            f"holds {target:.3g} mm at {rpm:.4g} rpm within a band of {band} over every load case "
-            f"and scatter, {self.factor:.3g} times as steady as the machine of the file"
-        )
+        found = f"holds {target:.3g} mm at {rpm:.4g} rpm within a band of {band}"
+        found += " over every load case and scatter"
+        if not math.isfinite(self.factor):
+            return found
+        return f"{found}, {self.factor:.3g} times as steady as the machine of the file"
 
 
 def design(
