@@ -11,7 +11,7 @@ def new(
     file: Annotated[str, typer.Argument(metavar="NAME.toml", help="File to write.")],
     duty: Annotated[bool, typer.Option("--duty", help="A duty file, for flipflow design.")] = False,
 ) -> None:
-    """Write a commented machine file, or duty file; never overwrites one."""
+    """Write a commented machine or duty file, never over another."""
     from flipflow.io.template import write_template  # noqa: PLC0415  keeps --help quick
 
     if duty:

@@ -128,6 +128,7 @@ class DecidedClaim:
                 flat(name): {"value": _finite(one.value), "unit": one.unit}
                 for name, one in self.evaluation.numbers.items()
             },
+            "names_in_two": [list(one) for one in self.evaluation.numbers if one != flat(one)],
         }
 
 

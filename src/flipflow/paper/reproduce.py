@@ -21,10 +21,12 @@ from flipflow.paper.claims import (
     WORDS_OF_TIES,
     DecidedClaim,
     Evaluation,
+    Name,
     Number,
     Numbers,
     Part,
     Verdict,
+    flat,
 )
 from flipflow.paper.figure import PaperFigure
 from flipflow.paper.registry import FIGURES, chosen
@@ -177,7 +179,11 @@ def _claim_from(document: Mapping[str, Any]) -> DecidedClaim:
     known = {} if one is None else {claim.id: claim for claim in (*one.claims, *one.findings)}
     if name not in known:
         raise StoreError(f"the claim {name!r} of {figure!r} is not known; update flipflow")
-    numbers: Numbers = {key: Number(**value) for key, value in document["numbers"].items()}
+    pairs = [(first, second) for first, second in document.get("names_in_two", ())]
+    names: dict[str, Name] = {flat(pair): pair for pair in pairs}
+    numbers: Numbers = {
+        names.get(key, key): Number(**value) for key, value in document["numbers"].items()
+    }
     told = document.get("parts", ())
     tied = any(part["answer"] == WORDS_OF_TIES[None] for part in told)
     words = WORDS_OF_TIES if tied else WORDS
