@@ -67,6 +67,12 @@ def assert_holds(after: Any, before: Any, where: str) -> None:
         for key in before.keys() - OTHERWISE:
             assert key in after, f"{where}.{key}"
             assert_holds(after[key], before[key], f"{where}.{key}")
+    elif isinstance(before, list) and before and named(before[0]):
+        # Rows of a table that go by name: a new quantity is one row more.
+        rows = {named(one): one for one in after}
+        for one in before:
+            assert named(one) in rows, f"{where}, {named(one)}"
+            assert_holds(rows[named(one)], one, f"{where}, {named(one)}")
     elif isinstance(before, list) and before and isinstance(before[0], (list, dict)):
         for one, other in zip(after, before, strict=True):
             assert_holds(one, other, where)
@@ -76,6 +82,15 @@ def assert_holds(after: Any, before: Any, where: str) -> None:
         assert after == pytest.approx(before, rel=1e-9, abs=1e-12), where
     else:
         assert after == before, where
+
+
+def named(row: Any) -> tuple[str, str] | None:
+    """Quantity and load case by which a row of a comparison goes."""
+    return (
+        (row["name"], row["case"])
+        if isinstance(row, dict) and {"name", "case"} <= row.keys()
+        else None
+    )
 
 
 LINEAR = "ffs0827-linear"

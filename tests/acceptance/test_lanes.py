@@ -113,6 +113,31 @@ def test_a_lane_that_fails_poisons_no_neighbour(screen):
     np.testing.assert_array_equal(found[~struck], clean[~struck])
 
 
+def test_a_stop_without_gap_among_others_changes_no_bit_of_theirs(screen):
+    columns = drawn(screen, ("clearance", "shear_damping"), 12, 0.2, seed=8)
+    clean, _ = values(screen, columns, "relative_amplitude")
+    columns["clearance"][5] = 0.0
+    found, why = values(screen, columns, "relative_amplitude")
+    others = np.arange(12) != 5
+    np.testing.assert_array_equal(found[others], clean[others])
+    bonded = variant(screen, columns, 5)
+    assert (why[5] == FOUND).all()
+    for k, omega in enumerate(SPEEDS):
+        own = ff.frequency_response(bonded, omega=SPAN).orbit_from_below(omega)
+        assert found[5, k] == pytest.approx(own.amplitude("relative"), rel=1e-8)
+
+
+def test_a_field_that_is_zero_varies_too(screen):
+    machine = screen.replace(stop_damping=0.0)
+    columns = {"stop_damping": np.array([0.0, 1e3, 2e3])}
+    found, why = values(machine, columns, "relative_amplitude", np.array([150.0]))
+    assert (why == FOUND).all()
+    for row, damping in enumerate(columns["stop_damping"]):
+        branch = ff.frequency_response(screen.replace(stop_damping=float(damping)), omega=SPAN)
+        own = branch.orbit_from_below(150.0).amplitude("relative")
+        assert found[row, 0] == pytest.approx(own, rel=1e-8)
+
+
 def test_neighbours_and_threads_change_no_bit(screen):
     columns = drawn(screen, FIELDS, 150, 0.3, seed=4)
     together, why = values(screen, columns, "relative_amplitude")
@@ -121,7 +146,7 @@ def test_neighbours_and_threads_change_no_bit(screen):
     part = {name: column[100:110] for name, column in columns.items()}
     some, why_some = values(screen, part, "relative_amplitude")
     np.testing.assert_array_equal(why[100:110], why_some)
-    np.testing.assert_allclose(together[100:110], some, rtol=1e-9)
+    np.testing.assert_array_equal(together[100:110], some)
 
 
 def test_where_symmetry_is_lost_the_lane_leans_and_where_the_period_doubles_it_says_so(screen):

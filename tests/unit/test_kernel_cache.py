@@ -481,7 +481,7 @@ def test_kernel_modules_import_only_what_kernels_need(module: str) -> None:
 
     Those are loaded by name when first used, which no import statement tells.
     """
-    rooms = {"compiled", "dynamics", "periodic", "continuation", "transient"}
+    rooms = {"compiled", "dynamics", "periodic", "continuation", "transient", "batch"}
     found = set(digest.closure(module))
     assert module in found
     tables = {"flipflow.errors", "flipflow.model", "flipflow.model.contact_law"}

@@ -24,7 +24,7 @@ from flipflow.batch.lane_path import (
     settle,
 )
 from flipflow.batch.lane_readings import Asked, Readings, ReadingWork, read_lane
-from flipflow.batch.reasons import FOUND, NO_MOTION, REFUSED, UNSTABLE
+from flipflow.batch.reasons import FOUND, NO_MOTION, UNSTABLE
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
@@ -89,8 +89,6 @@ def run_lanes(
     are even.
     """
     for lane in range(first, last):
-        if found.reason[lane, 0] == REFUSED:
-            continue
         forget(work)
         machine = machine_of(batch, lane)
         run_lane(

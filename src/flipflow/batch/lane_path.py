@@ -69,12 +69,16 @@ class LaneWork(NamedTuple):
     mu: Complex  # (2 N,) eigenvalues of the return map, with the problem's sign
 
 
-def new_lane_work(machine: MachineArrays) -> LaneWork:
-    """Scratch for lanes of machines that differ from a given one in numbers alone."""
+def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
+    """Scratch for lanes of machines that differ from a given one in numbers alone.
+
+    ``stop`` (1,) is the flag at which their flows end; none is followed any more.
+    """
+    shooting = new_shooting_work(machine)
     n = 2 * machine.direction.shape[1]
     vectors = ("z", "slope", "guess", "here", "here_slope", "behind", "behind_slope", "flown", "r")
     return LaneWork(
-        shooting=new_shooting_work(machine),
+        shooting=shooting._replace(flow=shooting.flow._replace(stop=stop)),
         schur=new_schur(n),
         omega=np.zeros(3),
         J=np.zeros((n, n + 1)),

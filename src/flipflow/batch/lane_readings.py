@@ -22,8 +22,8 @@ from flipflow.dynamics.contact_search import (
     exponential,
     exponentials,
     extremes,
-    first_harmonic,
     gap_state,
+    integral_of_exponential,
     modulus,
     new_gap_motion,
     prepare_search,
@@ -31,6 +31,7 @@ from flipflow.dynamics.contact_search import (
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, segment_motion
 from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
+from flipflow.periodic.readings import observe_record
 
 PER_RADIAN = 4.0  # samples of a vector's length per radian of its mean frequency
 REFINEMENTS = 40  # steps towards a summit; six are usual
@@ -99,9 +100,11 @@ def read_lane(
     half: bool, out: Readings, lane: int, f: int,
 ) -> None:  # fmt: skip
     """All readings of the motion recorded over ``turn`` seconds, half a turn of an even one."""
-    read_coordinates(
-        machine, flow, work.coordinate, asked.coordinate, omega, turn, half, out, lane, f
-    )
+    low, high, first = out.low[lane, f], out.high[lane, f], out.first[lane, f]
+    observe_record(machine, flow, omega, turn, asked.coordinate, work.coordinate, low, high, first)
+    for g in range(low.shape[0] if half else 0):
+        high[g] = max(high[g], -low[g])
+        low[g] = -high[g]
     read_stops(machine, flow, work.stop, omega, turn, out, lane, f)
     if asked.squared.shape[0] > 0:
         read_squares(machine, flow, work.squared, asked.squared, omega, turn, out, lane, f)
@@ -114,29 +117,6 @@ def read_lane(
             count = set_vector(machine, flow, work.vector, e, omega, linear, along, across)
             largest = max(largest, longest(work.vector, count, flow.length[e]))
         out.peak[lane, f, q] = largest
-
-
-@kernel
-def read_coordinates(
-    machine: MachineArrays, flow: Flow, motion: GapMotion, coordinate: Real, omega: float,
-    turn: float, half: bool, out: Readings, lane: int, f: int,
-) -> None:  # fmt: skip
-    """Extremes and first harmonics."""
-    for g in range(coordinate.shape[0]):
-        out.low[lane, f, g], out.high[lane, f, g] = math.inf, -math.inf
-        out.first[lane, f, g] = 0.0
-    for e in range(flow.segments[0]):
-        count = segment_motion(machine, flow, e, omega, coordinate, motion)
-        prepare_search(motion, count)
-        for g in range(coordinate.shape[0]):
-            low, high = extremes(motion, count, g, flow.length[e])
-            out.low[lane, f, g] = min(out.low[lane, f, g], low)
-            out.high[lane, f, g] = max(out.high[lane, f, g], high)
-            part = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega)
-            out.first[lane, f, g] += 2.0 * part / turn
-    for g in range(coordinate.shape[0] if half else 0):
-        out.high[lane, f, g] = max(out.high[lane, f, g], -out.low[lane, f, g])
-        out.low[lane, f, g] = -out.high[lane, f, g]
 
 
 @kernel
@@ -193,26 +173,19 @@ def read_squares(
         out.square[lane, f, g] = 0.0
     for e in range(flow.segments[0]):
         count = segment_motion(machine, flow, e, omega, coordinate, motion)
+        length = flow.length[e]
         for g in range(coordinate.shape[0]):
-            total = motion.drift[g] * motion.drift[g] * flow.length[e]
+            drift = motion.drift[g]
+            total = drift * drift * length
             for i in range(count):
                 a, p = motion.amplitude[g, i] * motion.rate[i], motion.rate[i]
-                total += 2.0 * motion.drift[g] * (a * integral(p, flow.length[e])).real
+                total += 2.0 * drift * (a * integral_of_exponential(p, length)).real
                 for j in range(count):
                     b, q = motion.amplitude[g, j] * motion.rate[j], motion.rate[j]
-                    total += 0.5 * (a * b * integral(p + q, flow.length[e])).real
+                    total += 0.5 * (a * b * integral_of_exponential(p + q, length)).real
                     b, q = b.conjugate(), q.conjugate()
-                    total += 0.5 * (a * b * integral(p + q, flow.length[e])).real
+                    total += 0.5 * (a * b * integral_of_exponential(p + q, length)).real
             out.square[lane, f, g] += total / turn
-
-
-@kernel(inline=True)
-def integral(rate: complex, length: float) -> complex:
-    """int_0^length exp(rate t) dt."""
-    x = rate * length
-    if modulus(x) < 1e-3:
-        return length * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x / 120.0))))
-    return (exponential(x) - 1.0) / rate
 
 
 @kernel

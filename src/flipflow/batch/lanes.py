@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.batch.side_by_side import side_by_side
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_arrays
@@ -130,25 +130,14 @@ class Lanes:
             cancelled=False,
         )
         begin = np.array(begin)
-        parts = [slice(k, min(k + CHUNK, count)) for k in range(0, count, CHUNK)]
-        pool = ThreadPoolExecutor(self.threads)
-        done, stop = 0, np.zeros(1, np.int64)
+
+        def chunk(part: slice, stop: Int) -> None:
+            self._chunk(run, part, begin, capture, most, stop)
+
         try:
-            waiting = {pool.submit(self._chunk, run, part, begin, capture, most, stop): part
-                       for part in parts}  # fmt: skip
-            for future in as_completed(waiting):
-                future.result()
-                part = waiting[future]
-                done += part.stop - part.start
-                if tick is not None:
-                    tick(done / count)
+            side_by_side(chunk, count, CHUNK, self.threads, tick)
         except Cancelled:
-            stop[0] = 1
-            pool.shutdown(cancel_futures=True)
             return Run(run.states, run.label, run.turns, run.code, cancelled=True)
-        finally:
-            stop[0] = 1
-            pool.shutdown(cancel_futures=True)
         return run
 
     def carry(self, states: Real, turns: int) -> Real:

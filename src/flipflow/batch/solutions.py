@@ -6,8 +6,7 @@ motion of a machine nearby that all lanes share, and neither on other lanes nor 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from flipflow.batch.lane_kernels import Found, new_found, run_lanes
 from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
+from flipflow.batch.side_by_side import side_by_side
 from flipflow.batch.variants import Batch, stacked
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_arrays
@@ -96,35 +96,16 @@ def solve_lanes(
     # A read-only array is another type to the compiler, and would be compiled for anew.
     speeds_in_order, guess, even = np.array(omega), np.array(nearby.state), np.array(nearby.even)
 
-    def chunk(begin: int) -> int:
-        work = new_lane_work(nominal)
+    def chunk(part: slice, stop: Int) -> None:
+        work = new_lane_work(nominal, stop)
         reading = new_reading_work(work.shooting.flow, nominal, asked)
-        end = min(begin + CHUNK, lanes)
         run_lanes(
-            batch.arrays, begin, end, speeds_in_order, length, guess, even, work, reading, asked,
-            found, readings,
+            batch.arrays, part.start, part.stop, speeds_in_order, length, guess, even, work,
+            reading, asked, found, readings,
         )  # fmt: skip
-        return end - begin
 
-    done = 0
-    for lanes_done in _each(chunk, range(0, lanes, CHUNK), threads):
-        done += lanes_done
-        if tell is not None:
-            tell(done / lanes)
+    side_by_side(chunk, lanes, CHUNK, threads, tell)
     return found, readings
-
-
-def _each(work: Callable[[int], int], items: Sequence[int], threads: int) -> Iterator[int]:
-    """What the work on each item returns, as each ends."""
-    if threads == 1 or len(items) == 1:
-        yield from map(work, items)
-        return
-    pool = ThreadPoolExecutor(threads)
-    try:
-        for future in as_completed([pool.submit(work, item) for item in items]):
-            yield future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _machine(arrays: MachineArrays, lane: int) -> MachineArrays:

@@ -2,8 +2,9 @@
 
 Nearly every parameter of a machine enters its masses, dampings, stiffnesses, gaps and forces
 linearly. Where all of them do so together, the arrays of any number of variants are sums, and none
-is assembled by itself. Whether they do is seen on rows of their own; where they do not, and where
-words vary, as that of a stop's law, each variant is assembled by its ``system()``.
+is assembled by itself. Whether they do is seen about the machine itself, so that the arrays of a
+variant depend on no other. Where they do not, where words vary, as that of a stop's law, and where
+a sum is no machine, each variant is assembled by its ``system()``.
 """
 
 from __future__ import annotations
@@ -28,9 +29,11 @@ from flipflow.model.system import Machine, MechanicalSystem
 
 Columns = Mapping[str, NDArray[Any]]
 Bool = NDArray[np.bool_]
-TRIED = 4  # rows on which sums are held against machines assembled by themselves
+Shapes = dict[str, tuple[int, ...]]
 EXACT = 1e-12  # deviation of a sum, as a share of the largest number of its array
-SLOPE = 1e-3  # relative change of a parameter over which its share in the sums is read
+# Changes of a parameter, as shares of its value, over which its share in the sums is read: what is
+# linear is so over any, and a wide one loses no digits.
+WIDTHS = (0.5, -0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +70,16 @@ def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
     for name, column in columns.items():
         if column.dtype.kind == "f" and name in FIELD and isinstance(machine, FlipFlowScreen):
             allowed &= FIELD[name].allows(column)
+    found, left = [], allowed.copy()
     # What a user's own class refuses only its ``system()`` tells.
     if isinstance(machine, (FlipFlowScreen, MechanicalSystem)):
-        at_once = _sums(machine, columns, allowed)
+        at_once = _sums(machine, columns, np.flatnonzero(allowed))
         if at_once is not None:
-            return [at_once], allowed
-    return _one_by_one(machine, columns, allowed), allowed
+            found.append(at_once)
+            left[at_once.rows] = False
+    by_themselves, refused = _one_by_one(machine, columns, left)
+    allowed[refused] = False
+    return [*found, *by_themselves], allowed
 
 
 def stacked(machines: list[MachineArrays]) -> MachineArrays:
@@ -91,15 +98,16 @@ def stacked(machines: list[MachineArrays]) -> MachineArrays:
     return first._replace(**joined, stops=Stops(first.stops.law, *stops))
 
 
-def _one_by_one(machine: Machine, columns: Columns, allowed: Bool) -> list[Batch]:
-    """Each variant assembled by its ``system()``; what it refuses is struck from ``allowed``."""
+def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[Batch], list[int]]:
+    """Each variant assembled by its ``system()``, and the rows of those that it refuses."""
     found: dict[tuple[Any, ...], tuple[list[int], list[MachineArrays], MechanicalSystem]] = {}
-    for row in np.flatnonzero(allowed).tolist():
+    refused = []
+    for row in np.flatnonzero(asked).tolist():
         try:
             system = _row(machine, columns, row).system().with_bonded()
             arrays = machine_arrays(system)
         except InputError:
-            allowed[row] = False
+            refused.append(row)
             continue
         shared = arrays.stops.law, arrays.power, arrays.wave, arrays.order
         key = (arrays.push.shape, *(tuple(one.tolist()) for one in shared))
@@ -109,39 +117,82 @@ def _one_by_one(machine: Machine, columns: Columns, allowed: Bool) -> list[Batch
     return [
         Batch(np.array(rows, np.int64), system, stacked(machines))
         for rows, machines, system in found.values()
-    ]
+    ], refused
 
 
-def _sums(machine: Machine, columns: Columns, allowed: Bool) -> Batch | None:
-    """All allowed variants as sums over their parameters; None where they are no sums."""
-    rows = np.flatnonzero(allowed)
-    machine = _with_own(machine, columns, rows)
-    own = {name: value_of(machine, name) for name in columns}
-    numbers = [isinstance(value, float) and math.isfinite(value) for value in own.values()]
-    words = any(column.dtype.kind != "f" for column in columns.values())
+def _sums(machine: Machine, columns: Columns, rows: Int) -> Batch | None:
+    """The variants of some rows as sums over their parameters, those that are machines.
+
+    None where variants are no sums, and where none is a machine.
+    """
+    if rows.size == 0 or any(column.dtype.kind != "f" for column in columns.values()):
+        return None
+    try:
+        linear = _linear(_with_own(machine, columns), tuple(columns))
+    except InputError:
+        return None
+    if linear is None:
+        return None
+    total = np.repeat(linear.middle[None], rows.size, axis=0)
+    for name, column in columns.items():
+        total += (column[rows, None] - linear.own[name]) * linear.slopes[name]
+    parts = dict(zip(linear.shapes, _split(total, linear.shapes), strict=True))
+    sound = _sound(parts)
+    if not sound.any():
+        return None
+    kept = {name: part[sound] for name, part in parts.items()}
+    return Batch(rows[sound], linear.system, _assembled(linear.system, kept))
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A machine's numbers in one row, and what each parameter adds to them."""
+
+    system: MechanicalSystem
+    shapes: Shapes
+    middle: Real
+    own: Mapping[str, float]
+    slopes: Mapping[str, Real]
+
+
+def _linear(machine: Machine, names: tuple[str, ...]) -> _Linear | None:
+    """How a machine depends on parameters; None where it is no sum over them.
+
+    Raises
+    ------
+    InputError
+        Where the machine takes no other values in any direction, or not all of them together.
+    """
+    own = {name: value_of(machine, name) for name in names}
     middle = _flat(machine)
-    if words or not all(numbers) or rows.size <= TRIED + len(columns) or middle is None:
+    if middle is None or not all(isinstance(v, float) and math.isfinite(v) for v in own.values()):
         return None
     values, shapes, system = middle
-    total = np.repeat(values[None], rows.size, axis=0)
-    for name, column in columns.items():
-        slope = _slope(machine, name, float(own[name]), values)  # type: ignore[arg-type]
-        if slope is None:
+    numbers = {name: float(str(value)) for name, value in own.items()}
+    slopes, ends = {}, {}
+    for name, value in numbers.items():
+        if isinstance(machine, FlipFlowScreen) and name in FIELD and FIELD[name].whole:
+            slopes[name] = np.zeros_like(values)  # pieces, of which no total is made here
+            continue
+        found = _slope(machine, name, value, values, shapes)
+        if found is None:
             return None
-        total += (column[rows, None] - own[name]) * slope
-    tried = np.linspace(0, rows.size - 1, TRIED).astype(int)
-    for k in tried.tolist():
-        apart = _flat(_row(machine, columns, int(rows[k])))
-        if apart is None or not _same(total[k], apart[0], shapes):
-            return None
-    arrays = _assembled(system, total, shapes)
-    return None if arrays is None else Batch(rows, system, arrays)
+        slopes[name], ends[name] = found
+    together = _flat(with_values(machine, ends))
+    total = values + sum((ends[name] - numbers[name]) * slopes[name] for name in ends)
+    if together is None or not _same(total, together[0], shapes):
+        return None
+    return _Linear(system, shapes, values, numbers, slopes)
 
 
-def _with_own(machine: Machine, columns: Columns, rows: Int) -> Machine:
-    """The machine, with the first value of each column where it has none of its own."""
-    none = [name for name in columns if value_of(machine, name) is None] if rows.size else []
-    return with_values(machine, {name: columns[name][rows[0]].item() for name in none})
+def _with_own(machine: Machine, columns: Columns) -> Machine:
+    """The machine with a value of its own of each parameter, of which it may have none."""
+    none = {
+        name: 0.0 if name not in FIELD or FIELD[name].allows(np.zeros(1))[0] else 1.0
+        for name in columns
+        if value_of(machine, name) is None
+    }
+    return with_values(machine, none) if none else machine
 
 
 def _row(machine: Machine, columns: Columns, row: int) -> Machine:
@@ -151,9 +202,6 @@ def _row(machine: Machine, columns: Columns, row: int) -> Machine:
         name: one.item() if isinstance(one, np.generic) else one for name, one in given.items()
     }
     return with_values(machine, plain)
-
-
-Shapes = dict[str, tuple[int, ...]]
 
 
 def _flat(machine: Machine) -> tuple[Real, Shapes, MechanicalSystem] | None:
@@ -166,17 +214,28 @@ def _flat(machine: Machine) -> tuple[Real, Shapes, MechanicalSystem] | None:
     return flat, {name: part.shape for name, part in parts.items()}, system
 
 
-def _slope(machine: Machine, name: str, value: float, middle: Real) -> Real | None:
-    """What one parameter adds to every number, each side of its value alike."""
-    if isinstance(machine, FlipFlowScreen) and name in FIELD and FIELD[name].whole:
-        return np.zeros_like(middle)  # numbers of pieces, of which no total is made here
-    step = SLOPE * abs(value) if value != 0.0 else SLOPE
-    sides = [_flat(with_values(machine, {name: value + way * step})) for way in (1.0, -1.0)]
-    if sides[0] is None or sides[1] is None or sides[0][0].shape != middle.shape:
-        return None
-    with np.errstate(invalid="ignore"):
-        slope = (sides[0][0] - sides[1][0]) / (2.0 * step)
-    return np.where(np.isinf(middle), 0.0, slope)
+def _slope(
+    machine: Machine, name: str, value: float, middle: Real, shapes: Shapes
+) -> tuple[Real, float] | None:
+    """What one parameter adds to every number, and the value at which that was read.
+
+    None where it does not do so linearly.
+    """
+    for share in WIDTHS:
+        width = share * (abs(value) or 1.0)
+        try:
+            half, whole = (
+                _flat(with_values(machine, {name: value + part * width})) for part in (0.5, 1.0)
+            )
+        except InputError:
+            continue
+        if half is None or whole is None or whole[0].shape != middle.shape:
+            return None
+        with np.errstate(invalid="ignore"):
+            slope = np.where(np.isinf(middle), 0.0, (whole[0] - middle) / width)
+        straight = _same(middle + 0.5 * width * slope, half[0], shapes)
+        return (slope, value + width) if straight else None
+    raise InputError(name, value, "the machine takes no other value")
 
 
 def _same(one: Real, other: Real, shapes: Shapes) -> bool:
@@ -202,14 +261,18 @@ def _split(flat: Real, shapes: Shapes) -> Iterator[Real]:
         begin = end
 
 
-def _assembled(system: MechanicalSystem, total: Real, shapes: Shapes) -> MachineArrays | None:
-    """Machines solved for their accelerations; None where one would be refused by itself."""
-    parts = dict(zip(shapes, _split(total, shapes), strict=True))
+def _sound(parts: Mapping[str, Real]) -> Bool:
+    """Which sums are machines that would be taken as they are, stops with a gap each."""
     gap, stop = parts["gap"], parts["stop"]
     sound = np.linalg.eigvalsh(parts["inertia"])[:, 0] > 0.0
     sound &= (stop >= 0.0).all(axis=(1, 2)) & (gap.sum(axis=2) > 0.0).all(axis=1)
-    if not sound.all():
-        return None
+    acting = (stop.sum(axis=1) > 0.0).all(axis=1)
+    return np.asarray(sound & acting & parts["damping"].any(axis=(1, 2)))
+
+
+def _assembled(system: MechanicalSystem, parts: Mapping[str, Real]) -> MachineArrays:
+    """Machines solved for their accelerations."""
+    gap, stop = parts["gap"], parts["stop"]
     first = machine_arrays(system)
     right = np.concatenate(
         [

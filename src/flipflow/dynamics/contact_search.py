@@ -31,6 +31,7 @@ from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 NOTHING = -9  # no regime: nothing has changed yet
 MAX_SEARCH = 20_000  # steps of one search; thirty are usual
 AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
+SHORT = 1e-3  # exponent whose sixth power is nothing beside 1
 SMALLEST_STEP = 1e-11  # share of the horizon: least step, which bounds their number at grazing
 
 
@@ -406,26 +407,27 @@ def first_harmonic(
 ) -> complex:
     """int y exp(-i omega t) dt over one piece, in closed form."""
     turn = exponential(-1j * omega * start)
-    total = motion.offset[g] * _integral_of_exponential(-1j * omega, length)
+    total = motion.offset[g] * integral_of_exponential(-1j * omega, length)
     if motion.drift[g] != 0.0:
         # By parts: int t exp(-i omega t) dt.
-        still = _integral_of_exponential(-1j * omega, length)
+        still = integral_of_exponential(-1j * omega, length)
         moved = length * exponential(-1j * omega * length)
         total += motion.drift[g] * (still - moved) / (1j * omega)
     for i in range(count):
         amplitude = motion.amplitude[g, i]
-        total += 0.5 * amplitude * _integral_of_exponential(motion.rate[i] - 1j * omega, length)
+        total += 0.5 * amplitude * integral_of_exponential(motion.rate[i] - 1j * omega, length)
         conjugate = motion.rate[i].conjugate() - 1j * omega
-        total += 0.5 * amplitude.conjugate() * _integral_of_exponential(conjugate, length)
+        total += 0.5 * amplitude.conjugate() * integral_of_exponential(conjugate, length)
     return total * turn
 
 
 @kernel
-def _integral_of_exponential(rate: complex, length: float) -> complex:
-    """int_0^length exp(rate t) dt."""
-    if abs(rate) * length < 1e-9:
-        return length * (1.0 + 0.5 * rate * length)
-    return (exponential(rate * length) - 1.0) / rate
+def integral_of_exponential(rate: complex, length: float) -> complex:
+    """int_0^length exp(rate t) dt; by its series where the closed form would lose digits."""
+    x = rate * length
+    if modulus(x) < SHORT:
+        return length * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x / 120.0))))
+    return (exponential(x) - 1.0) / rate
 
 
 def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:

@@ -152,7 +152,7 @@ def _kick_map(
     saltation(machine, j, sign, T, size)
 
 
-@kernel(shared=True)
+@kernel(entry=True)
 def carry_variation(
     machine: MachineArrays,
     flow: Flow,
@@ -190,23 +190,6 @@ def carry_variation(
             kick_columns(machine, flow, e, columns, U, work)
             if slopes.shape[0] > 0:
                 _kick_map(machine, flow, e, columns, T, slopes)
-
-
-@kernel(entry=True)
-def vary_flow(
-    machine: MachineArrays,
-    flow: Flow,
-    omega: float,
-    columns: Columns,
-    U: Real,
-    starts: Real,
-    shift: Real,
-    T: Real,
-    slopes: Real,
-    work: ColumnWork,
-) -> None:
-    """``carry_variation`` for callers outside the kernels."""
-    carry_variation(machine, flow, omega, columns, U, starts, shift, T, slopes, work)
 
 
 @kernel(entry=True)

@@ -22,7 +22,7 @@ from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import MachineColumns
 from flipflow.dynamics.motion import Motion, motion_of_flow
 from flipflow.dynamics.parameter_tangent import new_column_work
-from flipflow.dynamics.parameter_variation import columns_at, vary_flow
+from flipflow.dynamics.parameter_variation import carry_variation, columns_at
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.contact_law import shares, signed_gap
 from flipflow.periodic.exact_solver import ExactSolver
@@ -260,7 +260,7 @@ class MotionDerivatives:
         segments = int(flow.segments[0])
         starts, shift = np.zeros((segments, size, columns)), np.zeros((segments + 1, columns))
         T, slopes = np.eye(size), np.zeros((columns if with_map else 0, size, size))
-        vary_flow(
+        carry_variation(
             self.solver.machine, flow, self.omega, self.columns.solved, state.copy(), starts, shift,
             T, slopes, self.work,
         )  # fmt: skip

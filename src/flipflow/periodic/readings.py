@@ -15,7 +15,8 @@ from flipflow.dynamics.contact_search import (
     first_harmonic,
     prepare_search,
 )
-from flipflow.dynamics.flow import run_flow, segment_motion, segment_state
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.flow import Flow, run_flow, segment_motion, segment_state
 from flipflow.periodic.balance import (
     contact_forces,
     contact_free_harmonic,
@@ -60,17 +61,34 @@ def observe_flow(
         code[p] = _turn_after(problem, work, states[p], omega[p], turn, waiting)
         if code[p] != status.OK:
             continue
+        observe_record(
+            problem.machine, flow, omega[p], turn, coordinate, motion, low[p], high[p], first[p]
+        )
+
+
+@kernel
+def observe_record(
+    machine: MachineArrays,
+    flow: Flow,
+    omega: float,
+    turn: float,
+    coordinate: Real,
+    motion: GapMotion,
+    low: Real,
+    high: Real,
+    first: Complex,
+) -> None:
+    """Extremes and first harmonic, (G,) each, of coordinates (G, N) over a recorded turn."""
+    for g in range(coordinate.shape[0]):
+        low[g], high[g], first[g] = math.inf, -math.inf, 0.0
+    for e in range(flow.segments[0]):
+        count = segment_motion(machine, flow, e, omega, coordinate, motion)
+        prepare_search(motion, count)
         for g in range(coordinate.shape[0]):
-            low[p, g], high[p, g], first[p, g] = math.inf, -math.inf, 0.0
-        for e in range(flow.segments[0]):
-            count = segment_motion(problem.machine, flow, e, omega[p], coordinate, motion)
-            prepare_search(motion, count)
-            for g in range(coordinate.shape[0]):
-                smallest, largest = extremes(motion, count, g, flow.length[e])
-                low[p, g] = min(low[p, g], smallest)
-                high[p, g] = max(high[p, g], largest)
-                share = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega[p])
-                first[p, g] += 2.0 * share / turn
+            smallest, largest = extremes(motion, count, g, flow.length[e])
+            low[g], high[g] = min(low[g], smallest), max(high[g], largest)
+            share = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega)
+            first[g] += 2.0 * share / turn
 
 
 @kernel(inline=True)

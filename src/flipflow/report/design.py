@@ -54,7 +54,9 @@ def duty_of_proposal(found: Proposal) -> Iterator[Block]:
     """What was asked."""
     duty = found.duty
     speeds = " to ".join(dict.fromkeys(rpm(one) for one in duty.speed))
-    scatter = ", ".join(f"{name} +-{100.0 * one:.3g} %" for name, one in duty.scatter.items())
+    scatter = ", ".join(
+        f"{FIELD[name].key} +-{100.0 * one:.3g} %" for name, one in duty.scatter.items()
+    )
     yield Heading("The duty", 1, new_page=False)
     yield Values(
         (
@@ -74,15 +76,18 @@ def machine_of_proposal(found: Proposal) -> Iterator[Block]:
     """The parts that were chosen."""
     yield Heading("The machine", 1, new_page=False)
     columns = (
-        Column("Field"), Column("Of the file", numeric=True), Column("Proposed", numeric=True),
-        Column("Free", brief=False),
+        Column("In the machine file"), Column("Of the file", numeric=True),
+        Column("Proposed", numeric=True), Column("Free", brief=False),
     )  # fmt: skip
     own, new, free = found.duty.project.screen, found.screen, _free(found)
     rows = [
-        cells(name, _field(name, getattr(own, name)), _field(name, getattr(new, name)),
-              free.get(name, NOTHING))
+        cells(
+            FIELD[name].key,
+            *(_field(name, getattr(screen, name)) for screen in (own, new)),
+            free.get(name, NOTHING),
+        )
         for name in found.fields
-    ]  # fmt: skip
+    ]
     yield Table("Parts", columns, tuple(rows))
     if found.springs is not None:
         one, count = found.springs
@@ -95,7 +100,7 @@ def steadiness_of_proposal(found: Proposal) -> Iterator[Block]:
     """The band of the machine and of those beside it."""
     columns = (
         Column("Machine"), Column("Least", "mm", numeric=True),
-        Column("Greatest", "mm", numeric=True),        Column("Band", "mm", numeric=True),
+        Column("Greatest", "mm", numeric=True), Column("Band", "mm", numeric=True),
     )  # fmt: skip
     rows = [cells(one.name, *_ends(one)) for one in (found.chosen, *found.beside)]
     yield Table("Relative amplitude over all combinations", columns, tuple(rows))
@@ -115,7 +120,7 @@ def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
         for name, share in found.excess.items()
     ]
     rows += [
-        cells(name, "end of what is free", "0.00", _price(found, name))
+        cells(label_of(name), "end of what is free", "0.00", _price(found, name))
         for name in found.prices
         if name not in found.excess
     ]

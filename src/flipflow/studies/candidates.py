@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
 from flipflow.model.duty import Duty, Objective, SpringType
+from flipflow.model.fields import FIELD
 from flipflow.model.limits import limit_bounds
 from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -45,8 +46,11 @@ def quantity_of(name: str) -> Quantity:
 
 
 def label_of(constraint: str) -> str:
-    """A constraint in words."""
-    return QUANTITIES[constraint].label if constraint in QUANTITIES else constraint
+    """A constraint, or the least or greatest of a field, in words."""
+    if constraint in QUANTITIES:
+        return QUANTITIES[constraint].label
+    end, _, name = constraint.partition(" ")
+    return f"{end} {FIELD[name].key}" if name in FIELD else constraint
 
 
 @dataclass(frozen=True)

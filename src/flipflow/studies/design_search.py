@@ -34,6 +34,7 @@ STEP = 1e-4  # of a share, for central differences: lanes are exact, their error
 ROUNDS = 40
 ACTIVE = 1e-3  # excess above which a limit that is met binds
 HUGE = 1e3  # stands for infinity in the search
+SCALE = 1e6  # objectives are in N, W, m/s^2 and m
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +86,6 @@ def search(space: Space, generations: int, tell: Tell | None) -> Front:
     judged = space.judge(u, margins=True)
     kept = _front(space, judged)
     return Front(u[kept], _rows(judged, kept), cancelled, algorithm.evaluator.n_eval)
-
-
-SCALE = 1e6  # objectives are in N, W, m/s^2 and m
 
 
 def _first(space: Space) -> Real:

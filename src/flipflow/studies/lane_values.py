@@ -15,12 +15,10 @@ from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED
 from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
 from flipflow.batch.variants import Batch, batches
 from flipflow.dynamics.normal import normal_amplitude
-from flipflow.model.fields import FIELD
-from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord, Quantity, leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
-from flipflow.studies.quantity_values import MOTION_VALUES, Frame
+from flipflow.studies.quantity_values import MOTION_VALUES, Frame, fields_of_rows
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -79,7 +77,7 @@ def lane_values(
     Returns
     -------
     tuple
-        Values, NaN where there is none; reasons of :mod:`flipflow.batch.lane_path`.
+        Values, NaN where there is none; reasons of :mod:`flipflow.batch.reasons`.
     """
     rows = len(next(iter(columns.values())))
     values = {one.name: np.full((rows, omega.size), np.nan) for one in quantities}
@@ -127,28 +125,15 @@ class _Question:
 
     def _solved(self, omega: Real) -> Answer:
         nearby = nearby_motions(self.machine.system().with_bonded(), self.batch.system, omega)
-        plan = _Plan(self.machine, self.batch.system, self._fields, omega, self.quantities)
+        rows = self.batch.rows
+        own = {name: column[rows] for name, column in self.columns.items()}
+        of_screen = isinstance(self.machine, FlipFlowScreen)
+        fields = fields_of_rows(self.machine, own) if of_screen else {}
+        plan = _Plan(self.machine, self.batch.system, fields, omega, self.quantities, rows.size)
         found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
         told = _LaneMotions(plan, read)
         values = {one.name: told.value(one) for one in self.quantities}
         return values | {SIZE: told.amplitude(plan.leading)}, found.reason
-
-    @property
-    def _fields(self) -> dict[str, Real]:
-        """Fields of a screen, (L, 1) each."""
-        if not isinstance(self.machine, FlipFlowScreen):
-            return {}
-        lanes = self.batch.rows.size
-        known = {
-            name: np.full((lanes, 1), np.asarray(value_of(self.machine, name), float))
-            for name in FIELD
-        }
-        own = {
-            name: column[self.batch.rows].astype(float)[:, None]
-            for name, column in self.columns.items()
-            if name in FIELD
-        }
-        return known | own
 
 
 def _in_order(values: dict[str, Real], why: Int, order: Int) -> Answer:
@@ -177,6 +162,7 @@ class _Plan:
     fields: Mapping[str, Real]
     omega: Real
     quantities: tuple[Quantity, ...]
+    lanes: int
 
     @property
     def leading(self) -> Any:
@@ -210,7 +196,7 @@ class _Plan:
         )
         if not self.vectors:
             return asked
-        lanes, speeds = self.normal.shape
+        lanes, speeds = self.lanes, self.omega.size
         linear = np.zeros((lanes, len(self.vectors), 3, self.system.size))
         along, across = np.zeros((2, lanes, speeds, len(self.vectors)), np.complex128)
         for q, name in enumerate(self.vectors):

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from flipflow.dynamics.contact_free import contact_free
 from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
 from flipflow.model.constants import GRAVITY
+from flipflow.model.fields import FIELD
+from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
@@ -293,6 +295,12 @@ class Working(Frozen):
         if normal is None:
             return math.nan
         return self.orbit.peak(lambda t, x, v, a: np.hypot(along(x, v, a), across(normal, t)))
+
+
+def fields_of_rows(machine: Machine, columns: Mapping[str, NDArray[Any]]) -> dict[str, Real]:
+    """Fields of variants of a screen: numbers, but for columns, (S, 1); NaN where there is none."""
+    own = {name: column.astype(float)[:, None] for name, column in columns.items() if name in FIELD}
+    return {name: own.get(name, np.asarray(value_of(machine, name), float)) for name in FIELD}
 
 
 @dataclass(frozen=True, eq=False)

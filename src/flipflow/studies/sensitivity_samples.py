@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.batch.side_by_side import side_by_side
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
-from flipflow.model.parameters import value_of, with_values
+from flipflow.model.parameters import with_values
 from flipflow.model.quantities import BranchWord, Quantity, leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, system_of
@@ -25,7 +24,13 @@ from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response
 from flipflow.studies.lane_values import lane_values, on_lanes
-from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working, number_or_nan
+from flipflow.studies.quantity_values import (
+    MOTION_VALUES,
+    ContactFree,
+    Working,
+    fields_of_rows,
+    number_or_nan,
+)
 
 Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
@@ -69,15 +74,15 @@ class Question:
 
 def closed_form_values(question: Question, columns: Columns, omega: Real) -> Real:
     """The quantity of S samples at frequencies (K,), (S, K); NaN where physics forbids a value."""
-    nominal = {name: np.asarray(value_of(question.machine, name), float) for name in FIELD}
+    fields = fields_of_rows(question.machine, columns)
     evaluate = MOTION_VALUES[question.quantity.name]
     rows = len(next(iter(columns.values())))
     values = np.empty((rows, omega.size))
     step = max(CHUNK_VALUES // omega.size, 1)
     for begin in range(0, rows, step):
         part = slice(begin, begin + step)
-        own = {name: np.asarray(column[part], float)[:, None] for name, column in columns.items()}
-        values[part] = evaluate(ContactFree(nominal | own, omega))
+        own = {name: one[part] if one.ndim else one for name, one in fields.items()}
+        values[part] = evaluate(ContactFree(own, omega))
     for name, column in columns.items():
         values[~FIELD[name].allows(np.asarray(column, dtype=float))] = np.nan
     return values
@@ -101,37 +106,14 @@ def motion_values(
     rows = [tuple(map(_plain, row)) for row in zip(*columns.values(), strict=True)]
     values = np.full((len(rows), question.omega.size), np.nan)
 
-    ended = threading.Event()
-
-    def chunk(begin: int) -> None:
-        for k in range(begin, min(begin + CHUNK_ROWS, len(rows))):
-            if ended.is_set():
+    def chunk(part: slice, stop: NDArray[np.int64]) -> None:
+        for k in range(part.start, part.stop):
+            if stop[0]:
                 return
             values[k] = _sample(question, names, rows[k])
 
-    for done in _each(chunk, range(0, len(rows), CHUNK_ROWS), threads, ended):
-        tell(done)
+    side_by_side(chunk, len(rows), CHUNK_ROWS, threads, tell)
     return values
-
-
-def _each(
-    work: Callable[[int], None], items: range, threads: int, ended: threading.Event
-) -> Iterator[float]:
-    """Do all items and yield the share done after each; ``ended`` is set when nobody waits."""
-    if threads == 1:
-        for k, item in enumerate(items):
-            work(item)
-            yield (k + 1) / len(items)
-        return
-    pool = ThreadPoolExecutor(threads)
-    try:
-        waiting = [pool.submit(work, item) for item in items]
-        for k, done in enumerate(as_completed(waiting)):
-            done.result()
-            yield (k + 1) / len(items)
-    finally:
-        ended.set()
-        pool.shutdown(cancel_futures=True)
 
 
 def _sample(question: Question, names: tuple[str, ...], row: tuple[object, ...]) -> Real:

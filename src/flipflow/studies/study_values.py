@@ -45,8 +45,8 @@ def evaluate(
 ) -> Values:
     """Quantities of L machines at F frequencies.
 
-    Every machine is solved by itself, from no other's motion: the values of a row depend on
-    nothing but the row.
+    The values of a row depend on the row, on the machine itself, whose motions are first guesses,
+    and on the frequencies: on no other row.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def evaluate(
     -------
     tuple
         Values (L, F) by quantity, those of a response the same at every frequency; and the reason
-        of each motion, (L, F), a key of :data:`REASONS`.
+        of each motion, (L, F), a key of :data:`flipflow.batch.reasons.REASONS`.
     """
     asked = [quantity_named(name, machine) for name in quantities]
     rows = len(next(iter(columns.values())))
@@ -77,10 +77,7 @@ def evaluate(
     if all(replace(question, quantity=one).in_closed_form(tuple(columns)) for one in asked):
         for one in asked:
             values[one.name] = closed_form_values(replace(question, quantity=one), columns, omega)
-        refused = [
-            ~FIELD[name].allows(np.asarray(column, float)) for name, column in columns.items()
-        ]
-        reasons[np.any(refused, axis=0)] = REFUSED
+        reasons[~np.all(_fine(columns), axis=0)] = REFUSED
         return values, reasons
     told = [one for one in asked if on_lanes(machine, one)]
     if told:
@@ -114,8 +111,7 @@ def evaluate_loaded(
         loaded.pop("measured_shift", None)
     values, reasons = evaluate(machine.loaded(load), loaded, quantities, omega, branch)
     # A mass below zero stays impossible with material on it.
-    known = {name: column for name, column in columns.items() if name in FIELD}
-    fine = _fine(known)
+    fine = _fine({name: column for name, column in columns.items() if name in FIELD})
     refused = ~np.all(fine, axis=0) if fine else np.zeros(len(reasons), bool)
     reasons[refused] = REFUSED
     for table in values.values():

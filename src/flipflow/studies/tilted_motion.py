@@ -143,6 +143,11 @@ class TiltedMotion:
         slope = (cosine.imag - 1j * sine.imag) / harmonic
         return np.asarray(np.angle(harmonic) + 1j * slope.imag)
 
+    def offset(self) -> Complex:
+        """How far the middle of the relative motion lies beside zero, in m."""
+        mean = self.mean("relative")
+        return np.where(mean.real < 0.0, -mean, mean)
+
     def reach(self) -> Complex:
         """Greatest size of the relative displacement in m."""
         d = self.orbit.system.coordinate("relative")
