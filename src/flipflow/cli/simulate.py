@@ -58,10 +58,9 @@ def simulate(
     """
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
-    from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
-
     from flipflow.report.terminal import say  # noqa: PLC0415
     from flipflow.transient.history import thinned  # noqa: PLC0415
+    from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
 
     project = in_case(load_project(file, force=force), case)
     omega = speed_of(project, speed)
