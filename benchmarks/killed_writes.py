@@ -32,8 +32,8 @@ CASES = {
         ("simulate", "ffs0827", "--periods", "30", "--json"),
     ),
     "reproduce": (
-        ("reproduce", "2c", "-o"),
-        ("reproduce", "2c", "--machine", "ffs0827-linear", "-o"),
+        ("reproduce", "6", "-o"),
+        ("reproduce", "6", "--machine", "ffs0827-linear", "-o"),
     ),
 }
 # Loads and warms up once; for each line it reads a process of its own runs the two cases in turn.
@@ -128,6 +128,7 @@ def tried(name, folder, rng, kills):
         run = [sys.executable, "-m", "flipflow", *words, str(out)]
         assert subprocess.run(run, check=False, capture_output=True).returncode in (0, 3)
         sets.append(content(out))
+    assert sets[0] != sets[1]
     counts, out = Counter(), folder / "out" / file
     out.parent.mkdir(exist_ok=True)
     words = [sys.executable, "-c", CHILD, json.dumps(cases), str(out)]

@@ -113,7 +113,7 @@ COMMANDS = {
     "analyze": (("analyze", *QUICK), ("--harmonics", "3"), WRITER),
     "simulate": (("simulate", "ffs0827"), ("--periods", "30"), WRITER),
     "simulate --json": ((*SHORT, "20"), ("--periods", "30"), DOCUMENT_WRITER),
-    "reproduce": (("reproduce", "2c"), ("--machine", "ffs0827-linear"), WRITER),
+    "reproduce": (("reproduce", "6"), ("--machine", "ffs0827-linear"), WRITER),
 }
 
 

@@ -169,9 +169,11 @@ def checked_vector(name: str, value: object, remedy: str) -> Complex:
     array = _array(name, value, remedy)
     if array.dtype.kind not in COMPLEX_KINDS or array.ndim != 1 or array.size == 0:
         raise InputError(name, value, remedy)
+    with np.errstate(all="ignore"):
+        array = np.asarray(array, np.complex128)
     _check_sizes(name, value, array.real, remedy)
     _check_sizes(name, value, array.imag, remedy)
-    return np.asarray(array, np.complex128)
+    return array
 
 
 def checked_generator(rng: object) -> np.random.Generator:
