@@ -116,7 +116,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= WIDTH else text[: WIDTH - 3] + "..."
 
 
-def _number(value: numbers.Number) -> str:
+def _number(value: object) -> str:
     """A number; of one with very many digits how many."""
     if isinstance(value, numbers.Integral) and abs(int(value)) >= 10**WIDTH:
         return f"a number of {int(value).bit_length() * 3 // 10} digits"

@@ -109,3 +109,20 @@ def test_a_schema_of_a_thousand_words_is_shown_short(tmp_path):
     with pytest.raises(StoreError, match="update flipflow") as caught:
         ff.open_result(path)
     assert len(str(caught.value)) < 1000
+
+
+def test_names_in_any_letters_are_written_and_drawn(tmp_path):
+    """A coordinate in Greek, a load case that is no formula of TeX."""
+    tiny = ff.MechanicalSystem(
+        [[1.0]], [[40.0]], [[1e4]], (ff.ClearanceSpring([1.0], 2e4, 10.0, 1e-3),),
+        ff.Unbalance([1e-3]), {"\N{GREEK SMALL LETTER PHI}": [1.0]},
+    )  # fmt: skip
+    branch = ff.frequency_response(tiny, (80.0, 120.0), ff.PiecewiseExact(20))
+    for ending in ("nc", "csv", "json"):
+        ff.save(branch, tmp_path / f"branch.{ending}")
+    assert ff.open_result(tmp_path / "branch.json").omega.size == branch.omega.size
+    screen = ff.load("ffs0827-linear")
+    for name in ("$x^{2$", "\\frac{", "<b>&", "100 %"):
+        figure = ff.figure(ff.operating_region(screen, load_cases=[ff.Load(name=name)]))
+        for ending in ("html", "svg", "pdf"):
+            assert figure.write(tmp_path / f"figure.{ending}").stat().st_size > 1000

@@ -164,14 +164,16 @@ def thinned(history: History, most: int) -> History:
         return history
     step = math.ceil(rows / most) | 1
     kept = np.append(np.arange(0, rows - 1, step), rows - 1)
-    names = ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal")
-    given = {name: getattr(history, name) for name in names}
+    torque, normal = history.torque, history.normal
     return replace(
         history,
-        **{name: None if values is None else values[kept] for name, values in given.items()},
+        t=history.t[kept], x=history.x[kept], v=history.v[kept], a=history.a[kept],
+        force=history.force[kept], omega=history.omega[kept], angle=history.angle[kept],
+        torque=None if torque is None else torque[kept],
+        normal=None if normal is None else normal[kept],
         works={name: values[kept] for name, values in history.works.items()},
-        notes=(*history.notes, f"Of {rows} calculated times every {step}th is kept."),
-    )
+        notes=(*history.notes, f"Of {rows} calculated times one in {step} is kept."),
+    )  # fmt: skip
 
 
 def stop_forces(system: MechanicalSystem, x: Real, v: Real, regimes: Int) -> Real:
