@@ -5,6 +5,8 @@ written, and is killed by SIGKILL at a random moment after it begins to write.
 """
 
 import argparse
+import json
+import os
 import random
 import signal
 import subprocess
@@ -30,15 +32,15 @@ CASES = {
         ("simulate", "ffs0827", "--periods", "30", "--json"),
     ),
     "reproduce": (
-        ("reproduce", "2c", "-o"),
-        ("reproduce", "2c", "--machine", "ffs0827-linear", "-o"),
+        ("reproduce", "6", "-o"),
+        ("reproduce", "6", "--machine", "ffs0827-linear", "-o"),
     ),
 }
+# Loads and warms up once; for each line it reads a process of its own runs the two cases in turn.
 CHILD = """
-import json, sys
+import json, os, sys
 from flipflow.cli.main import main
 from flipflow.results import stage
-from flipflow.cli import destination
 
 def telling(function):
     def told(*given, **options):
@@ -46,16 +48,27 @@ def telling(function):
         return function(*given, **options)
     return told
 
-stage.Stage.commit = telling(stage.Stage.commit)
-cases, out = json.loads(sys.argv[1]), sys.argv[2]
-for k in range(1_000_000):
+def run(k):
     sys.argv = ["flipflow", *cases[k % 2], out]
-    if "analyze" in sys.argv and k % 2 == 0:
+    if "analyze" in sys.argv and "--overwrite" not in sys.argv:
         sys.argv.insert(2, "--overwrite")
     try:
         main()
     except SystemExit as ended:
         assert ended.code in (0, None, 3), ended.code
+
+stage.Stage.commit = telling(stage.Stage.commit)
+cases, out = json.loads(sys.argv[1]), sys.argv[2]
+run(0), run(1)
+for line in sys.stdin:
+    child = os.fork()
+    if child:
+        print("process", child, file=sys.stderr, flush=True)
+        os.waitpid(child, 0)
+        print("ended", file=sys.stderr, flush=True)
+        continue
+    for k in range(1_000_000):
+        run(k)
 """
 
 
@@ -72,20 +85,23 @@ def content(out):
     }
 
 
-def attempt(cases, out, rng):
-    """Kill a run at its third to sixth writing, up to 30 ms after that began."""
-    import json  # noqa: PLC0415
+def attempt(writer, rng):
+    """Kill a process at one of its first writings, up to 30 ms after that began."""
+    writer.stdin.write("go\n")
+    writer.stdin.flush()
+    number = int(line_with(writer, "process").split()[1])
+    for _ in range(rng.randrange(1, 4)):
+        line_with(writer, "writing")
+    time.sleep(rng.uniform(0.0, 0.03))
+    os.kill(number, signal.SIGKILL)
+    line_with(writer, "ended")
 
-    words = [sys.executable, "-c", CHILD, json.dumps(cases), str(out)]
-    with subprocess.Popen(
-        words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    ) as child:
-        for _ in range(rng.randrange(3, 7)):
-            while "writing" not in child.stderr.readline():
-                assert child.poll() is None
-        time.sleep(rng.uniform(0.0, 0.03))
-        child.send_signal(signal.SIGKILL)
-        child.stderr.read()
+
+def line_with(writer, word):
+    """The next line with a word on a process's stderr."""
+    while word not in (line := writer.stderr.readline()):
+        assert line, "the process that runs the command has ended"
+    return line
 
 
 def main():
@@ -112,13 +128,18 @@ def tried(name, folder, rng, kills):
         run = [sys.executable, "-m", "flipflow", *words, str(out)]
         assert subprocess.run(run, check=False, capture_output=True).returncode in (0, 3)
         sets.append(content(out))
-    counts = Counter()
-    for _ in range(kills):
-        out = folder / "out" / file
-        out.parent.mkdir(exist_ok=True)
-        attempt(cases, out, rng)
-        left = content(out)
-        counts["neither" if left not in sets else ("first", "second")[sets.index(left)]] += 1
+    assert sets[0] != sets[1]
+    counts, out = Counter(), folder / "out" / file
+    out.parent.mkdir(exist_ok=True)
+    words = [sys.executable, "-c", CHILD, json.dumps(cases), str(out)]
+    with subprocess.Popen(
+        words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as writer:
+        for _ in range(kills):
+            attempt(writer, rng)
+            left = content(out)
+            counts["neither" if left not in sets else ("first", "second")[sets.index(left)]] += 1
+        writer.stdin.close()
     print(f"{name:20s} {dict(counts)}", flush=True)
     return counts["neither"]
 

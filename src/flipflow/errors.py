@@ -97,6 +97,10 @@ class _Words(reprlib.Repr):
         self.maxlist = self.maxtuple = self.maxdict = self.maxset = self.maxfrozenset = 20
         self.maxstring = self.maxother = self.maxlong = 10 * WIDTH
 
+    def repr_int(self, x: int, level: int) -> str:  # noqa: ARG002  as reprlib calls it
+        """A whole number; Python refuses to write one of many thousand digits."""
+        return _number(x)
+
 
 _WORDS = _Words()
 
@@ -105,13 +109,20 @@ def _shown(value: object) -> str:
     """A value on one line, shortened."""
     if isinstance(value, (str, bytes)):
         text = repr(value[:WIDTH])
-    elif isinstance(value, numbers.Integral) and abs(int(value)) >= 10**WIDTH:
-        text = f"a number of {int(value).bit_length() * 3 // 10} digits"
     elif isinstance(value, numbers.Number):
-        text = str(value)
+        text = _number(value)
     else:
         text = " ".join(_WORDS.repr(value).split())
     return text if len(text) <= WIDTH else text[: WIDTH - 3] + "..."
+
+
+def _number(value: object) -> str:
+    """A number; of one with very many digits how many."""
+    if isinstance(value, numbers.Integral) and abs(int(value)) >= 10**WIDTH:
+        return f"a number of {int(value).bit_length() * 3 // 10} digits"
+    if isinstance(value, numbers.Rational) and not isinstance(value, numbers.Integral):
+        return f"{_number(value.numerator)}/{_number(value.denominator)}"
+    return str(value)
 
 
 def _portable(value: object) -> object:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import signal
@@ -51,9 +52,9 @@ def at_work(monkeypatch):
         def begun(*_words):
             act()
 
+        modules = [importlib.import_module(f"flipflow.cli.{name}") for name in QUICK]
         monkeypatch.setattr("flipflow.cli.progress.progress", begun)
-        for name in QUICK:
-            module = sys.modules[f"flipflow.cli.{name}"]
+        for module in modules:
             if hasattr(module, "progress"):
                 monkeypatch.setattr(module, "progress", begun)
 
@@ -201,8 +202,7 @@ def test_ctrl_c_while_files_are_written_leaves_none(command, monkeypatch, tmp_pa
     code, _, err = command("sensitivity", *QUICK["sensitivity"], "-o", "out")
     assert code == 130
     assert err == "Stopped by the user; nothing is written.\n"
-    assert list(tmp_path.iterdir()) == [tmp_path / "out"]
-    assert list((tmp_path / "out").iterdir()) == []
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("rows", [4, 10])
@@ -285,3 +285,24 @@ def test_ctrl_c_in_a_reproduction_keeps_the_figures_that_are_finished(
     assert (tmp_path / "out" / "figure-04.svg").exists()
     assert not (tmp_path / "out" / "figure-05.svg").exists()
     assert json.loads((tmp_path / "c.json").read_text())["claims"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("simulate", "ffs0827", "--periods", "20", "--impulse", "9999 s: main 1"),
+        ("simulate", "ffs0827", "--json", "nowhere/x.json"),
+        ("reproduce", "2c"),
+        ("compare", "ffs0827", "ffs0827-linear"),
+    ],
+)
+def test_what_ends_a_command_leaves_no_empty_folder(command, monkeypatch, tmp_path, words):
+    """An extra that is missing, an option that is wrong: what was made for the files goes."""
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    code, _, err = command(*words, "-o", tmp_path / "new" / "out")
+    assert code in (2, 4)
+    assert err.startswith("Error: ")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "new" / "out").mkdir(parents=True)
+    assert command(*words, "-o", tmp_path / "new" / "out")[0] == code
+    assert (tmp_path / "new" / "out").is_dir(), "it was there before"

@@ -176,3 +176,29 @@ def test_without_damping_nothing_settles(screen) -> None:
     assert np.abs(history.x[-1] - back.final[:2]).max() < 1e-9
     assert history.distance is None
     assert not history.settled
+
+
+def test_the_document_of_many_turns_is_thinned_and_says_so(command, monkeypatch, tmp_path):
+    """What is shown and drawn is of all times; of a document every k-th is kept, k odd."""
+    monkeypatch.setattr("flipflow.cli.simulate.MOST_ROWS", 1000)
+    code, out, _ = command(
+        "simulate", "ffs0827", "--periods", "100", "--json", str(tmp_path / "thin.json")
+    )
+    assert code == 0
+    assert "The document is thinned. Of 12801 calculated times one in 13 is kept." in " ".join(
+        out.split()
+    )
+    thin = ff.open_result(tmp_path / "thin.json")
+    whole = ff.simulate(ff.load("ffs0827"), ff.load_project("ffs0827").speed, 100)
+    assert thin.notes == ("Of 12801 calculated times one in 13 is kept.",)
+    assert thin.t.size <= 1000
+    assert thin.t[-1] == whole.t[-1]
+    np.testing.assert_array_equal(thin.x[:-1], whole.x[:-1:13])
+    assert thin.energy == whole.energy
+    assert thin.events == whole.events
+
+
+def test_a_document_of_usual_length_is_whole(command, tmp_path):
+    command("simulate", "ffs0827", "--periods", "20", "--json", str(tmp_path / "whole.json"))
+    whole = ff.open_result(tmp_path / "whole.json")
+    assert (whole.t.size, whole.notes) == (20 * 128 + 1, ())

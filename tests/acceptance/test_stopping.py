@@ -9,12 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.compiled.interruptible import interruptible
+from flipflow.errors import IncompleteError
 from flipflow.paper.page import write_figure
+from flipflow.periodic.exact_solver import ExactSolver
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
 # Sends itself a signal while the command line loads what it is built with.
@@ -173,3 +178,108 @@ def test_a_figure_is_written_whole_or_not_at_all(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         write_figure(dataclasses.replace(found, figure=Interrupted()), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def chain():
+    """Thirty masses in a row, four of them with a stop: a kernel's call takes minutes."""
+    n = 30
+    K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    stops = tuple(ff.ClearanceSpring(np.eye(n)[k], 5.0, 1e-3, 1.0) for k in range(4))
+    force = ff.Unbalance(np.eye(n)[0])
+    return ff.MechanicalSystem(np.eye(n), 1e-3 * K + 1e-4 * np.eye(n), K, stops, force)
+
+
+@contextmanager
+def interrupted_after(seconds):
+    """What Ctrl-C does, after some seconds; the list is filled with the moment at which it came."""
+    came = []
+
+    def answer(_number, _frame):
+        came.append(time.monotonic())
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, answer)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield came
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+LONG = {
+    "branch": lambda chain: ff.frequency_response(chain, (0.05, 2.5)),
+    "series": lambda chain: ff.frequency_response(chain, (0.05, 2.5), ff.HarmonicBalance(15)),
+    "motions": lambda chain: ff.periodic_orbits(chain, 1.2, max_periods=3),
+    "sweep": lambda chain: ff.sweep(chain, np.linspace(1.2, 1.3, 50)),
+    "glide": lambda chain: ff.ramp(chain, (1.2, 1.3), 1e-3),
+    "section": lambda chain: ff.poincare_section(chain, 1.2, 20_000),
+    "exponents": lambda chain: ff.lyapunov_exponents(chain, 1.2, periods=20_000),
+    "basins": lambda chain: ff.basins(chain, 1.2, {0: np.linspace(-3.0, 3.0, 200)}),
+    "turns": lambda chain: ff.simulate(chain, 1.2, 20_000),
+    "slow turns": lambda chain: ff.simulate(chain, 1e-4, 2),
+    "slow start": lambda _: ff.start_up(ff.load("ffs0827"), speed=0.05),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_ctrl_c_ends_every_kernel_within_a_second(chain, name):
+    """The signal comes after a second; whatever runs then is not waited for."""
+    begin = time.monotonic()
+    with interrupted_after(1.0) as came, pytest.raises(KeyboardInterrupt):
+        LONG[name](chain)
+    # On a quiet machine a tenth of a second, and half a one where a kernel has to end first.
+    assert came[0] - begin < 6.0
+    assert time.monotonic() - came[0] < 6.0
+
+
+def test_what_was_stopped_can_be_asked_again(screen):
+    """A stopped kernel leaves its flag and its scratch as they were."""
+    solver = ExactSolver(screen.system(), half_turn=False)
+    z, stop = np.zeros(4), solver.flow.stop
+    stop[0] = 1
+    with pytest.raises(IncompleteError):
+        solver.section(z, 120.0, 4)
+    stop[0] = 0
+    whole = solver.section(z, 120.0, 2000)
+
+    with interrupted_after(0.2), pytest.raises(KeyboardInterrupt):
+        solver.section(z, 120.0, 1_000_000)
+    assert stop[0] == 0
+    np.testing.assert_array_equal(solver.section(z, 120.0, 2000), whole)
+
+
+def test_a_failure_beside_the_main_thread_is_raised_in_it():
+    def fails():
+        raise IncompleteError("a sentence")
+
+    with pytest.raises(IncompleteError, match="a sentence"):
+        interruptible(fails)
+    assert interruptible(lambda: 3.0) == 3.0
+
+
+def test_slow_turns_are_refused_where_they_take_hours(screen):
+    with pytest.raises(ff.InputError, match=r"omega = 1e-07: 200 turns at it hold .* hours"):
+        ff.simulate(screen, 1e-7)
+    for run in (ff.start_up, ff.coast_down):
+        with pytest.raises(ff.InputError, match=r"speed = 0.0001: 20 turns at it are about 9e"):
+            run(screen, speed=1e-4)
+
+
+def test_the_energies_of_a_slow_turn_are_those_of_a_whole_one(screen, monkeypatch):
+    """A turn that is calculated in parts is the same motion, energies included."""
+    whole = ff.simulate(screen, 2.0, 2)
+    monkeypatch.setattr("flipflow.transient.recording.WORK_A_CALL", 300.0)
+    parts = ff.simulate(screen, 2.0, 2)
+    np.testing.assert_allclose(parts.x, whole.x, atol=1e-13)
+    for name, value in whole.energy.items():
+        assert parts.energy[name] == pytest.approx(value, rel=1e-9, abs=1e-9)
+
+
+def test_the_monitor_is_told_how_long_the_rest_will_take(screen, monkeypatch):
+    monkeypatch.setattr("flipflow.transient.simulate.SILENT_SECONDS", 0.0)
+    heard = []
+    ff.simulate(screen, 120.0, 500, monitor=lambda sentence, _share: heard.append(sentence))
+    assert len(heard) > 10
+    assert all(sentence.endswith(" s to go") for sentence in heard)

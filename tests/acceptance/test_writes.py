@@ -113,7 +113,7 @@ COMMANDS = {
     "analyze": (("analyze", *QUICK), ("--harmonics", "3"), WRITER),
     "simulate": (("simulate", "ffs0827"), ("--periods", "30"), WRITER),
     "simulate --json": ((*SHORT, "20"), ("--periods", "30"), DOCUMENT_WRITER),
-    "reproduce": (("reproduce", "2c"), ("--machine", "ffs0827-linear"), WRITER),
+    "reproduce": (("reproduce", "6"), ("--machine", "rig-lin2024"), WRITER),
 }
 
 
@@ -287,20 +287,20 @@ def small_disk(tmp_path):
 
 
 FILLING = {
-    "analyze": ("analyze", *QUICK, "-o", "out"),
-    "simulate": ("simulate", "ffs0827", "-o", "out"),
-    "simulate --json": ("simulate", "ffs0827", "--json", "out/a"),
-    "reproduce": ("reproduce", "2c", "-o", "out"),
+    "analyze": ("analyze", *QUICK, "-o"),
+    "simulate": ("simulate", "ffs0827", "-o"),
+    "simulate --json": ("simulate", "ffs0827", "--json"),
+    "reproduce": ("reproduce", "6", "-o"),
 }
 
 
 @pytest.mark.parametrize("name", FILLING)
-def test_a_full_disk_leaves_the_old_set(command, small_disk, monkeypatch, name):
+def test_a_full_disk_leaves_the_old_set(command, small_disk, name):
     old = old_set(small_disk / "out")
-    monkeypatch.chdir(small_disk)
-    code, _, err = command(*FILLING[name])
+    place = small_disk / "out" / ("a" if "--json" in name else "")
+    code, _, err = command(*FILLING[name], place)
     assert code == 4
-    assert " = 'out/" in err
+    assert f"{small_disk / 'out'}/" in err
     assert "No space left on device" in err
     assert ".part" not in err
     assert content(small_disk / "out") == old

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 import textwrap
 from collections.abc import Mapping
@@ -11,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
-from flipflow.errors import Cancelled, StoreError
+from flipflow.errors import Cancelled, FlipflowError, StoreError
 from flipflow.results.stage import Stage
 from flipflow.results.store import (
     checked_place,
@@ -52,13 +54,19 @@ class Destination:
         self, folder: Path | None, json: str | None, reads: Iterable[str] = (), *,
         quiet: bool = False,
     ) -> None:  # fmt: skip
-        if folder is not None:
-            prepare_folder(folder, OUTPUT)
         self.folder, self.json, self._reads = folder, json, tuple(reads)
         self._quiet = quiet
+        self._made: list[Path] = []
+        if folder is not None:
+            self._made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
+            prepare_folder(folder, OUTPUT)
         if json not in (None, TERMINAL):
-            refuse_input(json, self._reads, JSON)
-            checked_place(json, JSON)
+            try:
+                refuse_input(json, self._reads, JSON)
+                checked_place(json, JSON)
+            except FlipflowError:
+                self._remove_made()
+                raise
         self._stage = Stage(folder, OUTPUT)
         self._names: list[str] = []
         self._places: list[str] = []
@@ -78,10 +86,18 @@ class Destination:
         """Turn Ctrl-C into the sentence that ends a stopped command; drop what is not kept."""
         told = self._stage.told(str(error))
         self._stage.discard()
+        if not self._kept:
+            self._remove_made()
         if kind is not None and issubclass(kind, KeyboardInterrupt):
             raise self.stopped() from None
         if isinstance(error, StoreError) and told != str(error):
             raise StoreError(told) from None
+
+    def _remove_made(self) -> None:
+        """Remove the folders that were made for files that do not come."""
+        for one in self._made:
+            with contextlib.suppress(OSError):
+                one.rmdir()
 
     @property
     def spoken(self) -> bool:

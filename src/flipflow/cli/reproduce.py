@@ -56,6 +56,9 @@ def reproduce(
             lambda monitor: _finished(screen, [one.name for one in wanted], folder, monitor)
         )
         write_page(found, folder)
+        if len(found.figures) == len(wanted):
+            # A figure that this machine does not have would be left over from another one.
+            target.replaces([name for name in files if not (folder / name).exists()])
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 

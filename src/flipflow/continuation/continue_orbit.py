@@ -85,7 +85,7 @@ def continue_orbit(
     """
     checked_orbit("orbit", orbit)
     say = checked_monitor(monitor)
-    if field != "omega":
+    if not isinstance(field, str) or field != "omega":
         return field_branch(orbit, field, interval, formulation_like(orbit, ExactSolver), say)
     low, high = checked_interval("interval", interval)
     if not low <= orbit.omega <= high:

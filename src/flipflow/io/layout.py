@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -20,6 +20,7 @@ from flipflow.model.quantities import needing
 from flipflow.model.screen import Measured, Rotation, TemperatureOf
 
 FORMAT = 1
+MOST_LISTED = 30  # names that a sentence lists
 
 Kind = Literal[
     "quantity", "each", "interval", "choice", "text", "temperatures", "torques", "material", "split"
@@ -258,6 +259,13 @@ def refuse_unknown(table: Mapping[str, object], known: Iterable[str], *, place: 
     for key, value in table.items():
         if key not in known:
             near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-            hint = f"did you mean {near[0]!r}" if near else f"choose one of {', '.join(known)}"
+            hint = f"did you mean {near[0]!r}" if near else f"choose one of {_listed(known)}"
             label, shown = (place + key, value) if place else ("section", f"[{key}]")
             raise InputError(label, shown, f"this name is not known, {hint}")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names, of very many the first ones."""
+    if len(names) <= MOST_LISTED:
+        return ", ".join(names)
+    return f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more"

@@ -94,7 +94,7 @@ DAMAGE = (
     FlipflowError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
     RecursionError, MemoryError,
 )  # fmt: skip
-MOST_SHOWN = 200  # characters of what is wrong
+MOST_SHOWN = 400  # characters of what is wrong
 
 
 def save(result: object, path: str | os.PathLike[str]) -> None:
@@ -153,9 +153,12 @@ def open_result(path: str | os.PathLike[str]) -> Any:
         raise StoreError(f"{path} is not a result of flipflow: it has no schema")
     try:
         result = opener(schema)(document)
-        repr(result)  # a result without numbers, where it should have some, cannot be told
+        # What has no numbers where it should have some, or not as many of one as of another,
+        # cannot be told.
+        repr(result)
+        read_off(result)
     except StoreError as error:
-        raise StoreError(f"{path}: {error}") from None
+        raise StoreError(f"{path}: {_shown(error)}") from None
     except DAMAGE as error:
         raise StoreError(f"{path} is damaged: {_shown(error)}") from None
     return result

@@ -179,9 +179,11 @@ def checked_vector(name: str, value: object, remedy: str) -> Complex:
     array = _array(name, value, remedy)
     if array.dtype.kind not in COMPLEX_KINDS or array.ndim != 1 or array.size == 0:
         raise InputError(name, value, remedy)
+    with np.errstate(all="ignore"):
+        array = np.asarray(array, np.complex128)
     _check_sizes(name, value, array.real, remedy)
     _check_sizes(name, value, array.imag, remedy)
-    return np.asarray(array, np.complex128)
+    return array
 
 
 def checked_generator(rng: object) -> np.random.Generator:
@@ -314,6 +316,8 @@ def _array(name: str, value: object, remedy: str) -> NDArray[Any]:
 
     numpy takes True among floats for 1.0 and would read an iterator to no end: both are refused.
     """
+    if isinstance(value, np.ma.MaskedArray):
+        raise InputError(name, value, remedy)  # what is masked has no value
     if isinstance(value, np.ndarray) and value.dtype.kind != "O":
         return value
     if _has_flag(value) or isinstance(value, Iterator):
@@ -332,9 +336,12 @@ def _array(name: str, value: object, remedy: str) -> NDArray[Any]:
 
 
 def _has_flag(value: object, depth: int = 0) -> bool:
-    """Whether a boolean stands among nested numbers; also of a list that holds itself."""
+    """Whether a boolean, or what is masked, stands among nested numbers.
+
+    Also of a list that holds itself.
+    """
     if not isinstance(value, (list, tuple)):
-        return isinstance(value, (bool, np.bool_))
+        return isinstance(value, (bool, np.bool_, np.ma.MaskedArray))
     if depth > MOST_AXES:
         return True
     for one in value:  # noqa: SIM110  a loop takes half the time of any()

@@ -138,7 +138,8 @@ def array(values: Json, dtype: type = float) -> NDArray[Any]:
         return np.zeros(values["shape"], dtype)
     if np.issubdtype(dtype, np.complexfloating):
         pairs = np.asarray(values, dtype=float)
-        return pairs[..., 0] + 1j * pairs[..., 1] if pairs.size else np.zeros(0, dtype)
+        # Not a + 1j b, which is no number where one of them is infinite.
+        return pairs.view(np.complex128)[..., 0] if pairs.size else np.zeros(0, dtype)
     return np.asarray(values, dtype)
 
 

@@ -25,6 +25,7 @@ from flipflow.model.arguments import (
     checked_numbers,
     checked_speed,
     checked_text,
+    checked_word,
     refuse_pair,
 )
 from flipflow.model.monitor import Monitor
@@ -128,9 +129,7 @@ class BifurcationDiagram(Result):
         InputError
             For a coordinate that is not known, or a direction other than "up" and "down".
         """
-        if direction not in ("up", "down"):
-            raise InputError("direction", direction, "choose one of up, down")
-        passed: Pass = getattr(self, direction)
+        passed: Pass = getattr(self, checked_word("direction", direction, ("up", "down")))
         vector = np.asarray(self.system.coordinate(which))
         counts = [states.shape[0] for states in passed.states]
         none = np.zeros((0, 2 * vector.size))

@@ -181,7 +181,7 @@ def branch_from(document: Document) -> Branch:
     # Files of the time when every point was solved for at phase 0 do not say so.
     stored = document.get("section")
     phase = np.zeros(points) if stored is None else CODEC.form(Real).read(stored)
-    return Branch(
+    branch = Branch(
         formulation=solver.formulation,
         traced=_traced_from({**read, "phase": phase}, solver, maps),
         return_maps=maps,
@@ -194,6 +194,8 @@ def branch_from(document: Document) -> Branch:
         ),
         **{name: read[name] for name in ("machine", "method", "saddle_side_at_start", *ENDED)},
     )
+    _ = branch.shortened_steps  # a reason that is not known ends the reading
+    return branch
 
 
 def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:

@@ -277,15 +277,15 @@ def foundation_loads(
         For anything but motions and runs of a :class:`~flipflow.FlipFlowScreen`.
     """
     checked_mapping("motions", motions, "give motions by the name of their load case")
-    checked_mapping("runs", runs or {}, "give runs by name, or None")
+    runs = checked_mapping("runs", {} if runs is None else runs, "give runs by name, or None")
     remedy = "give motions of periodic_orbits, and runs of start_up or coast_down"
     machines = [checked_kind("motions", one, Orbit, remedy).machine for one in motions.values()]
-    machines += [checked_kind("runs", one, RunUp, remedy).machine for one in (runs or {}).values()]
+    machines += [checked_kind("runs", one, RunUp, remedy).machine for one in runs.values()]
     remedy = "give motions and runs of a FlipFlowScreen"
     screens = [checked_kind("motions", one, FlipFlowScreen, remedy) for one in machines]
     if not screens:
         raise InputError("motions", motions, "give at least one motion or run")
-    for name in (*motions, *(runs or {})):
+    for name in (*motions, *runs):
         checked_text("name", name)
     stands = {(one.supports, one.deck_angle, one.rotation, one.load_centre) for one in screens}
     if len(stands) > 1:
@@ -298,7 +298,7 @@ def foundation_loads(
         deck_angle=first.deck_angle,
         rotation=first.rotation,
         cases=tuple(_case_loads(name, orbit) for name, orbit in motions.items()),
-        runs=tuple(_run_loads(name, run) for name, run in (runs or {}).items()),
+        runs=tuple(_run_loads(name, run) for name, run in runs.items()),
         notes=tuple(_notes(first)),
         static_shares=static_shares(len(names), first.load_centre),
     )

@@ -174,7 +174,7 @@ def thinned(history: History, most: int) -> History:
         history,
         **thin,
         works={name: values[kept] for name, values in history.works.items()},
-        notes=(*history.notes, f"Of {rows} calculated times every {step}th is kept."),
+        notes=(*history.notes, f"Of {rows} calculated times one in {step} is kept."),
     )
 
 
