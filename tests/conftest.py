@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import pickle
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 import flipflow as ff
 from flipflow.cli.main import main
 from flipflow.continuation.branch import Branch
+from flipflow.io.project import Project
 from flipflow.paper.reproduce import Reproduction
+from flipflow.studies.assessment import Assessment, assess
+from kernels_ahead import compile_ahead
 
 LIGHT_DAMPING = {"isolation_damping": 3000.0, "shear_damping": 600.0, "stop_damping": 600.0}
+# Files that share what takes long.
+TOGETHER = {
+    "test_formats.py": "reports", "test_layout_of_reports.py": "reports",
+    "test_report_offline.py": "reports",
+    "test_paper_claims.py": "paper", "test_paper_figures.py": "paper",
+    "test_reproduction_page.py": "paper",
+}  # fmt: skip
 
 
 def pytest_configure() -> None:
@@ -24,11 +36,22 @@ def pytest_configure() -> None:
 
 
 @pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes() -> None:
+    """Large kernels are compiled before the processes start that would each compile them."""
+    compile_ahead()
+
+
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
     """Tests of a file stay on one process: what they share is then made once."""
     from xdist.scheduler import LoadFileScheduling  # noqa: PLC0415  only with pytest-xdist
 
-    return LoadFileScheduling(config, log)
+    class Grouped(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = super()._split_scope(nodeid)
+            return TOGETHER.get(file.rpartition("/")[2], file)
+
+    return Grouped(config, log)
 
 
 @pytest.fixture(scope="session")
@@ -83,3 +106,42 @@ def command(
 def reproduction() -> Reproduction:
     """All figures and claims of the paper on its own machine."""
     return ff.reproduce()
+
+
+@pytest.fixture(scope="session")
+def analysed() -> Callable[..., Assessment]:
+    """``analysed(project, **options)``: each project, or bundled machine, once a session."""
+    known: dict[bytes, Assessment] = {}
+
+    def found(project: Project | str, **options: object) -> Assessment:
+        if isinstance(project, str):
+            project = ff.load_project(project)
+        key = pickle.dumps((project, sorted(options.items())))
+        if key not in known:
+            known[key] = assess(project, **options)
+        return known[key]
+
+    return found
+
+
+@pytest.fixture(scope="session")
+def thirty_cases(analysed: Callable[..., Assessment]) -> Assessment:
+    """FFS0827 under thirty load cases."""
+    loads = tuple(
+        ff.Load(name=f"Fall {k + 1}: Steifigkeit", stiffness_factor=1.0 + 0.01 * k)
+        for k in range(30)
+    )
+    return analysed(dataclasses.replace(ff.load_project("ffs0827"), load_cases=loads))
+
+
+@pytest.fixture(scope="module")
+def analysed_once(analysed: Callable[..., Assessment]) -> Iterator[None]:
+    """Commands and comparisons take analyses from ``analysed``: what they do with them counts."""
+
+    def known(project: Project, *, monitor: object = None, **options: object) -> Assessment:  # noqa: ARG001
+        return analysed(project, **options)
+
+    with pytest.MonkeyPatch.context() as patched:
+        for room in ("assessment", "compare"):
+            patched.setattr(f"flipflow.studies.{room}.assess", known)
+        yield

@@ -186,7 +186,10 @@ def test_value(run, tmp_path, name):
 @pytest.mark.parametrize("name", SLIPS)
 def test_force_lets_slips_through_with_a_warning(run, tmp_path, name):
     old, new, _ = VALUES[name]
-    (tmp_path / "machine.toml").write_text(changed(old, new), encoding="utf-8")
+    text, case, _ = changed(old, new).partition("[[load_cases]]")
+    if name == "Hz for rpm":  # trying blows upon a machine with stops takes long at 51,000 rpm
+        text = re.sub(r"\[stops\][^\n]*\n[^[]*", "", text)
+    (tmp_path / "machine.toml").write_text(f'{text}{case}\nname = "empty"\n', encoding="utf-8")
     code, out, err = run("machine.toml", "--force")
     assert code == 0, err
     assert "looks wrong" in re.sub(r"\s+", " ", out + err)

@@ -89,10 +89,11 @@ def test_the_ends_of_the_allowed_range_name_their_case(project):
     assert words.endswith("(w_lb, empty machine).")
 
 
-def test_a_case_called_case_has_the_word_once(project):
+@pytest.mark.usefixtures("analysed_once")
+def test_a_case_called_case_has_the_word_once(project, analysed):
     """Fault seen in a report: "case case 29"."""
     loads = tuple(ff.Load(name=f"case {k}", stiffness_factor=1.0 + 0.1 * k) for k in range(28, 31))
-    found = ff.assess(dataclasses.replace(project, load_cases=loads))
+    found = analysed(dataclasses.replace(project, load_cases=loads))
     page = html(found)
     assert "(case 28)" in page
     assert not re.search("case case", page, re.IGNORECASE)

@@ -94,11 +94,12 @@ def named(row: Any) -> tuple[str, str] | None:
 
 
 LINEAR = "ffs0827-linear"
+SMALL = str(Path(__file__).parents[1] / "machines" / "small.toml")
 COMMANDS = {
-    "analyze": (Assessment, LINEAR, "--speeds", "800 rpm", "802 rpm"),
+    "analyze": (Assessment, SMALL, "--speeds", "800 rpm", "802 rpm"),
     "basins": (Basins, LINEAR, "--cells", "2"),
     "check": (Check, LINEAR),
-    "compare": (Comparison, LINEAR, LINEAR, "--speed", "800 rpm"),
+    "compare": (Comparison, SMALL, SMALL, "--speed", "800 rpm"),
     "design": (Proposal, "duty.toml", "--generations", "1"),
     "orbits": (tuple, LINEAR, "--max-periods", "1"),
     "reproduce": (Reproduction, "1"),

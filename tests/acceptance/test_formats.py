@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import openpyxl
 import pytest
@@ -36,6 +37,7 @@ PRINTING = (
 )  # fmt: skip
 MACHINES = ("bundled", "thirty cases", "no allowed speed", "long german names")
 PAPERS = {"a4": (595.3, 841.9), "letter": (612.0, 792.0)}  # points
+SMALL = str(Path(__file__).parents[1] / "machines" / "small.toml")
 FULL = 1.0 / 3.0  # of a page's height that every page but the last fills
 FOOTER = 0.965  # of a page's height, below which the foot of every page stands
 # Boxes of words hold more than their ink: so far they may reach into one another.
@@ -51,11 +53,6 @@ HOSTILE = ("=cmd|' /C calc'!A0", "+1", "-2+3", "@SUM(A1)", '=HYPERLINK("http://x
 
 def _project(kind):
     project = ff.load_project("ffs0827")
-    if kind == "thirty cases":
-        loads = tuple(
-            ff.Load(name=f"half full {k}", stiffness_factor=1.0 + 0.01 * k) for k in range(30)
-        )
-        return dataclasses.replace(project, load_cases=loads)
     if kind == "no allowed speed":
         narrow = dataclasses.replace(project.limits, relative_amplitude=(7.8e-3, 8e-3))
         return dataclasses.replace(project, limits=narrow)
@@ -76,9 +73,14 @@ def _project(kind):
 
 
 @pytest.fixture(scope="module")
-def assessed():
+def assessed(analysed, request):
     """``assessed("bundled")``: one of the machines of this module, judged once."""
-    return functools.cache(lambda kind: ff.assess(_project(kind)))
+
+    def found(kind):
+        many = kind == "thirty cases"
+        return request.getfixturevalue("thirty_cases") if many else analysed(_project(kind))
+
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +259,7 @@ def test_paper_and_missing_extras_are_said(assessed, monkeypatch, command, tmp_p
 
 def test_analyze_writes_what_is_asked_for(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    words = ("analyze", "ffs0827-linear", "--speeds", "800 rpm", "900 rpm", "-o", "out")
+    words = ("analyze", SMALL, "--speeds", "800 rpm", "900 rpm", "-o", "out")
     code, out, err = command(*words, "--paper", "letter", "--tables")
     assert code == 0, err
     assert (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF-")
@@ -275,9 +277,19 @@ def opened(content):
     return {sheet.title: [[cell.value for cell in row] for row in sheet] for sheet in book}
 
 
-def test_every_table_is_a_sheet_and_numbers_are_numbers(assessed):
+@pytest.fixture(scope="module")
+def sheets(assessed):
+    """The tables of the bundled machine."""
+    return opened(table_files(assessed("bundled"))["tables.xlsx"])
+
+
+@pytest.fixture(scope="module")
+def hostile_files(hostile):
+    return table_files(hostile)
+
+
+def test_every_table_is_a_sheet_and_numbers_are_numbers(assessed, sheets):
     found = assessed("bundled")
-    sheets = opened(table_files(found)["tables.xlsx"])
     tables = [block for block in blocks_of(found) if isinstance(block, Table)]
     assert len(sheets) == len(tables) + 2  # the report's head, and the response
     head, first, *_ = limits = sheets["Limit"]
@@ -301,9 +313,9 @@ def test_every_table_is_a_sheet_and_numbers_are_numbers(assessed):
                     assert not re.fullmatch(r"[-+\d. e]+( \S+)?", value), (name, title, value)
 
 
-def test_the_response_has_g_and_forces_in_the_units_of_the_file(assessed):
+def test_the_response_has_g_and_forces_in_the_units_of_the_file(assessed, sheets):
     found = assessed("bundled")
-    head, *rows = opened(table_files(found)["tables.xlsx"])["Response over speed"]
+    head, *rows = sheets["Response over speed"]
     assert {"Speed [rpm]", "Relative amplitude [mm]", "Main frame acceleration [g]",
             "Stop force [kN]", "Foundation force [kN]"} <= set(head)  # fmt: skip
     case = found.cases[0]
@@ -319,15 +331,14 @@ def test_the_response_has_g_and_forces_in_the_units_of_the_file(assessed):
     assert own[k]["Foundation force [kN]"] == pytest.approx(3.91, rel=0.02)
 
 
-def test_no_formula_comes_from_a_text(hostile):
-    files = table_files(hostile)
-    book = openpyxl.load_workbook(io.BytesIO(files["tables.xlsx"]))
+def test_no_formula_comes_from_a_text(hostile_files):
+    book = openpyxl.load_workbook(io.BytesIO(hostile_files["tables.xlsx"]))
     kinds = {cell.data_type for sheet in book for row in sheet for cell in row}
     assert "f" not in kinds
     names = {row[0].value for row in book["Load case"].iter_rows(min_row=2)}
     assert names == set(HOSTILE)
     assert all(row[0].quotePrefix for row in book["Load case"].iter_rows(min_row=2))
-    for name, text in files.items():
+    for name, text in hostile_files.items():
         if name.endswith(".csv"):
             for row in csv.reader(io.StringIO(text)):
                 for cell in row:
@@ -345,8 +356,8 @@ def test_the_response_beside_the_report_has_no_formula(hostile, tmp_path):
 
 
 @pytest.mark.skipif(OFFICE is None, reason="LibreOffice is not installed")
-def test_libreoffice_opens_the_tables(hostile, tmp_path):
-    (tmp_path / "tables.xlsx").write_bytes(table_files(hostile)["tables.xlsx"])
+def test_libreoffice_opens_the_tables(hostile_files, tmp_path):
+    (tmp_path / "tables.xlsx").write_bytes(hostile_files["tables.xlsx"])
     subprocess.run(
         [OFFICE, "--headless", f"-env:UserInstallation=file://{tmp_path / 'profile'}",
          "--convert-to", "xlsx:Calc MS Excel 2007 XML", "--outdir", tmp_path / "again",

@@ -272,8 +272,8 @@ def test_only_screens_have_a_foundation(linear) -> None:
 
 
 @pytest.fixture(scope="module")
-def assessment():
-    return ff.assess(ff.load_project("ffs0827"))
+def assessment(analysed):
+    return analysed("ffs0827")
 
 
 def test_one_sentence_on_page_1_in_the_terminal_and_in_the_document(assessment) -> None:

@@ -44,16 +44,6 @@ def odd(project):
     return assess(dataclasses.replace(project, load_cases=loads))
 
 
-@pytest.fixture(scope="module")
-def many(project):
-    """Thirty load cases."""
-    loads = tuple(
-        ff.Load(name=f"Fall {k + 1}: Steifigkeit", stiffness_factor=1.0 + 0.01 * k)
-        for k in range(30)
-    )
-    return assess(dataclasses.replace(project, load_cases=loads))
-
-
 def figures_of(assessment):
     return [b.figure for b in blocks_of(assessment) if isinstance(b, FigureBlock)]
 
@@ -102,16 +92,16 @@ def test_long_names_that_begin_alike_stay_apart():
     assert len(set(case_names(names))) == 3
 
 
-def test_every_figure_of_many_cases_fits_a_page(many):
-    for figure in figures_of(many):
+def test_every_figure_of_many_cases_fits_a_page(thirty_cases):
+    for figure in figures_of(thirty_cases):
         assert figure.height < SHEET - 60, figure.title
-    orbits = [f for f in figures_of(many) if f.title.startswith("Orbits of both frames")]
+    orbits = [f for f in figures_of(thirty_cases) if f.title.startswith("Orbits of both frames")]
     shown = [panel.title for figure in orbits for panel in figure.panels if panel.equal]
-    assert [title for title in shown if title] == [case.name for case in many.cases]
+    assert [title for title in shown if title] == [case.name for case in thirty_cases.cases]
 
 
-def test_the_model_limits_stand_on_the_back_of_the_first_page(odd, many):
-    for assessment in (odd, many):
+def test_the_model_limits_stand_on_the_back_of_the_first_page(odd, thirty_cases):
+    for assessment in (odd, thirty_cases):
         blocks = blocks_of(assessment)
         first = next(k for k, b in enumerate(blocks) if isinstance(b, Heading) and b.new_page)
         paragraph = blocks[first + 1]
@@ -134,8 +124,8 @@ def test_values_without_a_source_are_one_line(project):
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None or READER is None, reason="chromium or pdftotext is missing")
-def test_thirty_cases_stand_on_fewer_than_thirty_pages(many, tmp_path):
-    pages = printed_pages(many, tmp_path)
+def test_thirty_cases_stand_on_fewer_than_thirty_pages(thirty_cases, tmp_path):
+    pages = printed_pages(thirty_cases, tmp_path)
     assert len(pages) < 30
     for page in pages[:-1]:
         assert len(page.split()) > 40
@@ -145,9 +135,10 @@ def test_thirty_cases_stand_on_fewer_than_thirty_pages(many, tmp_path):
 @pytest.mark.skipif(CHROMIUM is None or READER is None, reason="chromium or pdftotext is missing")
 @pytest.mark.parametrize("count", [1, 4])
 @pytest.mark.parametrize("name", ["FFS0827", "Spannwellensiebmaschine für Rostasche, " + LONG])
-def test_a_long_title_block_leaves_no_page_of_five_lines(project, tmp_path, count, name):
+def test_a_long_title_block_leaves_no_page_of_five_lines(project, analysed, tmp_path, count, name):
     document = dataclasses.replace(project.document, customer=CUSTOMER, name=name)
-    changed = dataclasses.replace(project, document=document, load_cases=project.load_cases[:count])
-    _, second, *_ = printed_pages(assess(changed), tmp_path)
+    found = analysed(dataclasses.replace(project, load_cases=project.load_cases[:count]))
+    changed = dataclasses.replace(found.project, document=document)
+    _, second, *_ = printed_pages(dataclasses.replace(found, project=changed), tmp_path)
     assert len(second.split()) > 150
     assert "Model limits" in second

@@ -174,8 +174,8 @@ def test_rubber_is_as_warm_as_its_own_work_keeps_it(warm) -> None:
     assert f"20.0 degC is the air&#39;s temperature; the rubber settles at {rubber:.1f}" in page
 
 
-def test_a_temperature_of_the_rubber_stays_what_it_is() -> None:
-    found = ff.assess(ff.load_project("ffs0827"))
+def test_a_temperature_of_the_rubber_stays_what_it_is(analysed) -> None:
+    found = analysed("ffs0827")
     hot = next(one for one in found.cases if one.name == "hot")
     assert hot.load.temperature == 50.0
     assert "50.0 degC is the rubber&#39;s temperature" in html(found)
@@ -219,13 +219,13 @@ def test_a_file_without_the_table_of_stops_leaves_them_alone() -> None:
     assert screen.loaded(ff.Load(temperature=50.0)).stop_stiffness == screen.stop_stiffness
 
 
-def test_check_promises_what_analyze_prints() -> None:
+def test_check_promises_what_analyze_prints(analysed) -> None:
     """Force and power of one shear spring: missing with the pieces, there with them."""
     project = ff.load_project("ffs0827")
     bare = dataclasses.replace(project, screen=project.screen.replace(shear_pieces=None))
     gaps = {gap.missing: gap.disables for gap in check_project(bare).missing}
     assert "force per shear spring, power per shear spring" in gaps["shear_springs.pieces"]
-    page = html(ff.assess(project))
+    page = html(analysed(project))
     parts = page.split("<h3>Parts</h3>")[1].split("</section>")[0]
     for words in ("Force per shear spring", "Power per shear spring", "Temperature rise",
                   "Approach speed", "Load per exciter bearing", "ISO 281",

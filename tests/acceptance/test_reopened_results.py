@@ -47,6 +47,7 @@ from flipflow.transient.history import History
 from flipflow.transient.startup import Peak, RunUp
 from flipflow.transient.sweep import Sweep
 
+SMALL = Path(__file__).parents[1] / "machines" / "small.toml"
 NOT_RESULTS = {ff.FlipFlowScreen, ff.Project, ff.Duty, Figure}
 DRIVE = ff.Drive(inertia=0.9, motor=ff.Motor(synchronous_speed=157.0, rated_power=5500.0))
 
@@ -151,7 +152,7 @@ MADE: dict[type, list[Callable[[], object]]] = {
         lambda: ff.start_up(screen(), DRIVE, duration=0.5),
         lambda: ff.coast_down(screen(), 80.0, ff.SpeedProfile((0.0, 0.4), (80.0, 60.0))),
     ],
-    Comparison: [lambda: ff.compare(["ffs0827-linear", "ffs0827-linear"])],
+    Comparison: [lambda: ff.compare([SMALL, SMALL])],
     FoundationLoads: [
         lambda: ff.foundation_loads(
             {"empty": response().orbits_at(203.0)[0]},
@@ -353,9 +354,7 @@ def test_a_file_that_is_no_result_says_so(tmp_path, content, words):
 
 
 def test_a_summary_of_the_command_line_says_what_opens_again(tmp_path):
-    assessment = ff.assess(
-        dataclasses.replace(ff.load_project("ffs0827"), speed=None), omega=(85.0, 90.0)
-    )
+    assessment = ff.assess(ff.load_project(SMALL))
     for name, document in (
         ("assessment", {"schema": "flipflow/assessment/1", **read_off(assessment)}),
         ("claims", ff.reproduce(figures=("1",)).document()),

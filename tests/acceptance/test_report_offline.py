@@ -18,7 +18,6 @@ import flipflow as ff
 from flipflow.report.blocks import FigureBlock
 from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
-from flipflow.studies.assessment import assess
 
 CHROMIUM = shutil.which("chromium")
 pytestmark = [
@@ -36,8 +35,8 @@ NO_PAGE = "not an origin"  # who asks, when the browser does so for itself
 
 
 @pytest.fixture(scope="module")
-def assessment():
-    return assess(ff.load_project("ffs0827"))
+def assessment(analysed):
+    return analysed("ffs0827")
 
 
 @pytest.fixture(scope="module")
@@ -92,13 +91,13 @@ def test_nothing_is_asked_for(opened):
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils is not installed")
 @pytest.mark.parametrize("count", [1, 4, 8])
-def test_the_first_page_is_one_page(tmp_path, count):
+def test_the_first_page_is_one_page(analysed, tmp_path, count):
     """Printed on A4, page 1 ends with its last line however many load cases there are."""
     project = ff.load_project("ffs0827")
     more = (ff.Load(name=f"half full {k}", stiffness_factor=1.0 + 0.01 * k) for k in range(16))
     loads = (*project.load_cases, *more)[:count]
     report = tmp_path / "report.html"
-    assessed = assess(dataclasses.replace(project, load_cases=loads))
+    assessed = analysed(dataclasses.replace(project, load_cases=loads))
     report.write_text(html(assessed), encoding="utf-8")
     first, second = (" ".join(page.split()) for page in pages(report, tmp_path)[:2])
     assert "Power, throw dissipated power" in first
@@ -108,11 +107,10 @@ def test_the_first_page_is_one_page(tmp_path, count):
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils is not installed")
 @pytest.mark.parametrize("machine", ["ffs0827", "ffs0827-linear", "rig-lin2024"])
-def test_printed_pages_are_filled(tmp_path, machine, assessment):
+def test_printed_pages_are_filled(analysed, tmp_path, machine):
     """A figure that does not fit leaves a hole, but no page ends in its upper part."""
     report = tmp_path / "report.html"
-    assessed = assessment if machine == "ffs0827" else assess(ff.load_project(machine))
-    report.write_text(html(assessed), encoding="utf-8")
+    report.write_text(html(analysed(machine)), encoding="utf-8")
     ends = [lowest(page) for page in printed(report, tmp_path, "-bbox").split("</page>")[:-1]]
     assert len(ends) > 5
     assert min(ends[:-1]) > FILLED, ends

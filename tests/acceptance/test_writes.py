@@ -21,7 +21,9 @@ from flipflow.errors import Cancelled, StoreError
 from flipflow.results import stage
 from flipflow.results.stage import Stage
 
-QUICK = ("ffs0827-linear", "--speeds", "800 rpm", "900 rpm")
+# Linear, of one load case and one limit: for what is written, not for what is found.
+SMALL = str(Path(__file__).parents[1] / "machines" / "small.toml")
+QUICK = (SMALL, "--speeds", "800 rpm", "900 rpm")
 KILLS = 12
 # Writes the set of one folder, then that of the other, again and again, as a command does.
 WRITER = """
@@ -311,8 +313,8 @@ def test_another_report_is_not_overwritten(command, tmp_path):
     def analyzed(*words):
         return command("analyze", *words, "-o", "out")
 
-    command("new", "own.toml")
-    own = (tmp_path / "own.toml").read_text(encoding="utf-8")
+    own = Path(SMALL).read_text(encoding="utf-8").replace('customer = ""', 'customer = "Another"')
+    (tmp_path / "own.toml").write_text(own, encoding="utf-8")
     assert analyzed(*QUICK, "--tables")[0] == 0
     before = content(tmp_path / "out")
     assert analyzed(*QUICK)[0] == 0  # the same input and options

@@ -1,11 +1,12 @@
 """A screen with its shaft by SciPy's DOP853: frames, normal direction, motor, friction, gravity.
 
-Written from the equations alone, with one mass matrix for all four coordinates (x1, xf, y, phi);
-the paper's stop law, whose changes end a stretch of integration.
+Written from the equations alone, solved for the accelerations of (x1, xf, y, phi) by hand; the
+paper's stop law, whose changes end a stretch of integration.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -59,25 +60,21 @@ def run(
     def stop_force(side: int, s: Real) -> float:
         return side and k3 * (s[0] - s[1] - side * gap) + c3 * (s[4] - s[5])
 
-    def rate(t: float, s: Real, side: int) -> Real:
-        x1, xf, y, phi, v1, vf, vy, w = s
-        H = stop_force(side, s)
-        cos, sin = np.cos(phi), np.sin(phi)
-        M = np.array([
-            [m1, 0.0, 0.0, -m0r * sin],
-            [0.0, m2, 0.0, 0.0],
-            [0.0, 0.0, m1 + m2, m0r * cos],
-            [-m0r * sin, 0.0, m0r * cos, drive.inertia],
-        ])  # fmt: skip
-        shear = k2 * (x1 - xf) + c2 * (v1 - vf) + H
-        friction = drive.friction * np.tanh(w / CREEP) + drive.viscous_friction * w
-        f = np.array([
-            m0r * w * w * cos - k1 * x1 - c1 * v1 - shear,
-            shear,
-            m0r * w * w * sin - kn * y - cn * vy,
-            torque(t, w) - friction - m0r * GRAVITY * np.cos(phi + alpha),
-        ])  # fmt: skip
-        return np.concatenate([s[4:], np.linalg.solve(M, f)])
+    def rate(t: float, s: Real, side: int) -> list[float]:
+        x1, xf, y, phi, v1, vf, vy, w = s.tolist()
+        cos, sin = math.cos(phi), math.sin(phi)
+        stop = side and k3 * (x1 - xf - side * gap) + c3 * (v1 - vf)
+        shear = k2 * (x1 - xf) + c2 * (v1 - vf) + stop
+        friction = drive.friction * math.tanh(w / CREEP) + drive.viscous_friction * w
+        f1 = m0r * w * w * cos - k1 * x1 - c1 * v1 - shear
+        fy = m0r * w * w * sin - kn * y - cn * vy
+        turn = torque(t, w) - friction - m0r * GRAVITY * math.cos(phi + alpha)
+        # The rows m1 x1'' - m0r sin phi'' = f1 and (m1 + m2) y'' + m0r cos phi'' = fy put into
+        # J phi'' - m0r sin x1'' + m0r cos y'' = turn.
+        inertia = drive.inertia - (m0r * sin) ** 2 / m1 - (m0r * cos) ** 2 / (m1 + m2)
+        dw = (turn + m0r * sin * f1 / m1 - m0r * cos * fy / (m1 + m2)) / inertia
+        dv1, dvy = (f1 + m0r * sin * dw) / m1, (fy - m0r * cos * dw) / (m1 + m2)
+        return [v1, vf, vy, w, dv1, shear / m2, dvy, dw]
 
     def crossing(_t: float, s: Real, side: int) -> float:
         x2 = s[0] - s[1]

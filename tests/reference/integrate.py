@@ -1,8 +1,8 @@
 """Event-located integration of M x'' + C x' + K x + sum d H = f + sum Re(F exp(i n w t)) by DOP853.
 
-Between contacts the machine is linear, but nothing here makes use of that: every smooth piece is
-handed to scipy, which stops at the first event. The contact of a stop is a state machine, with p
-how far beyond the gap:
+Between contacts the machine is linear, which nothing here makes use of but the right side, a matrix
+and a force: every smooth piece is handed to scipy, which stops at the first event. The contact of a
+stop is a state machine, with p how far beyond the gap:
 
     OPEN      y within the gaps, no force
     ENGAGED   k p + c p'
@@ -75,11 +75,10 @@ class Stop:
             return self.push(x, v)
         return self.stiffness * self.depth(x) - self.damping * self.rate(v)
 
-    def force_in(self, state: str, x: np.ndarray, v: np.ndarray) -> float:
-        """Force against the motion in a state."""
-        if state == ENGAGED:
-            return self.push(x, v)
-        return {OUTWARDS: 1.0, DOUBLED: 2.0}.get(state, 0.0) * self.stiffness * self.depth(x)
+    def acting(self, state: str) -> tuple[float, float]:
+        """Stiffness and damping that act in a state."""
+        share = {ENGAGED: 1.0, OUTWARDS: 1.0, DOUBLED: 2.0}.get(state, 0.0)
+        return share * self.stiffness, self.damping if state == ENGAGED else 0.0
 
     def state_at(self, x: np.ndarray, v: np.ndarray) -> str:
         """State as position and push say."""
@@ -122,20 +121,16 @@ class Machine:
         static = np.zeros(system.size) if system.static_force is None else system.static_force
         return cls(system.M, system.C, system.K, stops, excitations, static)
 
-    def force(self, omega: float, t: float) -> np.ndarray:
-        """All that acts from outside at time t."""
-        total = self.static.copy()
-        for one in self.excitations:
-            speed = one.order * omega
-            turn = np.exp(1j * speed * t)
+    def forces(self, omega: float) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes (m, N) and speeds (m,) of what acts from outside, sum Re(F exp(i w t))."""
+        speeds = np.array([one.order * omega for one in self.excitations])
+        rows = []
+        for one, speed in zip(self.excitations, speeds, strict=True):
             if isinstance(one, MovingBase):
-                place = (one.displacement * turn).real
-                rate = (1j * speed * one.displacement * turn).real
-                total += one.stiffness * place + one.damping * rate
+                rows.append((one.stiffness + 1j * speed * one.damping) * one.displacement)
             else:
-                grown = speed**2 if isinstance(one, Unbalance) else 1.0
-                total += (one.vector * turn).real * grown
-        return total
+                rows.append(one.vector * (speed**2 if isinstance(one, Unbalance) else 1.0))
+        return np.array(rows, complex), speeds
 
 
 @dataclass(frozen=True)
@@ -239,17 +234,24 @@ def top(t: np.ndarray, y: np.ndarray, trajectory: Trajectory, vector: np.ndarray
 def right_side(
     machine: Machine, states: list[str], omega: float
 ) -> Callable[[float, np.ndarray], np.ndarray]:
-    """z' with the stops that are engaged now."""
+    """z' = A z + b + Re(F exp(i w t)) with the stops that are engaged now."""
     n = machine.M.shape[0]
-    touched = [pair for pair in zip(machine.stops, states, strict=True) if pair[1] != OPEN]
+    K, C, constant = machine.K.copy(), machine.C.copy(), machine.static.copy()
+    for stop, state in zip(machine.stops, states, strict=True):
+        stiffness, damping = stop.acting(state)
+        square = np.outer(stop.direction, stop.direction)
+        K += stiffness * square
+        C += damping * square
+        constant += stop.side * stiffness * stop.gap * stop.direction
     inverse = np.linalg.inv(machine.M)
+    A, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
+    A[:n, n:] = np.eye(n)
+    A[n:, :n], A[n:, n:], b[n:] = -inverse @ K, -inverse @ C, inverse @ constant
+    forces, speeds = machine.forces(omega)
+    F, turning = np.hstack([np.zeros_like(forces), forces @ inverse.T]), 1j * speeds
 
     def rate(t: float, z: np.ndarray) -> np.ndarray:
-        x, v = z[:n], z[n:]
-        total = machine.force(omega, t) - machine.C @ v - machine.K @ x
-        for stop, state in touched:
-            total = total - stop.side * stop.force_in(state, x, v) * stop.direction
-        return np.concatenate([v, inverse @ total])
+        return A @ z + b + (np.exp(turning * t) @ F).real
 
     return rate
 

@@ -35,8 +35,8 @@ from flipflow.studies.assessment import assess
 
 
 @pytest.fixture(scope="module")
-def assessment():
-    return assess(ff.load_project("ffs0827"))
+def assessment(analysed):
+    return analysed("ffs0827")
 
 
 @pytest.fixture(scope="module")
@@ -198,13 +198,13 @@ def test_band_holds_every_case_at_the_working_speed(assessment):
 
 
 @pytest.fixture(scope="module")
-def linear():
-    return assess(ff.load_project("ffs0827-linear"))
+def linear(analysed):
+    return analysed("ffs0827-linear")
 
 
 @pytest.fixture(scope="module")
-def rig():
-    return assess(ff.load_project("rig-lin2024"))
+def rig(analysed):
+    return analysed("rig-lin2024")
 
 
 def test_energy_bars_add_up_to_what_is_fed_in(assessment):

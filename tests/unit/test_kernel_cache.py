@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import compileall
+import functools
+import json
 import os
 import shutil
 import subprocess
 import sys
 import time
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -33,6 +36,25 @@ READ_ONLY = (
     "tiny.folders._write_whole = refuse\n"
 )
 UNTRIED = "import numba; numba.__version__ = '0.999.0'\n"
+# Has used numba and loaded none of our modules. A child runs each request, until it ends itself.
+FORKING = """
+import json, os, sys
+import numba; numba.njit(lambda x: x)(1.0)
+for request in sys.stdin:
+    child = os.fork()
+    if not child:
+        break
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+else:
+    sys.exit()
+asked = json.loads(request)
+os.chdir(asked["folder"])
+for stream, name in ((1, "stdout"), (2, "stderr")):
+    os.dup2(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
+os.environ.update(asked["environment"])
+sys.path.insert(0, asked["environment"]["PYTHONPATH"])
+exec(asked["code"])
+"""
 
 
 @pytest.fixture
@@ -55,13 +77,40 @@ def cache(tmp_path: Path) -> Path:
     return tmp_path / "cache"
 
 
-def python(path: Path, code: str, cache: Path, **environment: str) -> subprocess.CompletedProcess:
-    """A fresh process that finds ``tiny`` in a folder or an archive."""
-    return subprocess.run(
-        [sys.executable, "-c", code], cwd=cache.parent, capture_output=True, text=True,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(path),
-             "FLIPFLOW_CACHE_DIR": str(cache), **environment}, check=False,
+@functools.cache
+def forking() -> subprocess.Popen:
+    """Ends with its standard input, at the latest with this process."""
+    return subprocess.Popen(
+        [sys.executable, "-c", FORKING], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
     )  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forking_ends() -> Iterator[None]:
+    yield
+    if forking.cache_info().currsize:
+        with forking():
+            forking.cache_clear()
+
+
+def python(path: Path, code: str, cache: Path, **environment: str) -> subprocess.CompletedProcess:
+    """A new process that finds ``tiny`` in a folder or an archive.
+
+    Settings of numba need one that has not loaded it; loading it takes longer than all else.
+    """
+    ours = {"PYTHONPATH": str(path), "FLIPFLOW_CACHE_DIR": str(cache)}
+    if environment or not hasattr(os, "fork"):
+        return subprocess.run(
+            [sys.executable, "-c", code], cwd=cache.parent, capture_output=True, text=True,
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **ours, **environment}, check=False,
+        )  # fmt: skip
+    request = {"folder": str(cache.parent), "environment": ours, "code": code}
+    forking().stdin.write(json.dumps(request) + "\n")
+    forking().stdin.flush()
+    ended = int(forking().stdout.readline())
+    told = ((cache.parent / name).read_text() for name in ("stdout", "stderr"))
+    return subprocess.CompletedProcess(code, ended, *told)
 
 
 def run(path: Path, cache: Path, before: str = "", **environment: str) -> tuple[float, int, str]:
@@ -277,7 +326,7 @@ def test_one_set_of_options(package: Path, cache: Path) -> None:
         "from tiny.outer import answer; answer(2.0)\n"
         "assert levels == {0, 1}, levels\nassert config.OPT == {}\n"
     )
-    assert run(package.parent, cache, spy.replace("{}", "3"))[:2] == (7.0, 0)
+    assert run(package.parent, cache, spy.replace("{}", "3"), NUMBA_OPT="3")[:2] == (7.0, 0)
     assert run(package.parent, cache, spy.replace("{}", "2"), NUMBA_OPT="2")[:2] == (7.0, 0)
     assert run(package.parent, cache)[:2] == (7.0, 1)
 

@@ -43,8 +43,8 @@ def project():
 
 
 @pytest.fixture(scope="module")
-def assessment(project):
-    return assess(project)
+def assessment(analysed):
+    return analysed("ffs0827")
 
 
 @pytest.fixture(scope="module")
@@ -137,8 +137,8 @@ def test_a_stop_that_is_not_reached_is_said(assessment):
     assert first_page.stop_sentence(assessment).startswith("not reached in full, stiffening")
 
 
-def test_a_machine_without_stops_says_so():
-    linear = assess(ff.load_project("ffs0827-linear"))
+def test_a_machine_without_stops_says_so(analysed):
+    linear = analysed("ffs0827-linear")
     assert first_page.stop_sentence(linear) == "the machine has none."
     assert first_page.verdict_state(linear) == "fail"
     assert "none; no speed meets all limits" in allowed_range(linear.region)

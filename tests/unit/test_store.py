@@ -20,11 +20,12 @@ from flipflow.results.store import write_file
 from flipflow.studies.assessment import Assessment
 
 SOURCE = Path(results.__file__).parents[1]
+SMALL = Path(__file__).parents[1] / "machines" / "small.toml"
 
 
 @pytest.fixture(scope="module")
 def assessment() -> Assessment:
-    return ff.assess(ff.load_project("ffs0827-linear"), omega=(85.0, 90.0))
+    return ff.assess(ff.load_project(SMALL), omega=(85.0, 90.0))
 
 
 @pytest.fixture(scope="module")
