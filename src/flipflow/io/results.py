@@ -95,6 +95,7 @@ DAMAGE = (
     RecursionError, MemoryError,
 )  # fmt: skip
 MOST_SHOWN = 400  # characters of what is wrong
+SCHEMA_SHOWN = 60  # characters of a schema that is not known
 
 
 def save(result: object, path: str | os.PathLike[str]) -> None:
@@ -170,10 +171,10 @@ def _shown(error: Exception) -> str:
     return _line(told) or type(error).__name__
 
 
-def _line(text: str) -> str:
+def _line(text: str, most: int = MOST_SHOWN) -> str:
     """A text on one line, shortened."""
     line = " ".join(text.split())
-    return line if len(line) <= MOST_SHOWN else f"{line[: MOST_SHOWN - 3]}..."
+    return line if len(line) <= most else f"{line[: most - 3]}..."
 
 
 def _is_file(path: Path) -> bool:
@@ -231,7 +232,8 @@ def opener(schema: str) -> Callable[[Document], object]:
         return lambda document: CODEC.form(tuple[Orbit, ...]).read(document["orbits"])
     kinds = {known: kind for kind, known in SCHEMAS.items()}
     if schema not in kinds:
-        told = f"{_line(schema)!r} is no result that opens again; update flipflow if it is newer"
+        shown = repr(_line(schema, SCHEMA_SHOWN))
+        told = f"{shown} is no result that opens again; update flipflow if it is newer"
         raise StoreError(told)
     kind = kinds[schema]
     read = CODEC.form(kind).read
