@@ -174,26 +174,26 @@ def test_a_quasi_periodic_motion():
     assert swept.words == ("quasi-periodic",)
 
 
-def test_two_trajectories_part_as_the_largest_exponent_says():
-    """The impact oscillator at 0.905: two runs of DOP853 with events, pulled together each turn."""
-    machine, omega, apart, turns = impact_oscillator(), 0.905, 1e-7, 150
-    found = ff.lyapunov_exponents(machine, omega, periods=16384)
-    assert found.word == "chaotic"
+@pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, -0.3), (0.3, 1.0)])
+def test_two_trajectories_part_as_the_largest_exponent_says(start):
+    """The impact oscillator at 0.905: two runs of DOP853 with events, pulled together each turn.
+
+    Over so few turns that rounding has not grown to what is compared.
+    """
+    machine, omega, apart, turns = impact_oscillator(), 0.905, 1e-7, 32
+    found = ff.lyapunov_exponents(machine, omega, initial=start, periods=turns, skip=0)
     reference, turn = integrate.Machine.of(machine), 2.0 * math.pi / omega
-    z = found.state
-    other, growth = z + np.array([apart, 0.0]), np.empty(turns)
-    for k in range(turns):
+    z, growth = np.array(start), 0.0
+    other = z + np.array([apart, 0.0])
+    for _ in range(turns):
         z, other = (
             integrate.flow(reference, one, omega, 0.0, turn, rtol=1e-9).final for one in (z, other)
         )
         away = other - z
         size = math.hypot(away[0], away[1] / omega)
-        growth[k] = math.log(size / apart) / turn
+        growth += math.log(size / apart)
         other = z + away * apart / size
-    batches = growth.reshape(15, -1).mean(axis=1)
-    error = math.hypot(batches.std(ddof=1) / math.sqrt(15), found.standard_error[0])
-    close("largest exponent", growth.mean(), found.exponents[0], abs=ERRORS * error)
-    assert growth.mean() > ERRORS * error
+    close("largest exponent", growth / (turns * turn), found.exponents[0], rel=1e-4)
 
 
 def test_standard_errors_cover_what_runs_from_elsewhere_find(screen):

@@ -10,10 +10,7 @@ import itertools
 import json
 import math
 import re
-import signal
-import subprocess
 import sys
-import time
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -292,25 +289,6 @@ def test_unknown_figure_is_one_sentence_that_names_the_known(monkeypatch, capsys
     assert not list(tmp_path.iterdir())
 
 
-def test_interrupt_ends_with_130(tmp_path):
-    command = [sys.executable, "-m", "flipflow.cli.main", "reproduce", "-o", str(tmp_path / "out")]
-    started = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
-    deadline = time.monotonic() + 60.0
-    while not (tmp_path / "out").exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(0.5)
-    started.send_signal(signal.SIGINT)
-    _, error = started.communicate(timeout=60.0)
-    assert started.returncode == 130
-    assert b"Traceback" not in error
-
-
-@pytest.mark.parametrize(
-    ("vary", "word"),
-    [({}, "one field"), ({"clearance": [1e-3], "main_mass": [9e2]}, "one field"),
-     ({"colour": [1.0]}, "colour"), ({"clearance": []}, "list of values"),
-     ({"clearance": [-1e-3]}, "clearance")],
-)  # fmt: skip
 def test_bad_families_are_refused(screen, vary, word):
     with pytest.raises(InputError, match=word):
         ff.response_family(screen, vary)

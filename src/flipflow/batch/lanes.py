@@ -6,14 +6,13 @@ chunk has finished is kept whatever happens to the others.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.batch.side_by_side import side_by_side
+from flipflow.batch.side_by_side import processors, side_by_side
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_arrays
@@ -106,7 +105,7 @@ class Lanes:
             raise InputError("threads", threads, f"give a whole number from 1 to {MOST_THREADS}")
         self.machine = machine_arrays(system.with_bonded())
         self.omega = float(omega)
-        self.threads = threads or _processors()
+        self.threads = threads or processors()
 
     def settle(
         self,
@@ -168,10 +167,3 @@ class Lanes:
             return
         run.states[part], run.label[part] = states, label
         run.turns[part], run.code[part] = turns, code
-
-
-def _processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
+from flipflow.batch.side_by_side import processors
 from flipflow.model.duty import Duty, Objective, SpringType
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import limit_bounds
 from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.vary import Choice, Interval
-from flipflow.studies.study_values import evaluate_loaded
+from flipflow.studies.study_values import evaluate_loaded, jump_distance_loaded
 
 Real = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
@@ -181,7 +182,7 @@ class Space:
     @cached_property
     def _of_jumps(self) -> tuple[str, ...]:
         """The limit on the distance to the jump, where one is given."""
-        given = self.duty.bounds.jump_margin is not None
+        given = self.duty.bounds.jump_margin
         return (JUMP,) if given and not QUANTITIES[JUMP].missing(self.screen) else ()
 
     @cached_property
@@ -243,8 +244,8 @@ class Space:
         """What candidates (C, D) are like.
 
         With ``margins`` the distance to the jump is looked at, too, of the drawings of those that
-        fit else, under the softest and the stiffest load; the proof looks at all. It takes whole
-        responses, where all others are motions at one speed. Without, it counts as met.
+        fit else, under the softest and the stiffest load; the proof looks at all. It takes motions
+        at many speeds, where all others are at one. Without, it counts as met.
         """
         columns = self.columns(u)
         found = self.judge_columns(columns, u.shape[0])
@@ -276,13 +277,12 @@ class Space:
 
     def _nearness(self, columns: Columns) -> Real:
         """By how much drawings come too near to the jump under those loads, as a share, (C,)."""
-        least = self.duty.bounds.jump_margin
-        tables = [
-            evaluate_loaded(self.screen, columns, load, [JUMP], self.duty.speeds, "from-below")[0]
+        least = float(self.duty.bounds.jump_margin or 1.0)
+        told = [
+            jump_distance_loaded(self.screen, columns, load, self.duty.speeds, least, processors())
             for load in self._farthest
         ]
-        margins = np.concatenate([table[JUMP] for table in tables], axis=1)
-        return np.asarray(1.0 - _least(margins) / (least or 1.0))
+        return np.asarray(1.0 - _least(np.concatenate(told, axis=1)) / least)
 
     def judge_columns(self, columns: Columns, count: int) -> Judged:
         """What machines with these fields are like, (C,) each, but for a catalogue's limits."""
@@ -293,7 +293,7 @@ class Space:
         rows, parts = self._scattered(columns, count), []
         for load in self.duty.loads:
             values, reason = evaluate_loaded(
-                self.screen, rows, load, names, self.duty.speeds, "from-below"
+                self.screen, rows, load, names, self.duty.speeds, "from-below", processors()
             )
             parts.append((values, reason))
         tables = {

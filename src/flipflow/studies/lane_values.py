@@ -97,7 +97,49 @@ def lane_values(
 
 
 Answer = tuple[dict[str, Real], Int]
-SIZE = ""  # name of the leading amplitude, beside those of the quantities
+# Names of the leading amplitude and of the jumps of the path, beside those of the quantities.
+SIZE, JUMPS = "", "jumps"
+RINGS = 8  # parts of a distance within which jumps are looked for
+ONE_MOTION = 1e-6  # share within which two amplitudes are of one motion
+
+
+def jump_distance(
+    machine: Machine,
+    columns: Columns,
+    omega: float,
+    most: float,
+    span: tuple[float, float],
+    threads: int = 1,
+) -> Real:
+    """Distance |omega - jump| / jump of S variants from their nearest jump, (S,), at most ``most``.
+
+    Jumps are those of lanes that rise and fall through rings around omega; distances are rounded
+    down to a ring's edge, and 0 where two motions stand at omega. A jump and the one back may be
+    missed where they lie within one ring.
+
+    Parameters
+    ----------
+    machine, columns, span, threads
+        As of :func:`lane_values`.
+    omega
+        Frequency in rad/s.
+    most
+        Distance beyond which none counts, below 1.
+    """
+    steps = most * np.arange(RINGS, 0, -1) / RINGS
+    speeds = omega / np.concatenate([1.0 + steps, [1.0], 1.0 - steps[::-1]])
+    inner = np.concatenate([steps[1:], [0.0, 0.0], steps[:0:-1]])  # edge of each ring, (2 RINGS,)
+    rows = len(next(iter(columns.values())))
+    nearest = np.full(rows, np.nan)
+    for batch in batches(machine, columns)[0]:
+        question = _Question(machine, columns, (), batch, threads, None)
+        up, down = question.rising(speeds)[0], question.falling(speeds, span[1])[0]
+        jumped = (np.diff(up[JUMPS], axis=1) != 0.0) | (np.diff(down[JUMPS], axis=1) != 0.0)
+        one, two = up[SIZE][:, RINGS], down[SIZE][:, RINGS]
+        same = np.abs(one - two) <= ONE_MOTION * np.maximum(one, two)
+        near = np.where(jumped, inner, most).min(axis=1)
+        nearest[batch.rows] = np.where(same, near, 0.0)
+    return nearest
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +175,8 @@ class _Question:
         found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
         told = _LaneMotions(plan, read)
         values = {one.name: told.value(one) for one in self.quantities}
-        return values | {SIZE: told.amplitude(plan.leading)}, found.reason
+        of_path = {SIZE: told.amplitude(plan.leading), JUMPS: found.jumps.astype(float)}
+        return values | of_path, found.reason
 
 
 def _in_order(values: dict[str, Real], why: Int, order: Int) -> Answer:

@@ -23,6 +23,7 @@ from flipflow.batch.chunk_store import (
 )
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REASONS
 from flipflow.batch.run_chunks import executor_or_threads, run_chunks
+from flipflow.batch.side_by_side import processors
 from flipflow.errors import InputError, StoreError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_path
 from flipflow.model.monitor import Monitor
@@ -297,11 +298,6 @@ def open_study(path: str | os.PathLike[str]) -> Study:
         told = f"resume the study, and {'it is' if len(damaged) == 1 else 'they are'} redone"
         raise StoreError(f"{kept.folder} is damaged: {_named(damaged)}; {told}.")
     return _opened(kept, plan, [state.index for state in states if state.word == MISSING], ())
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _references(plan: Plan, pool: Executor, tell: Monitor) -> Arrays:

@@ -22,7 +22,7 @@ from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen, Load, loaded_columns
 from flipflow.model.system import Machine
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
-from flipflow.studies.lane_values import lane_values, on_lanes
+from flipflow.studies.lane_values import jump_distance, lane_values, on_lanes
 from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.sensitivity_samples import (
     STOP_FIELDS,
@@ -42,6 +42,7 @@ def evaluate(
     quantities: Sequence[str],
     omega: Real,
     branch: BranchWord,
+    threads: int = 1,
 ) -> Values:
     """Quantities of L machines at F frequencies.
 
@@ -60,6 +61,8 @@ def evaluate(
         Frequencies in rad/s, (F,).
     branch
         Which motion is meant where several exist.
+    threads
+        Threads that motions at single frequencies are solved on.
 
     Returns
     -------
@@ -71,8 +74,7 @@ def evaluate(
     rows = len(next(iter(columns.values())))
     values = {one.name: np.full((rows, omega.size), np.nan) for one in asked}
     reasons = np.full((rows, omega.size), FOUND, np.int8)
-    span = analysed_range(machine)
-    span = min(span[0], 0.9 * float(omega.min())), max(span[1], 1.1 * float(omega.max()))
+    span = _span(machine, omega)
     question = Question(machine, asked[0], omega, span, branch)
     if all(replace(question, quantity=one).in_closed_form(tuple(columns)) for one in asked):
         for one in asked:
@@ -81,7 +83,7 @@ def evaluate(
         return values, reasons
     told = [one for one in asked if on_lanes(machine, one)]
     if told:
-        found, why = lane_values(machine, columns, told, omega, span, branch)
+        found, why = lane_values(machine, columns, told, omega, span, branch, threads)
         values |= found
         reasons[:] = why
     asked = [one for one in asked if one not in told]
@@ -102,14 +104,13 @@ def evaluate_loaded(
     quantities: Sequence[str],
     omega: Real,
     branch: BranchWord,
+    threads: int = 1,
 ) -> Values:
     """As :func:`evaluate`, of the machines under a load; the columns hold what they are without."""
     if load is None or not isinstance(machine, FlipFlowScreen):
-        return evaluate(machine, columns, quantities, omega, branch)
-    loaded = loaded_columns(machine, load, columns)
-    if not machine.has_stop and not STOP_FIELDS & set(columns):
-        loaded.pop("measured_shift", None)
-    values, reasons = evaluate(machine.loaded(load), loaded, quantities, omega, branch)
+        return evaluate(machine, columns, quantities, omega, branch, threads)
+    loaded = _loaded(machine, load, columns)
+    values, reasons = evaluate(machine.loaded(load), loaded, quantities, omega, branch, threads)
     # A mass below zero stays impossible with material on it.
     fine = _fine({name: column for name, column in columns.items() if name in FIELD})
     refused = ~np.all(fine, axis=0) if fine else np.zeros(len(reasons), bool)
@@ -117,6 +118,30 @@ def evaluate_loaded(
     for table in values.values():
         table[refused] = np.nan
     return values, reasons
+
+
+def jump_distance_loaded(
+    screen: FlipFlowScreen, columns: Columns, load: Load, omega: Real, most: float, threads: int
+) -> Real:
+    """Distances (L, F) of :func:`~flipflow.studies.lane_values.jump_distance` under a load."""
+    loaded, machine = _loaded(screen, load, columns), screen.loaded(load)
+    span = _span(machine, omega)
+    told = [jump_distance(machine, loaded, at, most, span, threads) for at in omega.tolist()]
+    return np.stack(told, axis=1)
+
+
+def _span(machine: Machine, omega: Real) -> tuple[float, float]:
+    """The range analysed, widened to hold the frequencies."""
+    low, high = analysed_range(machine)
+    return min(low, 0.9 * float(omega.min())), max(high, 1.1 * float(omega.max()))
+
+
+def _loaded(screen: FlipFlowScreen, load: Load, columns: Columns) -> Columns:
+    """The columns of screens as they are under a load."""
+    loaded = loaded_columns(screen, load, columns)
+    if not screen.has_stop and not STOP_FIELDS & set(columns):
+        loaded.pop("measured_shift", None)
+    return loaded
 
 
 def _fine(columns: Columns) -> list[NDArray[np.bool_]]:
