@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from flipflow.model.system import Machine, MechanicalSystem
 Columns = Mapping[str, NDArray[Any]]
 Bool = NDArray[np.bool_]
 Shapes = dict[str, tuple[int, ...]]
+Own = FlipFlowScreen | MechanicalSystem
 EXACT = 1e-12  # deviation of a sum, as a share of the largest number of its array
 # Changes of a parameter, as shares of its value, over which its share in the sums is read: what is
 # linear is so over any, and a wide one loses no digits.
@@ -72,7 +74,7 @@ def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
             allowed &= FIELD[name].allows(column)
     found, left = [], allowed.copy()
     # What a user's own class refuses only its ``system()`` tells.
-    if isinstance(machine, (FlipFlowScreen, MechanicalSystem)):
+    if isinstance(machine, Own):
         at_once = _sums(machine, columns, np.flatnonzero(allowed))
         if at_once is not None:
             found.append(at_once)
@@ -120,7 +122,7 @@ def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[B
     ], refused
 
 
-def _sums(machine: Machine, columns: Columns, rows: Int) -> Batch | None:
+def _sums(machine: Own, columns: Columns, rows: Int) -> Batch | None:
     """The variants of some rows as sums over their parameters, those that are machines.
 
     None where variants are no sums, and where none is a machine.
@@ -155,7 +157,8 @@ class _Linear:
     slopes: Mapping[str, Real]
 
 
-def _linear(machine: Machine, names: tuple[str, ...]) -> _Linear | None:
+@lru_cache(maxsize=32)  # a search asks of the same few machines a thousand times
+def _linear(machine: Own, names: tuple[str, ...]) -> _Linear | None:
     """How a machine depends on parameters; None where it is no sum over them.
 
     Raises
@@ -185,7 +188,7 @@ def _linear(machine: Machine, names: tuple[str, ...]) -> _Linear | None:
     return _Linear(system, shapes, values, numbers, slopes)
 
 
-def _with_own(machine: Machine, columns: Columns) -> Machine:
+def _with_own(machine: Own, columns: Columns) -> Own:
     """The machine with a value of its own of each parameter, of which it may have none."""
     none = {
         name: 0.0 if name not in FIELD or FIELD[name].allows(np.zeros(1))[0] else 1.0

@@ -12,7 +12,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_text
@@ -27,6 +27,7 @@ PATH = re.compile(rf"springs\[([0-9]+)\]\.({'|'.join(OF_SPRING)})")
 FORCING = "forcing"
 FINITE = "give the machine a finite value of it first"
 OF_WEIGHT = ("deck_angle",)  # fields of a screen that move its gaps by what hangs on the springs
+Kind = TypeVar("Kind", bound=Machine)
 COUNTS = (int, "int")  # fields of this type are counted, and have no values between
 
 
@@ -109,7 +110,7 @@ def parameter_names(machine: Machine) -> tuple[str, ...]:
     )
 
 
-def with_values(machine: Machine, values: Mapping[str, Any]) -> Machine:
+def with_values(machine: Kind, values: Mapping[str, Any]) -> Kind:
     """The machine with other values of some parameters; of a screen, of any of its fields.
 
     Raises
@@ -120,7 +121,7 @@ def with_values(machine: Machine, values: Mapping[str, Any]) -> Machine:
     if isinstance(machine, FlipFlowScreen):
         return machine.replace(**values)
     try:
-        changed = _with_values(machine, values)
+        changed = cast("Kind", _with_values(machine, values))
         changed.system()
     except InputError:
         raise

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -120,14 +120,27 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """All candidates of a duty."""
+    """All candidates of a duty.
+
+    Parameters
+    ----------
+    duty
+        What is asked.
+    near
+        A machine near those looked at, whose motions are first guesses; None: that of the duty.
+    """
 
     duty: Duty
+    near: FlipFlowScreen | None = None
 
     @property
     def screen(self) -> FlipFlowScreen:
         """The machine to begin with."""
-        return self.duty.project.screen
+        return self.near or self.duty.project.screen
+
+    def around(self, u: Real) -> Space:
+        """The same candidates, looked at from one of them, (D,)."""
+        return replace(self, near=self.machine(u))
 
     @cached_property
     def springs(self) -> tuple[tuple[SpringType, int], ...]:

@@ -187,7 +187,7 @@ class _Around:
     """
 
     def __init__(self, space: Space, u: Real, moving: NDArray[np.int64]) -> None:
-        self.space, self.u, self.moving = space, u, moving
+        self.space, self.u, self.moving = space.around(u), u, moving
         self.target = space.duty.target
         self._last: tuple[bytes, Real, Real] | None = None
 

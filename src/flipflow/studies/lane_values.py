@@ -113,9 +113,9 @@ def jump_distance(
 ) -> Real:
     """Distance |omega - jump| / jump of S variants from their nearest jump, (S,), at most ``most``.
 
-    Jumps are those of lanes that rise and fall through rings around omega; distances are rounded
-    down to a ring's edge, and 0 where two motions stand at omega. A jump and the one back may be
-    missed where they lie within one ring.
+    Lanes rise and fall through rings around omega. Where they jump, and where they part or meet, is
+    a jump; distances are rounded down to a ring's edge, and 0 where two motions stand at omega. A
+    jump and the one back may be missed where they lie within one ring.
 
     Parameters
     ----------
@@ -134,11 +134,11 @@ def jump_distance(
     for batch in batches(machine, columns)[0]:
         question = _Question(machine, columns, (), batch, threads, None)
         up, down = question.rising(speeds)[0], question.falling(speeds, span[1])[0]
-        jumped = (np.diff(up[JUMPS], axis=1) != 0.0) | (np.diff(down[JUMPS], axis=1) != 0.0)
-        one, two = up[SIZE][:, RINGS], down[SIZE][:, RINGS]
-        same = np.abs(one - two) <= ONE_MOTION * np.maximum(one, two)
+        same = np.abs(up[SIZE] - down[SIZE]) <= ONE_MOTION * np.maximum(up[SIZE], down[SIZE])
+        told = (up[JUMPS], down[JUMPS], same.astype(float))
+        jumped = np.any([np.diff(one, axis=1) != 0.0 for one in told], axis=0)
         near = np.where(jumped, inner, most).min(axis=1)
-        nearest[batch.rows] = np.where(same, near, 0.0)
+        nearest[batch.rows] = np.where(same[:, RINGS], near, 0.0)
     return nearest
 
 
