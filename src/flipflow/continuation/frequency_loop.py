@@ -316,6 +316,9 @@ def attempt(
     course: Course,
 ) -> tuple[float, bool, int]:  # fmt: skip
     """Try a step to point p; its length, 0 where it is refused, whether it ends, iterations."""
+    # Asked as a condition of the loop over points, this makes a branch take 40 % longer.
+    if work.stop[0] != 0:
+        return 0.0, False, 0
     same = p > 1 and branch.signature[p - 1] == branch.signature[p - 2]
     ended = predict(work, step, course, same)
     # A correction as long as the step itself would not tell one strand from the next.
@@ -355,7 +358,7 @@ def trace(
         return code, 0
     length, travelled, p = 0.1, 0.0, 1
     clear(branch, p)
-    while p < branch.omega.shape[0] and work.stop[0] == 0:
+    while p < branch.omega.shape[0]:
         longest = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
         step, ends, iterations = attempt(problem, scratch, work, branch, p, longest, course)
         if step == 0.0:
