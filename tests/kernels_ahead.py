@@ -36,11 +36,6 @@ def _field() -> None:
     ff.continue_orbit(orbit, "springs[0].stiffness", (0.9, 1.1))
 
 
-def _lanes() -> None:
-    vary = {"springs[0].stiffness": (0.9, 1.1)}
-    ff.sensitivity(_machine(), vary, "stop_force", omega=0.5, n=2)
-
-
 def _followed(method: ff.HarmonicBalance | ff.SampledHarmonicBalance) -> None:
     ff.frequency_response(_machine(), (0.5, 0.51), method)
 
@@ -51,10 +46,10 @@ def _machine() -> ff.MechanicalSystem:
     return ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], [stop], ff.Unbalance([1.0]))
 
 
-# Fields and lanes begin on an exact branch, whose kernel the first part has then compiled.
+# Fields begin on an exact branch, whose kernel the first part has then compiled.
 PARTS: dict[str, tuple[Callable[[], None], ...]] = {
     "exact and fields": (*package.PARTS["branches"], _field),
-    "series and lanes": (*package.PARTS["runs"], _sampled, _balance, _lanes),
+    "runs and series": (*package.PARTS["runs"], _sampled, _balance),
 }
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import TypeVar
 from flipflow.compiled.arrays import Int
 
 R = TypeVar("R")
-BRIEF = 1024  # turns or points times N^2 up to which a kernel is called as it is
+BRIEF = 4096  # turns or points times N^2 up to which a kernel is called as it is
 PATIENCE = 0.5  # s for which a kernel that is to stop is waited for, so that its scratch is free
 
 

@@ -325,18 +325,19 @@ class Orbit(Frozen, Result):
         """Greatest value over the period of a function of times, pieces and states."""
         t, piece, *states = self._grid
         values = size(t, piece, *states)
-        best = float(values.max())
-        for k in _tops(values, piece):
-            low, high = max(k - 1, 0), min(k + 1, t.size - 1)
-            low, high = (one if piece[one] == piece[k] else k for one in (low, high))
-            ends = t[low], t[high]
-            for _ in range(ZOOMS):
-                fine, same = np.linspace(*ends, ZOOMED), np.full(ZOOMED, piece[k])
-                seen = size(fine, same, *states_on(self.motion, fine, same))
-                top = int(seen.argmax())
-                ends = fine[max(top - 1, 0)], fine[min(top + 1, ZOOMED - 1)]
-            best = max(best, _summit(seen))
-        return best
+        best, tops = float(values.max()), _tops(values, piece)
+        rows = np.arange(tops.size)
+        low, high = np.maximum(tops - 1, 0), np.minimum(tops + 1, t.size - 1)
+        low, high = (np.where(piece[one] == piece[tops], one, tops) for one in (low, high))
+        begin, end, same = t[low], t[high], np.repeat(piece[tops], ZOOMED)
+        for _ in range(ZOOMS):
+            fine = np.linspace(begin, end, ZOOMED, axis=1)
+            at = fine.ravel()
+            seen = size(at, same, *states_on(self.motion, at, same)).reshape(fine.shape)
+            top = seen.argmax(axis=1)
+            begin = fine[rows, np.maximum(top - 1, 0)]
+            end = fine[rows, np.minimum(top + 1, ZOOMED - 1)]
+        return max([best, *map(_summit, seen)])
 
     @property
     def touches(self) -> bool:

@@ -352,7 +352,8 @@ class Solver(ABC):
 
         if record.omega.size == 1 or p != TRACE_ALL:
             return run()
-        return interruptible(run, self.corrector.stop, self.flow.stop)
+        work = record.omega.size * self.system.size**2
+        return interruptible(run, self.corrector.stop, self.flow.stop, work=work)
 
     def between(self, traced: Traced, p: int, share: float) -> Point:
         """The branch's point at ``share`` of the way from point p to point p + 1."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from flipflow.batch.solutions import nearby_motions
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.compiled.workers import compile_parts, work
 from flipflow.continuation import correction
@@ -49,6 +50,12 @@ def _section_part() -> None:
     _small_solver().section(np.zeros(2), 1.0, 1)
 
 
+def _lanes_part() -> None:
+    solver = _small_solver()
+    solver.residual(np.zeros(2), 0.5)
+    nearby_motions(solver.system, solver.system, np.array([0.5, 0.51]))
+
+
 def _start_up_part() -> None:
     profile = SpeedProfile((0.0, 1.0), (1.0, 1.0))
     for _ in Stepper(_small_solver().system, profile, np.zeros(2), fastest=1.0).run(1.0):
@@ -66,7 +73,7 @@ def _small_solver() -> ExactSolver:
 # share when the first, whose one large kernel takes longest, comes to need it.
 PARTS: dict[str, tuple[Callable[[], None], ...]] = {
     "branches": (_start_up_part, _trace_part),
-    "runs": (_section_part, _observe_part),
+    "runs": (_section_part, _observe_part, _lanes_part),
 }
 
 if __name__ == "__main__":
