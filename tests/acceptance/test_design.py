@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 from typer.testing import CliRunner
 
 import flipflow as ff
@@ -192,6 +193,30 @@ def test_a_machine_near_its_jump_is_not_proposed():
     row = next(one for one in found.assessment.limits_table if one.name == "jump_margin")
     assert row.worst is not None
     assert row.worst >= 0.2
+
+
+def test_the_yield_counts_machines_as_they_are_built():
+    """Drawn evenly in the scatter, each is that of the exact branch; some of the paper's pass."""
+    asked = duty(limits=ff.Limits(), target=5.1e-3, tolerance=1.5e-3)
+    space = Space(asked)
+    own = space.share_of(space.screen)
+    judged = space.built(own)
+    draws = 2.0 * qmc.Sobol(2, rng=asked.seed).random(judged.fits.size)[:6] - 1.0
+    alone = replace(asked, scatter={})
+    for factors, amplitude in zip(1.0 + 0.15 * draws, judged.amplitude, strict=False):
+        screen = space.machine(own)
+        moved = {n: f * getattr(screen, n) for n, f in zip(SCATTER, factors, strict=True)}
+        close("built", amplitude, exact_amplitudes(screen.replace(**moved), alone), rel=1e-8)
+    within = np.abs(judged.amplitude - 5.1e-3).max(axis=1) <= 1.5e-3 * (1.0 + 1e-6)
+    np.testing.assert_array_equal(judged.fits, within)
+    assert 0.2 < within.mean() < 0.8
+
+
+def test_the_yield_of_a_proposal():
+    """At the corners it meets everything, and so it does between."""
+    found = proposed()
+    assert found.passing == 1.0
+    close("interval", found.passing_interval, (0.9964, 1.0), abs=1e-4)
 
 
 def test_stopped_it_keeps_the_best_so_far():

@@ -27,11 +27,11 @@ from flipflow.report.first_page import cases, limits
 from flipflow.report.numbers import NOTHING, bounds, number, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import FAIL, PASS
-from flipflow.studies.candidates import label_of
+from flipflow.studies.candidates import BUILT, label_of
 from flipflow.studies.design import Proposal, Trial
 
 NOT_COVERED = (
-    "Scatter is judged at its corners and on the drawing, not between. The material moves with the "
+    "The search judges scatter at its corners and on the drawing. The material moves with the "
     "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
     "corners; so is the margin to the jump. Fatigue of rubber, its wear and its creep are not "
     "computed: bounds on gap and shear stiffness keep the search away from "
@@ -152,6 +152,14 @@ def proof_of_proposal(found: Proposal) -> Iterator[Block]:
         yield from limits(found.assessment)
         yield from cases(found.assessment)
         yield from (Note(one) for one in found.assessment.notes)
+    if not np.isnan(found.passing):
+        low, high = (f"{100.0 * one:.4g}" for one in found.passing_interval)
+        yield Text(
+            f"{100.0 * found.passing:.4g} % ({low} to {high} %, 95 % confidence) of {BUILT:,} "
+            "machines, their parts drawn evenly within the scatter, meet every constraint in every "
+            "combination.",
+            "Yield:",
+        )
     yield Text(NOT_COVERED, "Not covered:")
 
 

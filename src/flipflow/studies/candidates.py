@@ -7,7 +7,7 @@ scatter of its parts, all of them lanes of one call. It is as bad as its worst.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -32,6 +32,7 @@ STRAIN, FORCE = "strain of the catalogue", "force of the catalogue"
 JUMP = "jump_margin"
 AMPLITUDE, OFFSET = "relative_amplitude", "relative_offset"
 MET = 1e-6  # excess up to which a constraint counts as met: a polish ends on what binds
+BUILT = 1024  # machines of which the yield is a share; Sobol's sequence wants a power of 2
 LEAN = 1e-2  # share of the amplitude by which equal gaps may be left to one side
 READ: Mapping[Objective, str] = {
     "acceleration": "floating_frame_acceleration",
@@ -260,16 +261,37 @@ class Space:
         fit else, under the softest and the stiffest load; the proof looks at all. It takes motions
         at many speeds, where all others are at one. Without, it counts as met.
         """
-        columns = self.columns(u)
-        found = self.judge_columns(columns, u.shape[0])
         springs = [self.spring_of(one) for one in u]
+        return self._judged(self.columns(u), springs, self.duty.corners, margins)
+
+    def built(self, u: Real) -> Judged:
+        """Machines as they are built from one candidate (D,), parts drawn evenly in the scatter."""
+        from scipy.stats import qmc  # noqa: PLC0415  slow to import
+
+        scatter, screen = self.duty.scatter, self.machine(u)
+        draws = 2.0 * qmc.Sobol(len(scatter), rng=self.duty.seed).random(BUILT) - 1.0
+        rows = {name: np.repeat(column, BUILT) for name, column in self.columns(u[None]).items()}
+        for (name, share), draw in zip(scatter.items(), draws.T, strict=True):
+            rows[name] = float(getattr(screen, name)) * (1.0 + share * draw)
+        springs = [self.spring_of(u)] * BUILT
+        return self._judged(rows, springs, self.duty.corners[:1], margins=True)
+
+    def _judged(
+        self,
+        columns: Columns,
+        springs: Sequence[tuple[SpringType, int] | None],
+        corners: Sequence[Mapping[str, float]],
+        margins: bool,
+    ) -> Judged:
+        count = len(springs)
+        found = self.judge_columns(columns, count, corners)
         over = [found.excess]
         for _, field, name in self._of_springs:
             allowed = [getattr(one[0], field) if one else None for one in springs]
             most = np.array([np.inf if one is None else one for one in allowed])
             over.append((found.worst[name] / most - 1.0)[:, None])
         if self._of_jumps:
-            over.append(np.full((u.shape[0], 1), -1.0))
+            over.append(np.full((count, 1), -1.0))
         excess = np.concatenate(over, axis=1)
         fit = np.flatnonzero((excess <= MET).all(axis=1))
         if self._of_jumps and margins and fit.size:
@@ -297,13 +319,15 @@ class Space:
         ]
         return np.asarray(1.0 - _least(np.concatenate(told, axis=1)) / least)
 
-    def judge_columns(self, columns: Columns, count: int) -> Judged:
+    def judge_columns(
+        self, columns: Columns, count: int, corners: Sequence[Mapping[str, float]]
+    ) -> Judged:
         """What machines with these fields are like, (C,) each, but for a catalogue's limits."""
         wanted = {AMPLITUDE, OFFSET, *self.limited}
         wanted |= {READ[one] for one in self.objectives if one != "steadiness"}
         wanted |= {name for _, _, name in self._of_springs}
         names = sorted(wanted)
-        rows, parts = self._scattered(columns, count), []
+        rows, parts = self._scattered(columns, count, corners), []
         for load in self.duty.loads:
             values, reason = evaluate_loaded(
                 self.screen, rows, load, names, self.duty.speeds, "from-below", processors()
@@ -338,9 +362,10 @@ class Space:
         far = _greatest(np.abs(amplitude - duty.target))
         return np.asarray((far - duty.tolerance) / duty.target)
 
-    def _scattered(self, columns: Columns, count: int) -> Columns:
+    def _scattered(
+        self, columns: Columns, count: int, corners: Sequence[Mapping[str, float]]
+    ) -> Columns:
         """Each candidate at every corner of the scatter, corners side by side."""
-        corners = self.duty.corners
         rows = {name: np.repeat(column, len(corners)) for name, column in columns.items()}
         for name in self.duty.scatter:
             own = rows.get(name, np.full(count * len(corners), float(getattr(self.screen, name))))

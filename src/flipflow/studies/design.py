@@ -30,6 +30,7 @@ from flipflow.studies.design_search import (
     polish,
     search,
 )
+from flipflow.studies.tolerance import confidence_interval
 
 Real = NDArray[np.float64]
 SEARCHED, POLISHED = 0.7, 0.8  # shares of the work that are done then
@@ -94,6 +95,12 @@ class Proposal(Frozen, Result):
     assessment
         The chosen machine judged as ``flipflow analyze`` judges: the exact solution under every
         load case, from rest to speed with its motor, blows, other motions.
+    passing
+        Yield: the share of machines as they are built, parts drawn evenly within their scatter,
+        that meet every constraint in every case; NaN without scatter or where the search was
+        stopped.
+    passing_interval
+        Its 95 % confidence interval, (2,).
     thrown_out
         Machines of the set that failed this proof, and why.
     evaluated
@@ -119,6 +126,8 @@ class Proposal(Frozen, Result):
     evaluated: int
     cancelled: bool
     version: str
+    passing: float = math.nan
+    passing_interval: tuple[float, float] = (math.nan, math.nan)
 
     def __repr__(self) -> str:
         return f"Proposal({self.duty.name}: {self.sentence})"
@@ -230,6 +239,7 @@ def design(
     front = search(space, rounds, _told(monitor, "searching", 0.0, SEARCHED))
     outcome = _proved(space, front, monitor)
     found = outcome.found
+    passing, passing_interval = _yield(space, outcome)
     if monitor is not None and not outcome.cancelled:
         monitor("design, done", 1.0)
     return Proposal(
@@ -248,6 +258,8 @@ def design(
         evaluated=front.evaluated,
         cancelled=outcome.cancelled,
         version=__version__,
+        passing=passing,
+        passing_interval=passing_interval,
     )
 
 
@@ -288,6 +300,14 @@ def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
     except Cancelled:
         return _Outcome(found, None, tuple(thrown), cancelled=True)
     return _Outcome(found, proof, tuple(thrown), none_left=True)
+
+
+def _yield(space: Space, outcome: _Outcome) -> tuple[float, tuple[float, float]]:
+    if outcome.cancelled or not space.duty.scatter:
+        return math.nan, (math.nan, math.nan)
+    fits = space.around(outcome.found.u).built(outcome.found.u).fits
+    low, high = confidence_interval(np.array([fits.sum()]), float(fits.size))[0].tolist()
+    return float(fits.mean()), (low, high)
 
 
 def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polished]:
@@ -349,7 +369,9 @@ def _beside(space: Space) -> tuple[Trial, ...]:
         alone = Space(replace(space.duty, project=replace(space.duty.project, screen=screen)))
         # One field makes a row; the others are the machine's own.
         own = {"main_mass": np.array([screen.main_mass])}
-        trials.append(Trial(name, screen, alone.judge_columns(own, 1).amplitude[0]))
+        trials.append(
+            Trial(name, screen, alone.judge_columns(own, 1, alone.duty.corners).amplitude[0])
+        )
     return tuple(trials)
 
 
