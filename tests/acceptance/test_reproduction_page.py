@@ -15,7 +15,7 @@ import flipflow as ff
 from flipflow.paper.page import PAGE, blocks, write_figure, write_page
 from flipflow.paper.registry import FIGURES
 from flipflow.plotting.symbols import TIMES, html_subscript, with_symbols
-from flipflow.report.blocks import Heading, Table
+from flipflow.report.blocks import Heading, Table, Text
 
 CHROMIUM = shutil.which("chromium")
 WIDTHS = (1400, 390)
@@ -231,3 +231,12 @@ def test_the_legend_of_a_family_has_the_unit_of_its_axes(screen):
     names = {trace.name for panel in figure.panels for trace in panel.traces if trace.legend}
     assert {name for name in names if name.startswith("e =")} == {"e = 2 mm"}
     assert {panel.y.unit for panel in figure.panels} == {"mm"}
+
+
+def test_the_page_says_whose_machine_it_is():
+    own = ff.load("ffs0827")
+    for machine, whose in ((own, "the paper's"), (own.replace(clearance=5e-3), "not the paper's")):
+        told = list(blocks(ff.reproduce(machine, ["figure-02c"])))
+        text = next(one for one in told if isinstance(one, Text) and one.lead == "Machine:").text
+        assert text.startswith(f"{whose}, m1 916 kg, ")
+        assert text.endswith(f" e {1e3 * machine.clearance:.2f} mm.")

@@ -9,9 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from flipflow import __version__
+from flipflow.io.project import load
+from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.monitor import Monitor, silent
+from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Numbers, Verdict
-from flipflow.paper.reproduce import PAPER, ReproducedFigure, Reproduction
+from flipflow.paper.reproduce import MACHINE, PAPER, ReproducedFigure, Reproduction
 from flipflow.plotting.drawing import Drawing
 from flipflow.report.blocks import (
     Block,
@@ -27,7 +30,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.html import page
-from flipflow.report.numbers import NOTHING, number
+from flipflow.report.numbers import NOTHING, number, quantity
 from flipflow.results.store import write_file
 
 TITLE = "The paper, reproduced"
@@ -140,6 +143,7 @@ def blocks(found: Reproduction) -> Iterator[Block]:
     """Title, all verdicts, what the paper does not say, then figure by figure."""
     counted = ", ".join(f"{count} {verdict}" for verdict, count in found.counts.items() if count)
     yield TitleBlock(TITLE, (("Paper", PAPER), ("flipflow", __version__), ("Claims", counted)))
+    yield Text(_machine(found.screen), "Machine:")
     yield Text(INTRODUCTION)
     if found.claims:
         yield _summary("What the paper claims", found.claims, VERDICTS)
@@ -147,6 +151,18 @@ def blocks(found: Reproduction) -> Iterator[Block]:
         yield _summary(BEYOND, found.findings, FOUND)
     for one in found.figures:
         yield from _figure_blocks(one)
+
+
+def _machine(screen: FlipFlowScreen) -> str:
+    """Whose machine it is, and its numbers."""
+    fields = (FIELD[name] for name in MOTION_FIELDS)
+    numbers = ", ".join(
+        f"{one.symbol} {quantity(value, one.file_unit, one.unit)}"
+        for one in fields
+        if (value := getattr(screen, one.name)) is not None
+    )
+    whose = "the paper's" if screen == load(MACHINE) else "not the paper's"
+    return f"{whose}, {numbers}."
 
 
 def heading_of(one: ReproducedFigure) -> str:
