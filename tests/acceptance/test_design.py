@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -232,6 +234,43 @@ def test_stopped_it_keeps_the_best_so_far():
     assert found.assessment is None
     assert len(told) == 4
     assert np.isfinite(found.chosen.band)
+
+
+def same(one: ff.Proposal, other: ff.Proposal) -> None:
+    """Two proposals are equal, bit for bit."""
+    assert one.screen == other.screen
+    np.testing.assert_array_equal(one.chosen.amplitude, other.chosen.amplitude)
+    for name, values in one.objectives.items():
+        np.testing.assert_array_equal(values, other.objectives[name])
+
+
+def test_a_search_that_was_stopped_goes_on_and_ends_as_one_that_was_not(tmp_path):
+    """Damaged in between, a generation is looked at again; another duty is refused."""
+    store, told = tmp_path / "search.zarr", []
+
+    def stop(sentence: str, share: float) -> None:
+        told.append((sentence, share))
+        if len(told) == 4:
+            raise ff.Cancelled("stopped by the user")
+
+    whole = ff.design(duty(), generations=6)
+    assert ff.design(duty(), generations=6, store=store, monitor=stop).cancelled
+    file = store / "objective" / "c.1.0"
+    file.write_bytes(file.read_bytes()[:-1])
+    same(ff.design(duty(), generations=6, store=store), whole)
+    same(ff.design(duty(), generations=6, store=store), whole)
+    with pytest.raises(
+        ff.StoreError, match=r"holds a search of other inputs: duty\.seed is 1 there"
+    ):
+        ff.design(duty(seed=2), generations=6, store=store)
+
+
+def test_workers_find_what_threads_find():
+    """A pool of processes here; a cluster of dask is an executor, too."""
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        same(ff.design(duty(), generations=3, executor=pool), ff.design(duty(), generations=3))
+    with pytest.raises(ff.InputError, match="executor"):
+        ff.design(duty(), executor=2)
 
 
 def test_the_template_runs_as_it_stands(tmp_path, monkeypatch):

@@ -271,8 +271,8 @@ class ChunkStore:
             digests[0, k] = np.frombuffer(content, np.uint8)
         self._put(CHECKSUM, slice(index, index + 1), digests)
 
-    def read(self, name: str) -> Array:
-        """The values of an array.
+    def read(self, name: str, index: int | None = None) -> Array:
+        """The values of an array, or those of one chunk of a growing one.
 
         Raises
         ------
@@ -280,7 +280,8 @@ class ChunkStore:
             When a file of it is damaged.
         """
         try:
-            found = self._group[name][...]
+            rows = (index or 0) * self.rows, ((index or 0) + 1) * self.rows
+            found = self._group[name][... if index is None else slice(*rows)]
         except DAMAGE as error:
             raise StoreError(f"{self.folder} is damaged: {name} ({error}).") from None
         return np.asarray(found)

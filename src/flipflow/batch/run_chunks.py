@@ -42,10 +42,21 @@ def executor_or_threads(executor: object, threads: int) -> Iterator[Executor]:
         finally:
             own.shutdown(cancel_futures=True)
         return
+    yield checked_executor(executor)
+
+
+def checked_executor(executor: object) -> Executor:
+    """An executor.
+
+    Raises
+    ------
+    InputError
+        For what is none.
+    """
     if not isinstance(executor, Executor):
         remedy = "give an executor of concurrent.futures, as client.get_executor() of dask is one"
         raise InputError("executor", executor, remedy)
-    yield executor
+    return executor
 
 
 def run_chunks(

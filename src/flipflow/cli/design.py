@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 REPORT, PDF, DATA, MACHINE, FIGURE = (
     "report.html", "report.pdf", "proposal.json", "machine.toml", "candidates.html",
 )  # fmt: skip
-MOST_GENERATIONS = 9999
+MOST_GENERATIONS, MOST_WORKERS = 9999, 256
 STAGE = "design"  # the stages of a design that keep what is found
 
 
@@ -28,15 +28,34 @@ def design(
         int | None,
         whole("--generations", "N", 1, MOST_GENERATIONS, "How long to search."),
     ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            "--store",
+            metavar="DIR",
+            help="Folder that keeps the search, to go on with.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        whole("--workers", "N", 1, MOST_WORKERS, "Run on N worker processes instead of threads."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler", metavar="ADDRESS", help="Run on a cluster of dask: 'tcp://host:8786'."
+        ),
+    ] = None,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write the report as PDF, too.")] = False,
     force: Force = False,
 ) -> None:
     """Choose the machine for a duty, and prove it.
 
-    Stopped, it keeps the best so far. Ends with code 6 where the duty cannot be done; the nearest
-    machine is then shown.
+    Stopped, it keeps the best so far; with --store the same command goes on. Ends with code 6 where
+    the duty cannot be done; the nearest machine is then shown.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
     from flipflow.io.duty import load_duty  # noqa: PLC0415
     from flipflow.report.html import require_templates  # noqa: PLC0415
@@ -54,9 +73,15 @@ def design(
         from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
         from flipflow.studies.design import design as analysis  # noqa: PLC0415
 
-        with progress("starting") as tell, stoppable(tell, STAGE) as told:
+        with (
+            progress("starting") as tell,
+            executor_of(workers, scheduler) as executor,
+            stoppable(tell, STAGE) as told,
+        ):
             compile_ahead(lambda s: tell(f"compiling, once per version: {s:.0f} s", 0.0))
-            found = analysis(duty, generations=generations, monitor=told)
+            found = analysis(
+                duty, generations=generations, store=store, executor=executor, monitor=told
+            )
         _write(found, target, pdf=pdf)
         if found.cancelled:
             raise target.stopped(kept=True)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.batch.run_chunks import checked_executor
 from flipflow.errors import Cancelled, InputError
-from flipflow.model.arguments import checked_count, checked_monitor
+from flipflow.model.arguments import checked_count, checked_monitor, checked_path
 from flipflow.model.duty import Duty, SpringType
 from flipflow.model.fields import FIELD
 from flipflow.model.monitor import Monitor
@@ -24,12 +27,14 @@ from flipflow.studies.assessment import FAIL, Assessment, assess
 from flipflow.studies.candidates import MET, Judged, Space, label_of
 from flipflow.studies.design_search import (
     GENERATIONS,
+    POPULATION,
     Front,
     Polished,
     by_preference,
     polish,
     search,
 )
+from flipflow.studies.design_store import search_store
 from flipflow.studies.tolerance import confidence_interval
 
 Real = NDArray[np.float64]
@@ -197,7 +202,12 @@ class Proposal(Frozen, Result):
 
 
 def design(
-    duty: Duty, *, generations: int | None = None, monitor: Monitor | None = None
+    duty: Duty,
+    *,
+    generations: int | None = None,
+    store: str | os.PathLike[str] | None = None,
+    executor: Executor | None = None,
+    monitor: Monitor | None = None,
 ) -> Proposal:
     """Choose the machine for a duty and prove it.
 
@@ -212,6 +222,12 @@ def design(
         What is asked, as :func:`flipflow.load_duty` reads it.
     generations
         How long to search; None: as long as pays.
+    store
+        Folder that grows as the search runs. Where one of the same duty is there, the search goes
+        on with it, and ends as one that was never stopped.
+    executor
+        What judges the candidates, such as ``client.get_executor()`` of dask; None: threads of
+        this process. The result is the same, bit for bit.
     monitor
         Called with a sentence and the share done. What raises :class:`~flipflow.Cancelled` ends
         the search, and the best so far is proposed.
@@ -226,8 +242,12 @@ def design(
     ------
     InputError
         For anything but a duty.
+    IncompleteError
+        When the workers are gone; what the store holds by then stays.
+    StoreError
+        When the store cannot be written, another run writes to it, or it is of another duty.
     MissingExtra
-        When pymoo is not installed.
+        When pymoo is not installed; for a store where zarr is not.
     """
     if not isinstance(duty, Duty):
         remedy = 'give a duty, such as ff.load_duty("duty.toml")'
@@ -236,7 +256,7 @@ def design(
     rounds = GENERATIONS if generations is None else checked_count("generations", generations, 9999)
     space = Space(duty)
 
-    front = search(space, rounds, _told(monitor, "searching", 0.0, SEARCHED))
+    front = _searched(space, rounds, store, executor, monitor)
     outcome = _proved(space, front, monitor)
     found = outcome.found
     passing, passing_interval = _yield(space, outcome)
@@ -261,6 +281,23 @@ def design(
         passing=passing,
         passing_interval=passing_interval,
     )
+
+
+def _searched(
+    space: Space,
+    rounds: int,
+    store: str | os.PathLike[str] | None,
+    executor: Executor | None,
+    monitor: Monitor | None,
+) -> Front:
+    """The search, kept in a store where one is named."""
+    tell = _told(monitor, "searching", 0.0, SEARCHED)
+    if executor is not None:
+        checked_executor(executor)
+    if store is None:
+        return search(space, rounds, tell, executor=executor)
+    with search_store(checked_path("store", store), space, rounds, POPULATION).writing() as kept:
+        return search(space, rounds, tell, kept=kept, executor=executor)
 
 
 @dataclass(frozen=True, eq=False)

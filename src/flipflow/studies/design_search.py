@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,13 +23,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
+from flipflow.batch.chunk_store import ChunkStore
+from flipflow.batch.run_chunks import run_chunks
 from flipflow.errors import Cancelled, MissingExtra
 from flipflow.studies.candidates import MET, TARGET, Judged, Space
+from flipflow.studies.design_store import SHARES, keep, looked_at
 
 Real = NDArray[np.float64]
 Tell = Callable[[float], None]
 POPULATION = 64
 GENERATIONS = 60
+TOGETHER = 8  # candidates that a worker judges at once
 CLOSE = 0.1  # share by which a candidate may be worse in what comes first, for what comes next
 STEP = 1e-4  # of a share, for central differences: lanes are exact, their error is its square
 ROUNDS = 40
@@ -47,8 +52,18 @@ class Front:
     evaluated: int
 
 
-def search(space: Space, generations: int, tell: Tell | None) -> Front:
+def search(
+    space: Space,
+    generations: int,
+    tell: Tell | None,
+    *,
+    kept: ChunkStore | None = None,
+    executor: Executor | None = None,
+) -> Front:
     """The Pareto set of a duty; where no candidate fits, those that miss least.
+
+    ``kept`` is the store of the search, held for writing, if it has one. Candidates are judged by
+    ``executor``, if there is one, else by threads.
 
     Raises
     ------
@@ -63,12 +78,11 @@ def search(space: Space, generations: int, tell: Tell | None) -> Front:
         raise MissingExtra("A design needs pymoo: pip install 'flipflow[study]'.") from None
     size, goals, rules = len(space.genes), len(space.objectives), len(space.constraints)
 
+    judging = _Judging(space, executor, kept)
+
     class Candidates(Problem):  # type: ignore[misc]  # pymoo is untyped
         def _evaluate(self, x: Real, out: dict[str, Any], *_: Any, **__: Any) -> None:
-            judged = space.judge(x, margins=True)
-            values = [judged.objective(one) for one in space.objectives]
-            out["F"] = np.minimum(np.stack(values, axis=1), HUGE * SCALE)
-            out["G"] = np.minimum(judged.excess, HUGE)
+            out["F"], out["G"] = judging.judged(x)
 
     problem = Candidates(n_var=size, n_obj=goals, n_ieq_constr=rules, xl=0.0, xu=1.0)
     algorithm = NSGA2(pop_size=POPULATION, sampling=_first(space))
@@ -84,8 +98,48 @@ def search(space: Space, generations: int, tell: Tell | None) -> Front:
         cancelled = True
     u = np.unique(np.array(algorithm.pop.get("X"), float), axis=0)
     judged = space.judge(u, margins=True)
-    kept = _front(space, judged)
-    return Front(u[kept], _rows(judged, kept), cancelled, algorithm.evaluator.n_eval)
+    best = _front(space, judged)
+    return Front(u[best], _rows(judged, best), cancelled, algorithm.evaluator.n_eval)
+
+
+class _Judging:
+    """Objectives and excesses of one generation after the other, those of before from a store."""
+
+    def __init__(self, space: Space, executor: Executor | None, kept: ChunkStore | None) -> None:
+        self.space, self.executor, self.kept = space, executor, kept
+        self.generation = 0
+
+    def judged(self, u: Real) -> tuple[Real, Real]:
+        """Objectives (C, O) and excesses (C, G) of candidates (C, D), both finite."""
+        at, self.generation = self.generation, self.generation + 1
+        before = None if self.kept is None else looked_at(self.kept, at, u)
+        if before is not None:
+            return before
+        judged = _judged_by(self.executor, self.space, u)
+        values = [judged.objective(one) for one in self.space.objectives]
+        objective = np.minimum(np.stack(values, axis=1), HUGE * SCALE)
+        excess = np.minimum(judged.excess, HUGE)
+        if self.kept is not None:
+            keep(self.kept, at, {SHARES: u, "objective": objective, "excess": excess})
+        return objective, excess
+
+
+def _judged_by(executor: Executor | None, space: Space, u: Real) -> Judged:
+    """Candidates judged, a few at a time where an executor does it."""
+    if executor is None:
+        return space.judge(u, margins=True)
+    tasks = [(k, (space, u[k : k + TOGETHER])) for k in range(0, u.shape[0], TOGETHER)]
+    found = dict(run_chunks(executor, _judged, tasks))
+    parts = [found[k] for k, _ in tasks]
+    return Judged(
+        np.concatenate([one.amplitude for one in parts]),
+        {name: np.concatenate([one.worst[name] for one in parts]) for name in parts[0].worst},
+        np.concatenate([one.excess for one in parts]),
+    )
+
+
+def _judged(space: Space, u: Real) -> Judged:
+    return space.judge(u, margins=True)
 
 
 def _first(space: Space) -> Real:

@@ -250,7 +250,9 @@ def plan_from(store: ChunkStore) -> Plan:
     return Plan(machine, design, loads, tuple(known["quantities"]), omega, known["branch"])
 
 
-def refuse_other(kept: Mapping[str, Any], now: Mapping[str, Any], folder: object) -> None:
+def refuse_other(
+    kept: Mapping[str, Any], now: Mapping[str, Any], folder: object, what: str = "study"
+) -> None:
     """See that a store is one of these inputs.
 
     Raises
@@ -262,7 +264,7 @@ def refuse_other(kept: Mapping[str, Any], now: Mapping[str, Any], folder: object
     if found:
         more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
         raise StoreError(
-            f"{folder} holds a study of other inputs: {found[0]}{more}; name another folder."
+            f"{folder} holds a {what} of other inputs: {found[0]}{more}; name another folder."
         )
 
 
