@@ -254,12 +254,12 @@ class Space:
                 found.append(gene.share_of(getattr(screen, gene.name)))
         return np.array(found)
 
-    def judge(self, u: Real, *, margins: bool = False) -> Judged:
+    def judge(self, u: Real, *, margins: Sequence[Load] = ()) -> Judged:
         """What candidates (C, D) are like.
 
-        With ``margins`` the distance to the jump is looked at, too, of the drawings of those that
-        fit else, under the softest and the stiffest load; the proof looks at all. It takes motions
-        at many speeds, where all others are at one. Without, it counts as met.
+        The distance to the jump is looked at under the loads ``margins``, of the drawings of those
+        that fit else: it takes motions at many speeds, where all others are at one. Without loads
+        it counts as met.
         """
         springs = [self.spring_of(one) for one in u]
         return self._judged(self.columns(u), springs, self.duty.corners, margins)
@@ -274,14 +274,14 @@ class Space:
         for (name, share), draw in zip(scatter.items(), draws.T, strict=True):
             rows[name] = float(getattr(screen, name)) * (1.0 + share * draw)
         springs = [self.spring_of(u)] * BUILT
-        return self._judged(rows, springs, self.duty.corners[:1], margins=True)
+        return self._judged(rows, springs, self.duty.corners[:1], self.farthest)
 
     def _judged(
         self,
         columns: Columns,
         springs: Sequence[tuple[SpringType, int] | None],
         corners: Sequence[Mapping[str, float]],
-        margins: bool,
+        margins: Sequence[Load],
     ) -> Judged:
         count = len(springs)
         found = self.judge_columns(columns, count, corners)
@@ -295,11 +295,12 @@ class Space:
         excess = np.concatenate(over, axis=1)
         fit = np.flatnonzero((excess <= MET).all(axis=1))
         if self._of_jumps and margins and fit.size:
-            excess[fit, -1] = self._nearness({name: one[fit] for name, one in columns.items()})
+            kept = {name: one[fit] for name, one in columns.items()}
+            excess[fit, -1] = self._nearness(kept, margins)
         return Judged(found.amplitude, found.worst, excess)
 
     @cached_property
-    def _farthest(self) -> tuple[Load, ...]:
+    def farthest(self) -> tuple[Load, ...]:
         """The loads between which the jump moves farthest: softest and stiffest for its mass."""
         loads = self.duty.loads
 
@@ -310,12 +311,12 @@ class Space:
         ends = (min(loads, key=own), max(loads, key=own))
         return ends[:1] if ends[0] is ends[1] else ends
 
-    def _nearness(self, columns: Columns) -> Real:
-        """By how much drawings come too near to the jump under those loads, as a share, (C,)."""
+    def _nearness(self, columns: Columns, loads: Sequence[Load]) -> Real:
+        """By how much drawings come too near to the jump under some loads, as a share, (C,)."""
         least = float(self.duty.bounds.jump_margin or 1.0)
         told = [
             jump_distance_loaded(self.screen, columns, load, self.duty.speeds, least, processors())
-            for load in self._farthest
+            for load in loads
         ]
         return np.asarray(1.0 - _least(np.concatenate(told, axis=1)) / least)
 

@@ -327,10 +327,7 @@ def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
                     return _Outcome(found, None, tuple(thrown))
             # A polish may end too near to a jump, of which it knows nothing.
             for found in _versions(space, front.u[k], monitor):
-                proof = assess(
-                    _project(space.duty, space.machine(found.u)), monitor=_of_proof(monitor)
-                )
-                why = _why_not(proof, space.duty)
+                proof, why = _proof(space.duty, space.machine(found.u), monitor)
                 if not why:
                     return _Outcome(found, proof, tuple(thrown))
                 thrown.append(why)
@@ -350,12 +347,7 @@ def _yield(space: Space, outcome: _Outcome) -> tuple[float, tuple[float, float]]
 def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polished]:
     """A candidate after its polish, then as it was found."""
     yield polish(space, u, _told(monitor, "polishing", SEARCHED, POLISHED))
-    yield Polished(u, space.judge(u[None], margins=True), {})
-
-
-def _of_proof(monitor: Monitor | None) -> Monitor:
-    told = _told(monitor, "proving", POLISHED, 1.0)
-    return lambda _, share: told(share)
+    yield Polished(u, space.judge(u[None], margins=space.duty.loads), {})
 
 
 def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Callable[[float], None]:
@@ -379,10 +371,38 @@ def _project(duty: Duty, screen: FlipFlowScreen) -> Project:
     )
 
 
-def _why_not(proof: Assessment, duty: Duty) -> str:
-    """Why a machine fails its proof; empty where it does not."""
-    if proof.state == FAIL or proof.start_fails:
-        return proof.verdict
+def _proof(duty: Duty, screen: FlipFlowScreen, monitor: Monitor | None) -> tuple[Assessment, str]:
+    """The drawing judged, and why it fails; so may machines with all parts at one end of theirs."""
+    tell = _told(monitor, "proving", POLISHED, 1.0)
+    ends = _ends(duty)
+    parts = 1 + len(ends)
+    drawn = assess(_project(duty, screen), monitor=lambda _, share: tell(share / parts))
+    if drawn.state == FAIL or drawn.start_fails:
+        return drawn, drawn.verdict
+    why = _other_motion(drawn, duty)
+    for k, (name, factors) in enumerate(ends.items(), 1):
+        if why:
+            break
+        fields = {field: factor * getattr(screen, field) for field, factor in factors.items()}
+        built = assess(
+            _project(duty, screen.replace(**fields)),
+            monitor=lambda _, share, k=k: tell((k + share) / parts),  # type: ignore[misc]
+        )
+        told = built.verdict if built.start_fails else _other_motion(built, duty)
+        why = f"{name}: {told}" if told else ""
+    return drawn, why
+
+
+def _ends(duty: Duty) -> dict[str, Mapping[str, float]]:
+    """Factors of the two corners of the scatter at which all parts are at one end of theirs."""
+    if not duty.scatter:
+        return {}
+    _, least, *_, greatest = duty.corners
+    return {"every part at its least": least, "every part at its greatest": greatest}
+
+
+def _other_motion(proof: Assessment, duty: Duty) -> str:
+    """Another stable motion at speed under some load, or none at all; empty where all is well."""
     for case in proof.cases:
         own = None if case.orbit is None else case.orbit.amplitude("relative")
         for orbit in case.orbits:

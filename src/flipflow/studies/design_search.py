@@ -97,7 +97,7 @@ def search(
     except Cancelled:
         cancelled = True
     u = np.unique(np.array(algorithm.pop.get("X"), float), axis=0)
-    judged = space.judge(u, margins=True)
+    judged = space.judge(u, margins=space.duty.loads)
     best = _front(space, judged)
     return Front(u[best], _rows(judged, best), cancelled, algorithm.evaluator.n_eval)
 
@@ -127,7 +127,7 @@ class _Judging:
 def _judged_by(executor: Executor | None, space: Space, u: Real) -> Judged:
     """Candidates judged, a few at a time where an executor does it."""
     if executor is None:
-        return space.judge(u, margins=True)
+        return space.judge(u, margins=space.farthest)
     tasks = [(k, (space, u[k : k + TOGETHER])) for k in range(0, u.shape[0], TOGETHER)]
     found = dict(run_chunks(executor, _judged, tasks))
     parts = [found[k] for k, _ in tasks]
@@ -139,7 +139,7 @@ def _judged_by(executor: Executor | None, space: Space, u: Real) -> Judged:
 
 
 def _judged(space: Space, u: Real) -> Judged:
-    return space.judge(u, margins=True)
+    return space.judge(u, margins=space.farthest)
 
 
 def _first(space: Space) -> Real:

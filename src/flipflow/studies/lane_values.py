@@ -97,8 +97,9 @@ def lane_values(
 
 
 Answer = tuple[dict[str, Real], Int]
-# Names of the leading amplitude and of the jumps of the path, beside those of the quantities.
-SIZE, JUMPS = "", "jumps"
+# Names of the leading amplitude, of the jumps of the path, and of whether an even machine leans,
+# beside those of the quantities.
+SIZE, JUMPS, LEANS = "", "jumps", "leans"
 RINGS = 8  # parts of a distance within which jumps are looked for
 ONE_MOTION = 1e-6  # share within which two amplitudes are of one motion
 
@@ -113,9 +114,10 @@ def jump_distance(
 ) -> Real:
     """Distance |omega - jump| / jump of S variants from their nearest jump, (S,), at most ``most``.
 
-    Lanes rise and fall through rings around omega. Where they jump, and where they part or meet, is
-    a jump; distances are rounded down to a ring's edge, and 0 where two motions stand at omega. A
-    jump and the one back may be missed where they lie within one ring.
+    Lanes rise and fall through rings around omega. Where they jump, part or meet, where their
+    motion is lost to one of more periods, and where it begins to lean, is a jump. Distances are
+    rounded down to a ring's edge, and 0 where two motions or none stand at omega. A jump and the
+    one back may be missed where they lie within one ring.
 
     Parameters
     ----------
@@ -133,9 +135,11 @@ def jump_distance(
     nearest = np.full(rows, np.nan)
     for batch in batches(machine, columns)[0]:
         question = _Question(machine, columns, (), batch, threads, None)
-        up, down = question.rising(speeds)[0], question.falling(speeds, span[1])[0]
+        up, why = question.rising(speeds)
+        down, why_down = question.falling(speeds, span[1])
         same = np.abs(up[SIZE] - down[SIZE]) <= ONE_MOTION * np.maximum(up[SIZE], down[SIZE])
-        told = (up[JUMPS], down[JUMPS], same.astype(float))
+        same &= (why == FOUND) & (why_down == FOUND)
+        told = (up[JUMPS], down[JUMPS], up[LEANS], down[LEANS], same.astype(float))
         jumped = np.any([np.diff(one, axis=1) != 0.0 for one in told], axis=0)
         near = np.where(jumped, inner, most).min(axis=1)
         nearest[batch.rows] = np.where(same[:, RINGS], near, 0.0)
@@ -175,7 +179,11 @@ class _Question:
         found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
         told = _LaneMotions(plan, read)
         values = {one.name: told.value(one) for one in self.quantities}
-        of_path = {SIZE: told.amplitude(plan.leading), JUMPS: found.jumps.astype(float)}
+        of_path = {
+            SIZE: told.amplitude(plan.leading),
+            JUMPS: found.jumps.astype(float),
+            LEANS: found.leaning.astype(float),
+        }
         return values | of_path, found.reason
 
 
