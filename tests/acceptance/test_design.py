@@ -79,7 +79,7 @@ def test_a_grid_finds_nothing_better_by_more_than_its_step():
     inner = [k for k, one in enumerate(best) if 1e-3 < one < 1.0 - 1e-3][:2] or [0, 1]
     inner += [k for k in range(len(names)) if k not in inner][: 2 - len(inner)]
     rows[:, inner[0]], rows[:, inner[1]] = (one.ravel() for one in np.meshgrid(u, u))
-    judged = space.judge(rows)
+    judged = space.judge(rows, margins=space.duty.loads)
     bands = judged.band[judged.fits]
     assert bands.size
     assert found.chosen.band <= bands.min() * (1.0 + 1e-6)
@@ -184,6 +184,22 @@ def test_what_a_limit_costs_is_what_a_rerun_finds():
         gained = float(own.judged.band[0] - moved.judged.band[0])
         # A share of the target: the tolerance is less by their ratio.
         assert gained == pytest.approx(amplitude * share * 0.8 / 7.0, rel=0.1)
+
+
+def test_speeds_that_the_limits_forbid_are_refused():
+    with pytest.raises(ff.InputError, match="speed = '1100 rpm': the limits allow 600 to 1000 rpm"):
+        ff.design(duty(speed=(1100.0 / RPM, 1100.0 / RPM), limits=None))
+
+
+def test_no_other_motion_stands_at_the_ends_of_the_scatter():
+    """Softer springs leave the steadiest of all beside a second motion: it is not proposed."""
+    found = proposed()
+    for corner in (found.duty.corners[1], found.duty.corners[-1]):
+        built = {name: factor * getattr(found.screen, name) for name, factor in corner.items()}
+        for load in found.duty.loads:
+            machine = found.screen.replace(**built).loaded(load)
+            motions = ff.periodic_orbits(machine, SPEED, max_periods=1)
+            assert sum(one.stable for one in motions) == 1
 
 
 def test_a_machine_near_its_jump_is_not_proposed():

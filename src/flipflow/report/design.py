@@ -26,14 +26,16 @@ from flipflow.report.blocks import (
 from flipflow.report.first_page import cases, limits
 from flipflow.report.numbers import NOTHING, bounds, number, quantity
 from flipflow.report.registry import Part, section
-from flipflow.studies.assessment import FAIL, PASS
-from flipflow.studies.candidates import BUILT, label_of
+from flipflow.studies.assessment import ATTENTION, FAIL, PASS
+from flipflow.studies.candidates import ALONE, BUILT, EVEN, MET, MOTION, label_of
 from flipflow.studies.design import Proposal, Trial
 
+CERTAIN = 0.99  # share of machines as built from which a proposal passes
 NOT_COVERED = (
     "The search judges scatter at its corners and on the drawing. The material moves with the "
     "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
-    "corners; so is the margin to the jump. Fatigue of rubber, its wear and its creep are not "
+    "corners; so is the margin to the jump. Starts and other motions are judged as drawn and with "
+    "every part at one end of its scatter. Fatigue of rubber, its wear and its creep are not "
     "computed: bounds on gap and shear stiffness keep the search away from "
     "machines that hang on them."
 )
@@ -42,7 +44,7 @@ NOT_COVERED = (
 @section(Proposal, Part.FIRST_PAGE, 10, brief=True)
 def verdict_of_proposal(found: Proposal) -> Iterator[Block]:
     """What was found."""
-    yield Verdict(_sentence(found), PASS if found.possible else FAIL)
+    yield Verdict(_sentence(found), _state(found))
     if found.cancelled:
         yield Note("The search was stopped: this is the best so far, and it is not proved.")
     for why in found.thrown_out:
@@ -63,7 +65,7 @@ def duty_of_proposal(found: Proposal) -> Iterator[Block]:
             ("Relative amplitude", f"{_mm(duty.target)} within {_mm(duty.tolerance)} either way"),
             ("Speed", f"{speeds} rpm"),
             ("Combinations", _combinations(found)),
-            ("Loads", ", ".join(load.name or "empty" for load in duty.loads)),
+            ("Loads", "; ".join(load.name or "empty" for load in duty.loads)),
             ("Scatter of parts", scatter or "none"),
             ("Preferred", ", ".join(duty.prefer)),
             ("Machines looked at", f"{found.evaluated}, seed {duty.seed}"),
@@ -109,16 +111,18 @@ def steadiness_of_proposal(found: Proposal) -> Iterator[Block]:
 @section(Proposal, Part.FIRST_PAGE, 50, brief=True)
 def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
     """How far each constraint is away, and what it costs."""
+    priced = bool(found.prices)
     columns = (
         Column("Constraint"), Column("Allowed", brief=False), Column("Margin", "%", numeric=True),
-        Column("1 % more of it narrows the band by", "um", numeric=True),
+        *([Column("1 % more of it narrows the band by", "um", numeric=True)] if priced else []),
     )  # fmt: skip
     rows = [
         cells(
-            label_of(name), _allowed(found, name), f"{0.0 - 100.0 * share:.2f}", _price(found, name)
+            label_of(name), _allowed(found, name), _margin(name, share),
+            *([_price(found, name)] if priced else []),
         )
         for name, share in found.excess.items()
-    ]
+    ]  # fmt: skip
     rows += [
         cells(label_of(name), "end of what is free", "0.00", _price(found, name))
         for name in found.prices
@@ -128,8 +132,11 @@ def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
         "Of the relative amplitude 1 % of the target more to each side; of an end 1 % of its "
         "interval."
     )
-    if not found.prices:
-        caption = "The machine is as the search found it: costs are told of a polished one alone."
+    if not priced:
+        caption = (
+            "What a constraint costs is told of a machine that its polish ends at; this one lies "
+            "before, where it leaves another motion or the jump far enough away."
+        )
     yield Table("What binds, and what it costs", columns, tuple(rows), caption)
 
 
@@ -157,15 +164,41 @@ def proof_of_proposal(found: Proposal) -> Iterator[Block]:
         yield Text(
             f"{100.0 * found.passing:.4g} % ({low} to {high} %, 95 % confidence) of {BUILT:,} "
             "machines, their parts drawn evenly within the scatter, meet every constraint in every "
-            "combination.",
+            f"combination.{_failing(found)}",
             "Yield:",
         )
     yield Text(NOT_COVERED, "Not covered:")
 
 
+def _state(found: Proposal) -> str:
+    """Attention where the machine is not proved, or where some of those that are built fail."""
+    if not found.possible:
+        return FAIL
+    some_fail = found.passing < CERTAIN
+    return ATTENTION if found.cancelled or found.assessment is None or some_fail else PASS
+
+
+def _margin(name: str, excess: float) -> str:
+    """Margin in percent; of what is a question of yes or no, the answer."""
+    if np.isnan(excess):
+        return NOTHING
+    if name in (MOTION, EVEN, ALONE):
+        return "met" if excess <= MET else "not met"
+    return f"{0.0 - 100.0 * excess:.2f}"
+
+
 def _sentence(found: Proposal) -> str:
     words = found.sentence
     return f"{words[0].upper()}{words[1:]}."
+
+
+def _failing(found: Proposal) -> str:
+    """What the others miss."""
+    missed = {name: share for name, share in found.failing.items() if share > 0.0}
+    told = [
+        f"{label_of(n)} ({100.0 * missed[n]:.3g} %)" for n in sorted(missed, key=missed.__getitem__)
+    ]
+    return f" Others miss: {', '.join(told[::-1])}." if told else ""
 
 
 def _combinations(found: Proposal) -> str:

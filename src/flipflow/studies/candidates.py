@@ -23,12 +23,13 @@ from flipflow.model.limits import limit_bounds
 from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.vary import Choice, Interval
-from flipflow.studies.study_values import evaluate_loaded, jump_distance_loaded
+from flipflow.studies.study_values import evaluate_loaded, jump_distance_loaded, one_motion_loaded
 
 Real = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 TARGET, MOTION, EVEN = "relative amplitude asked", "a stable motion", "a motion that does not lean"
 STRAIN, FORCE = "strain of the catalogue", "force of the catalogue"
+ALONE = "one motion at speed"
 JUMP = "jump_margin"
 AMPLITUDE, OFFSET = "relative_amplitude", "relative_offset"
 MET = 1e-6  # excess up to which a constraint counts as met: a polish ends on what binds
@@ -191,7 +192,7 @@ class Space:
     def constraints(self) -> tuple[str, ...]:
         """Names of what must be met, in the order of ``excess``."""
         of_springs = (name for name, _, _ in self._of_springs)
-        return (TARGET, MOTION, EVEN, *self.limited, *of_springs, *self._of_jumps)
+        return (TARGET, MOTION, EVEN, *self.limited, *of_springs, ALONE, *self._of_jumps)
 
     @cached_property
     def _of_jumps(self) -> tuple[str, ...]:
@@ -257,9 +258,9 @@ class Space:
     def judge(self, u: Real, *, margins: Sequence[Load] = ()) -> Judged:
         """What candidates (C, D) are like.
 
-        The distance to the jump is looked at under the loads ``margins``, of the drawings of those
-        that fit else: it takes motions at many speeds, where all others are at one. Without loads
-        it counts as met.
+        Whether all parts at one end of their scatter leave another stable motion at speed, and how
+        far the jump is from the drawing, is looked at under the loads ``margins`` and of those that
+        fit else: it takes motions at many speeds. Without loads both count as met.
         """
         springs = [self.spring_of(one) for one in u]
         return self._judged(self.columns(u), springs, self.duty.corners, margins)
@@ -290,13 +291,14 @@ class Space:
             allowed = [getattr(one[0], field) if one else None for one in springs]
             most = np.array([np.inf if one is None else one for one in allowed])
             over.append((found.worst[name] / most - 1.0)[:, None])
-        if self._of_jumps:
-            over.append(np.full((count, 1), -1.0))
+        over.append(np.full((count, 1 + len(self._of_jumps)), -1.0))
         excess = np.concatenate(over, axis=1)
         fit = np.flatnonzero((excess <= MET).all(axis=1))
-        if self._of_jumps and margins and fit.size:
+        if margins and fit.size:
             kept = {name: one[fit] for name, one in columns.items()}
-            excess[fit, -1] = self._nearness(kept, margins)
+            excess[fit, self.constraints.index(ALONE)] = self._not_alone(kept, corners, margins)
+            if self._of_jumps:
+                excess[fit, -1] = self._nearness(kept, margins)
         return Judged(found.amplitude, found.worst, excess)
 
     @cached_property
@@ -310,6 +312,20 @@ class Space:
 
         ends = (min(loads, key=own), max(loads, key=own))
         return ends[:1] if ends[0] is ends[1] else ends
+
+    def _not_alone(
+        self, columns: Columns, corners: Sequence[Mapping[str, float]], loads: Sequence[Load]
+    ) -> Real:
+        """Share of extreme corners, loads and speeds at which there is another motion, (C,)."""
+        count = len(next(iter(columns.values())))
+        ends = (corners[1], corners[-1]) if len(corners) > 1 else corners
+        rows = self._scattered(columns, count, ends)
+        told = [
+            one_motion_loaded(self.screen, rows, load, self.duty.speeds, processors())
+            for load in loads
+        ]
+        alone = np.concatenate([one.reshape(count, -1) for one in told], axis=1)
+        return np.asarray(1.0 - alone.mean(axis=1))
 
     def _nearness(self, columns: Columns, loads: Sequence[Load]) -> Real:
         """By how much drawings come too near to the jump under some loads, as a share, (C,)."""

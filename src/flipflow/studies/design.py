@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,12 +19,14 @@ from flipflow.model.arguments import checked_count, checked_monitor, checked_pat
 from flipflow.model.duty import Duty, SpringType
 from flipflow.model.fields import FIELD
 from flipflow.model.monitor import Monitor
+from flipflow.model.numerals import rpm
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.vary import Choice
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result, above
 from flipflow.studies.assessment import FAIL, Assessment, assess
-from flipflow.studies.candidates import MET, Judged, Space, label_of
+from flipflow.studies.candidates import JUMP, MET, Space, label_of
 from flipflow.studies.design_search import (
     GENERATIONS,
     POPULATION,
@@ -39,6 +41,7 @@ from flipflow.studies.tolerance import confidence_interval
 
 Real = NDArray[np.float64]
 SEARCHED, POLISHED = 0.7, 0.8  # shares of the work that are done then
+HALVINGS = 6  # of the way to a polished machine that leaves another motion or a jump too near
 TRIED = 3  # machines proved before it is said that none passes
 COEXISTING = 1e-3  # share by which the amplitude of another stable motion may differ
 
@@ -106,6 +109,10 @@ class Proposal(Frozen, Result):
         stopped.
     passing_interval
         Its 95 % confidence interval, (2,).
+    failing
+        Share of these machines that miss each constraint.
+    generations
+        How long was searched.
     thrown_out
         Machines of the set that failed this proof, and why.
     evaluated
@@ -133,6 +140,8 @@ class Proposal(Frozen, Result):
     version: str
     passing: float = math.nan
     passing_interval: tuple[float, float] = (math.nan, math.nan)
+    failing: Mapping[str, float] = field(default_factory=dict)
+    generations: int = GENERATIONS
 
     def __repr__(self) -> str:
         return f"Proposal({self.duty.name}: {self.sentence})"
@@ -159,8 +168,12 @@ class Proposal(Frozen, Result):
     @property
     def machine_file(self) -> str:
         """The chosen machine as a machine file, which says where its new values come from."""
-        own = dict.fromkeys(self.fields, f"chosen for the duty {self.duty.name}")
-        sources = {FIELD[name].key: words for name, words in own.items()}
+        sources = dict.fromkeys(
+            (FIELD[name].key for name in self.fields), f"chosen for the duty {self.duty.name}"
+        )
+        before, now = self.duty.project.limits, self.duty.bounds
+        asked = [f"limits.{n}" for n in now.given if getattr(now, n) != getattr(before, n)]
+        sources |= dict.fromkeys(("operation.speed", *asked), f"the duty {self.duty.name}")
         return str(above("io.machine_text", "machine_text")(self.project, sources))
 
     @cached_property
@@ -185,20 +198,35 @@ class Proposal(Frozen, Result):
         if not self.possible and self.thrown_out and not self.missed:
             return f"no machine that was tried passes its proof: {self.thrown_out[-1]}"
         if not self.possible:
-            names = [one for one in self.against or self.missed if one in self.excess]
-            words = " and ".join(label_of(one) for one in names)
-            low, high = 1e3 * self.chosen.amplitude.min(), 1e3 * self.chosen.amplitude.max()
-            return (
-                f"the duty cannot be done with what is free: {words} "
-                f"{'exclude each other' if len(names) > 1 else 'cannot be met'}; the nearest "
-                f"machine does {low:.3g} to {high:.3g} mm"
-            )
-        target, rpm = 1e3 * self.duty.target, self.duty.speeds.mean() * 30.0 / math.pi
-        found = f"holds {target:.3g} mm at {rpm:.4g} rpm within a band of {band}"
-        found += " over every load case and scatter"
-        if not math.isfinite(self.factor):
-            return found
-        return f"{found}, {self.factor:.3g} times as steady as the machine of the file"
+            return f"{self._impossible}; the nearest machine does {self._reached} mm"
+        target, speed = 1e3 * self.duty.target, rpm(float(self.duty.speeds.mean()))
+        asked = f"{target:.3g} +-{1e3 * self.duty.tolerance:.3g} mm asked"
+        found = f"does {self._reached} mm, {asked}, at {speed} rpm "
+        found += f"over every load case and scatter: a band of {band}"
+        if math.isfinite(self.factor):
+            found += f", {self.factor:.3g} times as steady as the machine of the file"
+        if self.passing < 1.0:
+            found += f"; {100.0 * self.passing:.3g} % of machines as built meet every constraint"
+        return found
+
+    @property
+    def _reached(self) -> str:
+        """Least and greatest amplitude in mm."""
+        low, high = 1e3 * self.chosen.amplitude.min(), 1e3 * self.chosen.amplitude.max()
+        return f"{low:.3g} to {high:.3g}"
+
+    @property
+    def _impossible(self) -> str:
+        """Why the duty is not done."""
+        names = [one for one in self.against or self.missed if one in self.excess]
+        ends = [label_of(one) for one in self.against if one not in self.excess]
+        words = " and ".join(map(label_of, names))
+        chosen = any(isinstance(one.distribution, Choice) for one in self.duty.varied)
+        if self.generations < GENERATIONS and (chosen or self.springs is not None):
+            return f"no machine for the duty in {self.generations} generations: {words} missed"
+        excluded = "exclude each other" if len(names) > 1 else "cannot be met"
+        beside = f" (at the {' and the '.join(ends)})" if ends else ""
+        return f"the duty cannot be done with what is free: {words} {excluded}{beside}"
 
 
 def design(
@@ -254,12 +282,13 @@ def design(
         raise InputError("duty", type(duty).__name__, remedy)
     checked_monitor(monitor)
     rounds = GENERATIONS if generations is None else checked_count("generations", generations, 9999)
+    _refuse_speed(duty)
     space = Space(duty)
 
     front = _searched(space, rounds, store, executor, monitor)
     outcome = _proved(space, front, monitor)
     found = outcome.found
-    passing, passing_interval = _yield(space, outcome)
+    built = _yield(space, outcome)
     if monitor is not None and not outcome.cancelled:
         monitor("design, done", 1.0)
     return Proposal(
@@ -269,7 +298,7 @@ def design(
         chosen=Trial("proposed", space.machine(found.u), found.judged.amplitude[0]),
         beside=_beside(space),
         possible=bool(found.judged.fits[0]) and not outcome.none_left,
-        excess=_excess(space, found.judged),
+        excess=_excess(space, outcome),
         against=found.against,
         prices=found.price,
         springs=space.spring_of(found.u),
@@ -278,9 +307,22 @@ def design(
         evaluated=front.evaluated,
         cancelled=outcome.cancelled,
         version=__version__,
-        passing=passing,
-        passing_interval=passing_interval,
+        passing=built.passing,
+        passing_interval=built.interval,
+        failing=built.failing,
+        generations=rounds,
     )
+
+
+def _refuse_speed(duty: Duty) -> None:
+    """See that the duty asks for speeds at which the machine may run."""
+    if duty.bounds.speed is None:
+        return
+    low, high = duty.bounds.speed
+    if duty.speed[0] < low or duty.speed[1] > high:
+        told = " to ".join(dict.fromkeys(rpm(one) for one in duty.speed))
+        remedy = f"the limits allow {rpm(low)} to {rpm(high)} rpm, change one of the two"
+        raise InputError("speed", f"{told} rpm", remedy)
 
 
 def _searched(
@@ -336,17 +378,44 @@ def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
     return _Outcome(found, proof, tuple(thrown), none_left=True)
 
 
-def _yield(space: Space, outcome: _Outcome) -> tuple[float, tuple[float, float]]:
+@dataclass(frozen=True, eq=False)
+class _Yield:
+    """Shares of machines as they are built."""
+
+    passing: float = math.nan
+    interval: tuple[float, float] = (math.nan, math.nan)
+    failing: Mapping[str, float] = field(default_factory=dict)
+
+
+def _yield(space: Space, outcome: _Outcome) -> _Yield:
     if outcome.cancelled or not space.duty.scatter:
-        return math.nan, (math.nan, math.nan)
-    fits = space.around(outcome.found.u).built(outcome.found.u).fits
+        return _Yield()
+    judged = space.around(outcome.found.u).built(outcome.found.u)
+    fits, missed = judged.fits, (judged.excess > MET).mean(axis=0).tolist()
     low, high = confidence_interval(np.array([fits.sum()]), float(fits.size))[0].tolist()
-    return float(fits.mean()), (low, high)
+    failing = dict(zip(space.constraints, missed, strict=True))
+    return _Yield(float(fits.mean()), (low, high), failing)
 
 
 def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polished]:
-    """A candidate after its polish, then as it was found."""
-    yield polish(space, u, _told(monitor, "polishing", SEARCHED, POLISHED))
+    """A candidate after its polish, or as far on the way there as it fits; then as it was found."""
+    polished = polish(space, u, _told(monitor, "polishing", SEARCHED, POLISHED))
+
+    def on_the_way(share: float) -> Polished:
+        there = u + share * (polished.u - u)
+        judged = space.around(there).judge(there[None], margins=space.duty.loads)
+        return Polished(there, judged, polished.price if share == 1.0 else {})
+
+    best, low, high = on_the_way(1.0), 0.0, 1.0
+    if not best.judged.fits[0]:
+        for _ in range(HALVINGS):
+            middle = on_the_way(0.5 * (low + high))
+            if middle.judged.fits[0]:
+                best, low = middle, 0.5 * (low + high)
+            else:
+                high = 0.5 * (low + high)
+    if best.judged.fits[0]:
+        yield best
     yield Polished(u, space.judge(u[None], margins=space.duty.loads), {})
 
 
@@ -361,8 +430,12 @@ def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Calla
 
 
 def _project(duty: Duty, screen: FlipFlowScreen) -> Project:
+    own = duty.project.document
     return replace(
         duty.project,
+        document=replace(
+            own, name=f"{own.name or duty.project.name}, for {duty.name}", revision=""
+        ),
         screen=screen,
         speed=float(duty.speeds.mean()),
         load_cases=duty.loads,
@@ -432,5 +505,11 @@ def _beside(space: Space) -> tuple[Trial, ...]:
     return tuple(trials)
 
 
-def _excess(space: Space, judged: Judged) -> dict[str, float]:
-    return dict(zip(space.constraints, judged.excess[0].tolist(), strict=True))
+def _excess(space: Space, outcome: _Outcome) -> dict[str, float]:
+    """Of the margin to the jump, which a search only compares, what the proof found."""
+    excess = dict(zip(space.constraints, outcome.found.judged.excess[0].tolist(), strict=True))
+    if JUMP in excess:
+        rows = () if outcome.proof is None else outcome.proof.limits_table
+        known = [-row.margin for row in rows if row.name == JUMP and row.margin is not None]
+        excess[JUMP] = known[0] if known else math.nan
+    return excess

@@ -135,15 +135,27 @@ def jump_distance(
     nearest = np.full(rows, np.nan)
     for batch in batches(machine, columns)[0]:
         question = _Question(machine, columns, (), batch, threads, None)
-        up, why = question.rising(speeds)
-        down, why_down = question.falling(speeds, span[1])
-        same = np.abs(up[SIZE] - down[SIZE]) <= ONE_MOTION * np.maximum(up[SIZE], down[SIZE])
-        same &= (why == FOUND) & (why_down == FOUND)
+        up, down, same = question.both_ways(speeds, span[1])
         told = (up[JUMPS], down[JUMPS], up[LEANS], down[LEANS], same.astype(float))
         jumped = np.any([np.diff(one, axis=1) != 0.0 for one in told], axis=0)
         near = np.where(jumped, inner, most).min(axis=1)
         nearest[batch.rows] = np.where(same[:, RINGS], near, 0.0)
     return nearest
+
+
+def one_motion(
+    machine: Machine, columns: Columns, omega: Real, span: tuple[float, float], threads: int = 1
+) -> NDArray[np.bool_]:
+    """Whether S variants come to the same motion at frequencies (K,) from below and above, (S, K).
+
+    Parameters are those of :func:`lane_values`.
+    """
+    rows = len(next(iter(columns.values())))
+    alone = np.zeros((rows, omega.size), bool)
+    for batch in batches(machine, columns)[0]:
+        question = _Question(machine, columns, (), batch, threads, None)
+        alone[batch.rows] = question.both_ways(omega, span[1])[2]
+    return alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +180,14 @@ class _Question:
         begin = max(top, ABOVE * float(omega.max()))
         solved = self._solved(np.concatenate([[begin], omega[order]]))
         return _in_order(*solved, 1 + np.argsort(order, kind="stable"))
+
+    def both_ways(
+        self, omega: Real, top: float
+    ) -> tuple[dict[str, Real], dict[str, Real], NDArray[np.bool_]]:
+        """Values from below and from above, and where both are of one motion, (L, K)."""
+        (up, why), (down, why_down) = self.rising(omega), self.falling(omega, top)
+        same = np.abs(up[SIZE] - down[SIZE]) <= ONE_MOTION * np.maximum(up[SIZE], down[SIZE])
+        return up, down, same & (why == FOUND) & (why_down == FOUND)
 
     def _solved(self, omega: Real) -> Answer:
         nearby = nearby_motions(self.machine.system().with_bonded(), self.batch.system, omega)

@@ -22,7 +22,7 @@ from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen, Load, loaded_columns
 from flipflow.model.system import Machine
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
-from flipflow.studies.lane_values import jump_distance, lane_values, on_lanes
+from flipflow.studies.lane_values import jump_distance, lane_values, on_lanes, one_motion
 from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.sensitivity_samples import (
     STOP_FIELDS,
@@ -128,6 +128,14 @@ def jump_distance_loaded(
     span = _span(machine, omega)
     told = [jump_distance(machine, loaded, at, most, span, threads) for at in omega.tolist()]
     return np.stack(told, axis=1)
+
+
+def one_motion_loaded(
+    screen: FlipFlowScreen, columns: Columns, load: Load, omega: Real, threads: int
+) -> NDArray[np.bool_]:
+    """:func:`~flipflow.studies.lane_values.one_motion` under a load."""
+    loaded, machine = _loaded(screen, load, columns), screen.loaded(load)
+    return one_motion(machine, loaded, omega, _span(machine, omega), threads)
 
 
 def _span(machine: Machine, omega: Real) -> tuple[float, float]:
