@@ -293,12 +293,20 @@ def test_the_template_runs_as_it_stands(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert CliRunner().invoke(app, ["new", "mine.toml", "--duty"]).exit_code == 0
     arguments = ["design", "mine.toml", "-o", "out", "--generations", "8", "--json", "it.json"]
+    Path("out").mkdir()
+    Path("out/report.pdf").write_text("of another duty", encoding="utf-8")
     ended = CliRunner().invoke(app, arguments)
     assert ended.exit_code == 0, ended.output
+    assert not Path("out/report.pdf").exists()
     found = ff.open_result("it.json")
     assert found.possible
     again = ff.load_project("out/machine.toml")
     assert again.screen == found.screen
+    for name in found.fields:
+        value = getattr(again.screen, name)
+        assert value == float(f"{value:.7g}")
+    assert again.document.name.endswith(", for mine")
+    assert again.sources["operation.speed"] == "the duty mine"
     assert again.speed == found.project.speed
     assert again.limits == found.project.limits
     assert [load.name for load in again.load_cases] == ["empty", "full, stiffening"]

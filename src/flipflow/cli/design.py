@@ -105,6 +105,8 @@ def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
 
         target.content(PDF, proposal_pdf(found))
         target.wrote(PDF)
+    else:
+        target.replaces([PDF])  # one of another duty would stay beside this report
     document = document_of(found)
     target.data(DATA, document)
     target.picture(FIGURE, figure(found), found.duty.name)

@@ -34,6 +34,7 @@ JUMP = "jump_margin"
 AMPLITUDE, OFFSET = "relative_amplitude", "relative_offset"
 MET = 1e-6  # excess up to which a constraint counts as met: a polish ends on what binds
 BUILT = 1024  # machines of which the yield is a share; Sobol's sequence wants a power of 2
+SIGNIFICANT = 12  # digits of a field, so that one that was rounded is told by as few
 LEAN = 1e-2  # share of the amplitude by which equal gaps may be left to one side
 READ: Mapping[Objective, str] = {
     "acceleration": "floating_frame_acceleration",
@@ -69,7 +70,8 @@ class Gene:
         """Values of the field at shares (C,)."""
         if self.values:
             return np.asarray(np.asarray(self.values)[self.index(u)])
-        return np.asarray(self.low + u * (self.high - self.low))
+        values = self.low + u * (self.high - self.low)
+        return np.array([float(f"{one:.{SIGNIFICANT}g}") for one in values.tolist()])
 
     def index(self, u: Real) -> NDArray[np.int64]:
         """Which of the values a share stands for."""
@@ -235,6 +237,15 @@ class Space:
         """The machine of one candidate, (D,)."""
         row = {name: column[0].item() for name, column in self.columns(u[None]).items()}
         return self.screen.replace(**row)
+
+    def rounded(self, u: Real, digits: int) -> Real:
+        """A candidate, (D,), whose fields have so many significant digits."""
+        found = u.copy()
+        for d, gene in enumerate(self.genes):
+            if not gene.values:
+                value = float(f"{gene.decoded(u[d : d + 1])[0]:.{digits}g}")
+                found[d] = gene.share_of(value)
+        return found
 
     def spring_of(self, u: Real) -> tuple[SpringType, int] | None:
         """The catalogue's spring of a candidate, and how many."""

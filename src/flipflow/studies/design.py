@@ -41,6 +41,7 @@ from flipflow.studies.tolerance import confidence_interval
 
 Real = NDArray[np.float64]
 SEARCHED, POLISHED = 0.7, 0.8  # shares of the work that are done then
+DIGITS = (5, 6, 7)  # of the fields of a proposal
 HALVINGS = 6  # of the way to a polished machine that leaves another motion or a jump too near
 TRIED = 3  # machines proved before it is said that none passes
 COEXISTING = 1e-3  # share by which the amplitude of another stable motion may differ
@@ -415,8 +416,18 @@ def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polish
             else:
                 high = 0.5 * (low + high)
     if best.judged.fits[0]:
-        yield best
-    yield Polished(u, space.judge(u[None], margins=space.duty.loads), {})
+        yield _rounded(space, best)
+    yield _rounded(space, on_the_way(0.0))
+
+
+def _rounded(space: Space, found: Polished) -> Polished:
+    """A candidate with as few digits as leave it fit."""
+    for digits in DIGITS:
+        u = space.rounded(found.u, digits)
+        judged = space.around(u).judge(u[None], margins=space.duty.loads)
+        if judged.fits[0]:
+            return replace(found, u=u, judged=judged)
+    return found
 
 
 def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Callable[[float], None]:
