@@ -9,6 +9,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 from scipy.stats import qmc
 from typer.testing import CliRunner
@@ -153,6 +154,49 @@ def test_the_choice_from_a_catalogue_is_the_best_of_all():
     assert found.chosen.band == pytest.approx(judged.band[judged.fits].min(), rel=1e-9)
     assert found.springs is not None
     assert found.screen.shear_stiffness == found.springs[0].stiffness * found.springs[1]
+
+
+CATALOGUE = {
+    "commas.csv": "name,stiffness,loss_factor,height\nA,225 kN/m,0.07,50 mm\nB,180 kN/m,8 %,\n",
+    "head.csv": "name,stiffness [kN/m],loss_factor,height [mm]\nA,225,0.07,50\nB,180,8 %,\n",
+    "semicolons.csv": "name;stiffness [kN/m];loss_factor;height\nA;225;0.07;50 mm\nB;180;0.08;\n",
+    "book.xlsx": "",
+}
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_a_catalogue_is_a_table_of_any_kind(name, tmp_path, monkeypatch):
+    """Units behind each number or in the head; XLSX cells are numbers."""
+    monkeypatch.chdir(tmp_path)
+    if name.endswith(".xlsx"):
+        book = openpyxl.Workbook()
+        for row in (
+            ("name", "stiffness [kN/m]", "loss_factor", "height [mm]"),
+            ("A", 225, 0.07, 50), ("B", 180.0, 0.08, None),
+        ):  # fmt: skip
+            book.active.append(row)
+        book.save(name)
+    else:
+        Path(name).write_text(CATALOGUE[name], encoding="utf-8")
+    text = IMPOSSIBLE_DUTY.replace("[limits]", f'[catalogue]\nfile = "{name}"\n[limits]')
+    Path("duty.toml").write_text(text.replace("shear_stiffness", "# "), encoding="utf-8")
+    one, other = ff.load_duty("duty.toml").catalogue
+    assert one == ff.SpringType(name="A", stiffness=225e3, loss_factor=0.07, height=0.05)
+    assert other == ff.SpringType(name="B", stiffness=180e3, loss_factor=0.08)
+
+
+def test_a_catalogue_with_a_fault_names_its_place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = IMPOSSIBLE_DUTY.replace("[limits]", '[catalogue]\nfile = "c.csv"\n[limits]')
+    Path("duty.toml").write_text(text.replace("shear_stiffness", "# "), encoding="utf-8")
+    for table, told in {
+        "name,stiffness,loss_factor,prise\n": "c.csv, head = 'prise': 'price' perhaps; ",
+        "name,stiffness,loss_factor\n\nA,225,0.07\n": "c.csv, A, stiffness = '225': give its unit",
+    }.items():
+        Path("c.csv").write_text(f"{table}B,1 kN/m,0.1\n", encoding="utf-8")
+        with pytest.raises(ff.InputError) as refused:
+            ff.load_duty("duty.toml")
+        assert told in str(refused.value)
 
 
 def test_numbers_of_pieces_and_material_are_lanes_too():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import math
 import os
 from collections.abc import Mapping
@@ -197,33 +198,53 @@ def _springs(path: Path) -> tuple[SpringType, ...]:
     rows = _rows(path)
     if len(rows) < 2:
         raise InputError("catalogue.file", path.name, "give a head and at least one spring")
-    head = [str(one).strip() for one in rows[0]]
-    known = ("name", *COLUMNS)
-    for one in head:
-        if one not in known:
-            raise InputError("catalogue.file", one, f"name each column one of {', '.join(known)}")
-    missing = [one for one in ("name", "stiffness", "loss_factor") if one not in head]
+    heads = [_head(str(one), path) for one in rows[0]]
+    names, units = [name for name, _ in heads], dict(heads)
+    missing = [one for one in ("name", "stiffness", "loss_factor") if one not in names]
     if missing:
         raise InputError("catalogue.file", path.name, f"a column is missing: {missing[0]}")
-    return tuple(_spring(dict(zip(head, row, strict=False)), path) for row in rows[1:])
+    return tuple(_spring(dict(zip(names, row, strict=False)), units, path) for row in rows[1:])
 
 
-def _spring(row: Mapping[str, Any], path: Path) -> SpringType:
+def _head(written: str, path: Path) -> tuple[str, str]:
+    """Name of a column, and the unit behind it in brackets."""
+    name, _, unit = written.strip().removesuffix("]").partition("[")
+    name, known = name.strip(), ("name", *COLUMNS)
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 1)
+        meant = f"'{near[0]}' perhaps; " if near else ""
+        remedy = f"{meant}name each column one of {', '.join(known)}"
+        raise InputError(f"{path.name}, head", name, remedy)
+    return name, unit.strip()
+
+
+def _spring(row: Mapping[str, Any], units: Mapping[str, str], path: Path) -> SpringType:
     values: dict[str, Any] = {"name": str(row["name"]).strip()}
     for key, (unit, needed) in COLUMNS.items():
         written = row.get(key)
+        label = f"{path.name}, {values['name']}, {key}"
         if written is None or str(written).strip() == "":
             if needed:
-                raise InputError(f"{path.name}, {values['name']}, {key}", LEFT_OUT, "give it")
+                raise InputError(label, LEFT_OUT, "give it")
             continue
-        label = f"{path.name}, {values['name']}, {key}"
+        if unit and _is_number(written):
+            if not units[key]:
+                remedy = f"give its unit, behind it or in the head: '{key} [k{unit}]' for example"
+                raise InputError(label, written, remedy)
+            written = f"{written} {units[key]}"
         values[key] = parse_quantity(
-            written if isinstance(written, str) and unit else _plain(written, label),
-            unit,
-            field=label,
+            written if unit else _plain(written, label), unit, field=label,
             example=f"225 {unit}".strip(),
-        )
+        )  # fmt: skip
     return SpringType(**values)
+
+
+def _is_number(written: object) -> bool:
+    try:
+        float(str(written))
+    except ValueError:
+        return False
+    return True
 
 
 def _plain(written: object, label: str) -> Any:
@@ -241,8 +262,11 @@ def _rows(path: Path) -> list[list[Any]]:
     try:
         if path.suffix == ".xlsx":
             return _sheet_rows(path)
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            return [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        # What a spreadsheet writes where the comma stands in numbers.
+        apart = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
+        rows = csv.reader(lines, delimiter=apart)
+        return [row for row in rows if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError("catalogue.file", str(path), f"it cannot be read, {error}") from None
 
