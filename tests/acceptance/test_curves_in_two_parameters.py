@@ -6,6 +6,7 @@ benchmarks/curves.py compares every point of these curves, here some of them are
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -300,3 +301,30 @@ def test_bad_input(exact, of_chain) -> None:
     ):  # fmt: skip
         with pytest.raises(ff.InputError):
             ff.continue_bifurcation(point, names, limits)
+
+
+@dataclass(frozen=True)
+class DampedStop:
+    """One mass before a damped stop on one side: a third contact ends its curve of folds."""
+
+    gap: float = 0.4
+
+    def system(self) -> ff.MechanicalSystem:
+        """The machine."""
+        stop = ff.ClearanceSpring([1.0], 30.0, 1.0, self.gap, np.inf)
+        return ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], (stop,), ff.HarmonicForce([0.5]))
+
+
+def test_a_curve_that_meets_a_grazing_ends_there_and_says_so():
+    fold = ff.frequency_response(DampedStop(), (0.4, 1.0)).folds[0]
+    curve = ff.continue_fold(fold, "gap", (0.2, 0.6))
+    assert curve.status is ff.BranchStatus.MEETS_GRAZING
+    assert curve.status.complete
+    for k in (0, -1):
+        gap, orbit = curve.values[k], curve.orbits[k]
+        x = orbit.displacement(0, np.linspace(0.0, orbit.period, 20_001))
+        tops = x[1:-1][(x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])]
+        assert len(orbit.contact_intervals) == 2
+        # The third summit touches, but for what is left of the last step.
+        assert np.sort(np.abs(tops - gap))[0] < 1e-4 * gap
+        assert tops.max() > gap

@@ -23,6 +23,10 @@ class BranchStatus(Enum):
         "The branch was followed to both its ends, where it leaves the interval or meets the "
         "branch from which it comes."
     )
+    MEETS_GRAZING = (
+        "The curve ends where another contact begins: beyond, the branch has a corner in its "
+        "place. Follow that grazing with continue_bifurcation."
+    )
     TURNED_BACK = (
         "The branch turned back and left the interval at its lower end; widen the interval to "
         "follow it."
@@ -48,7 +52,10 @@ class BranchStatus(Enum):
     @property
     def complete(self) -> bool:
         """Whether the branch was followed to both its ends, or all round."""
-        return self in (BranchStatus.COMPLETE, BranchStatus.FOLLOWED, BranchStatus.CLOSED)
+        return self in (
+            BranchStatus.COMPLETE, BranchStatus.FOLLOWED, BranchStatus.CLOSED,
+            BranchStatus.MEETS_GRAZING,
+        )  # fmt: skip
 
     @staticmethod
     def from_code(code: int) -> BranchStatus:

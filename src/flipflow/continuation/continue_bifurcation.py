@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.compiled import status
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -49,6 +50,7 @@ CRITICAL = 1e-3  # distance of a multiplier from 1 beyond which a fold is none o
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
 FINE = 20.0  # steps in each of these intervals
 GRAZED = 1e-6  # depth beyond a gap that a motion grazes, as a share of the motion
+BEFORE_GRAZING = 1e-4  # the same, from which a curve that stalls is held to end at it
 AT_CORNER = (
     "The fold lies where a contact begins and the branch has a corner: the curve is that of the "
     "grazing, and a fold as long as the branch turns back there."
@@ -319,9 +321,24 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
             for one in found
             if kept.start - 1 <= one.index < kept.stop
         ),
-        status=BranchStatus.from_code(traced.code),
+        status=_ended(solver, traced, plane),
         notes=(*notes, *unsettled),
     )  # fmt: skip
+
+
+def _ended(solver: FieldSolver, traced: Traced, plane: Plane) -> BranchStatus:
+    """How the curve ended; where it stalled, whether another contact begins at each end within."""
+    if traced.code != status.STEP_TOO_SMALL or traced.omega.size == 0:
+        return BranchStatus.from_code(traced.code)
+    depth, sought = np.abs(traced.depth), solver.sought
+    if sought.test == GRAZING:
+        depth[:, sought.gap // 2, sought.gap % 2] = np.inf  # held at 0 all along
+    for k in (0, -1):
+        place = traced.omega[k], traced.u[k, -1]
+        within = all(low < x < high for x, (low, high) in zip(place, plane.bounds, strict=True))
+        if within and depth[k].min() > BEFORE_GRAZING * solver.length:
+            return BranchStatus.STEP_TOO_SMALL
+    return BranchStatus.MEETS_GRAZING
 
 
 def _values(point: Point) -> tuple[float, float]:
