@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import cast
@@ -51,6 +52,7 @@ BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one 
 FINE = 20.0  # steps in each of these intervals
 GRAZED = 1e-6  # depth beyond a gap that a motion grazes, as a share of the motion
 BEFORE_GRAZING = 1e-4  # the same, from which a curve that stalls is held to end at it
+SAMPLES = 4097  # of a turn, for its summits
 AT_CORNER = (
     "The fold lies where a contact begins and the branch has a corner: the curve is that of the "
     "grazing, and a fold as long as the branch turns back there."
@@ -304,6 +306,7 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
     say("special points", SPECIAL_SHARE)
     found, unsettled = curve_points(solver, traced) if traced.omega.size else ([], [])
     kept = _where_it_holds(solver, traced, plane)
+    points = solver.points(traced)
 
     def motion(at: Point) -> Orbit:
         one = cast("FieldPoint", at)
@@ -311,7 +314,7 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
         return Orbit(plane.machine_at(one.value, one.beside), known, UNDETERMINED)
 
     return Followed(
-        orbits=tuple(map(motion, solver.points(traced)[kept])),
+        orbits=tuple(map(motion, points[kept])),
         values=np.column_stack([traced.omega, traced.u[:, -1]])[kept],
         special_points=tuple(
             CurvePoint(
@@ -321,24 +324,35 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
             for one in found
             if kept.start - 1 <= one.index < kept.stop
         ),
-        status=_ended(solver, traced, plane),
+        status=_ended(solver, traced, [motion(one) for one in (*points[:1], *points[-1:])], plane),
         notes=(*notes, *unsettled),
     )  # fmt: skip
 
 
-def _ended(solver: FieldSolver, traced: Traced, plane: Plane) -> BranchStatus:
+def _ended(
+    solver: FieldSolver, traced: Traced, ends: Sequence[Orbit], plane: Plane
+) -> BranchStatus:
     """How the curve ended; where it stalled, whether another contact begins at each end within."""
-    if traced.code != status.STEP_TOO_SMALL or traced.omega.size == 0:
-        return BranchStatus.from_code(traced.code)
-    depth, sought = np.abs(traced.depth), solver.sought
-    if sought.test == GRAZING:
-        depth[:, sought.gap // 2, sought.gap % 2] = np.inf  # held at 0 all along
-    for k in (0, -1):
+    stalled = traced.code == status.STEP_TOO_SMALL and solver.sought.test != GRAZING
+    grazing = stalled and bool(ends)
+    for k, orbit in zip((0, -1), ends, strict=True) if grazing else ():
         place = traced.omega[k], traced.u[k, -1]
         within = all(low < x < high for x, (low, high) in zip(place, plane.bounds, strict=True))
-        if within and depth[k].min() > BEFORE_GRAZING * solver.length:
-            return BranchStatus.STEP_TOO_SMALL
-    return BranchStatus.MEETS_GRAZING
+        if within and not _grazes(orbit, solver.length):
+            grazing = False
+    return BranchStatus.MEETS_GRAZING if grazing else BranchStatus.from_code(traced.code)
+
+
+def _grazes(orbit: Orbit, length: float) -> bool:
+    """Whether a summit of the motion hardly touches a stop, or nearly does."""
+    x = orbit.motion.derivative(np.linspace(0.0, orbit.period, SAMPLES)[:-1], 0)
+    for spring in orbit.system.springs:
+        for side, gap in zip((1.0, -1.0), spring.gaps, strict=True):
+            y = side * (x @ np.asarray(spring.direction))
+            tops = y[(y > np.roll(y, 1)) & (y >= np.roll(y, -1))]
+            if np.any(np.abs(tops - gap) < BEFORE_GRAZING * length):
+                return True
+    return False
 
 
 def _values(point: Point) -> tuple[float, float]:
