@@ -87,12 +87,16 @@ def test_a_study_and_its_report(command, here):
     code, out, err = command("study", "spread.toml", "--json", "found.json")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
-    assert "of 32 machines at 850 rpm meet every limit in every load case" in " ".join(out.split())
+    said = " ".join(out.split())
+    assert "32 machines at 850 rpm meet the 3 limits looked at in every load case" in said
+    assert "Not looked at: main frame acceleration, floating frame acceleration, shear" in said
     names = sorted(path.name for path in (here / "spread-flipflow").iterdir())
     assert names == ["machines.csv", "report.html", "results.json", "study.html", "tolerance.html"]
     page = (here / "spread-flipflow/report.html").read_text()
     for words in (
-        "Machines that meet every limit",
+        "Machines that meet the 3 limits looked at",
+        "Not looked at: main frame acceleration",
+        "all looked at, every case",
         "What tolerances cost",
         "Machines of the study",
     ):
@@ -122,6 +126,8 @@ def test_a_grid_is_drawn_as_a_map(command, here):
     assert max(map(len, out.splitlines())) <= 80
     names = {path.name for path in (here / "map-flipflow").iterdir()}
     assert {"map.html", "report.html"} <= names
+    page = (here / "map-flipflow/report.html").read_text()
+    assert "Shaded: machines that meet the 2 limits looked at. Not looked at: main frame" in page
     assert ff.open_study("map.zarr").grid_shape == (3, 2)
 
 

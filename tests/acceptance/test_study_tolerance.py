@@ -11,7 +11,7 @@ from scipy import stats
 
 import flipflow as ff
 from flipflow.report.study import spread_table
-from flipflow.studies.tolerance import confidence_interval
+from flipflow.studies.tolerance import confidence_interval, limits_in_words, limits_left_out
 
 pytestmark = pytest.mark.numerical
 OMEGA = 89.0
@@ -128,6 +128,16 @@ def test_a_fold_that_moves_through_the_speed_is_a_share_that_jumps(screen):
     assert (first[1], second[1]) == ("empty", "empty, jumped")
     assert (int(first[-1]), int(second[-1])) == ((~beyond).sum(), beyond.sum())
     assert {row[1] for row in rows if row[0] == "upper jump speed"} == {"empty"}
+
+
+def test_limits_that_were_not_looked_at_are_named():
+    start = ff.PassingLimits(stop_force=9e3)
+    limits = ff.Limits(stop_force=8e3, shear_strain=0.2, start=start)
+    assert limits_in_words(limits, ("stop_force",)) == "the one limit looked at"
+    named = ("shear strain", "stop force at start")
+    assert limits_left_out(limits, ("stop_force",)) == named
+    limits = replace(limits, start=None)
+    assert limits_in_words(limits, ("stop_force", "shear_strain")) == "every limit"
 
 
 def test_what_is_refused(linear):

@@ -120,17 +120,18 @@ class _Asked:
         """The share that meets the limits of the machine file, where it can be told."""
         from dataclasses import replace  # noqa: PLC0415  keeps --help quick
 
-        from flipflow.studies.tolerance import tolerance  # noqa: PLC0415
+        from flipflow.studies.tolerance import limits_known, tolerance  # noqa: PLC0415
 
         if self.file is None or found.sampling == "grid":
             return None
         limits = self.file.project.limits
-        known = [name for name in limits.given if name in found.values or name == "speed"]
+        known = limits_known(found, limits)
         if not known:
             return None
         others = {name: None for name in limits.given if name not in known}
         kept = replace(limits, **others)  # type: ignore[arg-type]
-        return tolerance(found, kept)
+        # The report tells the limits of the file that were not looked at.
+        return replace(tolerance(found, kept), limits=limits)
 
 
 def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: bool) -> _Asked:

@@ -24,7 +24,13 @@ from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.sensitivity import SHOWN, tornado_figure
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.study import Study
-from flipflow.studies.tolerance import FOLDS, jumped_motions
+from flipflow.studies.tolerance import (
+    FOLDS,
+    jumped_motions,
+    limits_in_words,
+    limits_known,
+    limits_left_out,
+)
 
 Real = NDArray[np.float64]
 LEVELS = 7  # contours of a map, about
@@ -95,7 +101,7 @@ def map_figure(
     cells: tuple[Cells, ...] = ()
     if limits is not None:
         traces += _limit_contours(grid, limits)
-        cells = (_met_cells(grid, limits),)
+        cells = (_met_cells(grid, limits),) if limits_known(study, limits) else ()
     traces += _fold_contours(grid)
     notes = tuple(_level_notes(traces))
     panel = Panel(
@@ -103,7 +109,7 @@ def map_figure(
         tuple(trace for trace in traces if trace.x.size), cells=cells, notes=notes,
         title=_where(study, place, one),
     )  # fmt: skip
-    shaded = " Shaded: every limit is met." if cells else ""
+    shaded = "" if limits is None else _shaded_words(study, limits)
     jumps = (
         " Dashed: beyond this line the machine has jumped, and no contour leads across. Dotted: "
         "from this line on two motions are possible."
@@ -169,7 +175,11 @@ def study_tornado(study: Study, quantity: str, place: Place | None = None) -> Fi
 
 
 def parallel_figure(
-    study: Study, passing: NDArray[np.bool_] | None = None, place: Place | None = None
+    study: Study,
+    passing: NDArray[np.bool_] | None = None,
+    place: Place | None = None,
+    *,
+    met: str = "every limit",
 ) -> Figure:
     """Each machine a line across its fields and quantities.
 
@@ -181,13 +191,15 @@ def parallel_figure(
         Which machines meet every limit, (S,); the others are drawn in another colour.
     place
         Load case and frequency.
+    met
+        What those have met, in words.
     """
     place = place or Place()
     fine = np.ones(study.size, bool) if passing is None else np.asarray(passing)
     columns = list(_axes(study, place))[:MOST_AXES]
     rows = np.linspace(0, study.size - 1, min(study.size, MOST_LINES)).astype(int)
     heights = np.stack([_share(values) for _, values in columns], axis=1)[rows]
-    groups = [("meets every limit", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
+    groups = [(f"meets {met}", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
     if passing is None:
         groups = [("machine", fine[rows], "main")]
     x = np.arange(len(columns) + 1.0)
@@ -288,12 +300,22 @@ def _fold_contours(grid: _Grid) -> Iterator[Trace]:
 def _met_cells(grid: _Grid, limits: Limits) -> Cells:
     """Machines that meet every limit, as cells around the points of the grid."""
     met = np.ones((grid.y.size, grid.x.size), bool)
-    for name in limits.given:
-        if name in grid.study.values:
-            low, high = limit_bounds(limits, name)
-            values = grid.values(name)
-            met &= (values >= low) & (values <= high)
+    for name in limits_known(grid.study, limits):
+        low, high = limit_bounds(limits, name)
+        operation = QUANTITIES[name].of == "operation"
+        values = grid.study.omega[grid.place.at] if operation else grid.values(name)
+        met &= (values >= low) & (values <= high)
     return Cells(_edges(grid.x), _edges(grid.y), met.astype(np.int64), ("none", "case 3"))
+
+
+def _shaded_words(study: Study, limits: Limits) -> str:
+    """What the shading of a map means, and which limits it does not know."""
+    known = limits_known(study, limits)
+    if not known:
+        return ""
+    left_out = limits_left_out(limits, known)
+    others = f" Not looked at: {', '.join(left_out)}." if left_out else ""
+    return f" Shaded: machines that meet {limits_in_words(limits, known)}.{others}"
 
 
 def _joined(

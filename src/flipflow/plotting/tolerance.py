@@ -8,7 +8,7 @@ from flipflow.model.arguments import checked_index
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
 from flipflow.plotting.study import symbol_of
-from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.tolerance import Tolerance, limits_in_words
 
 
 def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
@@ -29,7 +29,8 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
     if not known.any():
         factors, share, low, high = np.ones(1), own[None], interval[:1], interval[1:]
     band = Trace("95 % confidence", factors, high, "case band", "case band", lower=low)
-    line = Trace("share that meets every limit", factors, share, colour="relative", bold=True)
+    met = limits_in_words(found.limits, found.checked)
+    line = Trace(f"share that meets {met}", factors, share, colour="relative", bold=True)
     above = Panel(
         Axis("all tolerances times", ""), Axis("machines that pass", "%", (0.0, 102.0)),
         (band, line), lines=(Line("x", 1.0, "as given", "mark"),),
@@ -53,7 +54,7 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
             ),
         )  # fmt: skip
     caption = (
-        "Above: the share of built machines that meet every limit in every load case, against a "
+        f"Above: the share of built machines that meet {met} in every load case, against a "
         "factor on all tolerances. Below: the same with one tolerance alone half as wide; the "
         "longest bar to the right is the tolerance that costs most."
     )

@@ -36,7 +36,13 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import NOTHING, bounds, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.study import Study
-from flipflow.studies.tolerance import FOLDS, Tolerance, jumped_motions
+from flipflow.studies.tolerance import (
+    FOLDS,
+    Tolerance,
+    jumped_motions,
+    limits_in_words,
+    limits_left_out,
+)
 
 Real = NDArray[np.float64]
 QUANTILES = (0.025, 0.5, 0.975)
@@ -122,22 +128,30 @@ def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> I
     for name in motions[:MOST_FIGURES]:
         if np.isfinite(found.nominal[name]).all():
             yield FigureBlock(study_tornado(found, name, Place()))
-    yield FigureBlock(parallel_figure(found, None if judged is None else judged.passing[:, 0]))
+    if judged is None:
+        yield FigureBlock(parallel_figure(found))
+        return
+    met = limits_in_words(judged.limits, judged.checked)
+    yield FigureBlock(parallel_figure(found, judged.passing[:, 0], met=met))
 
 
 @section(Tolerance, Part.FIRST_PAGE, 10, brief=True)
 def yield_of_machines(found: Tolerance) -> Iterator[Block]:
     """The share that passes at each speed, each limit, and which tolerance costs most."""
-    yield Heading("Machines that meet every limit", 1, new_page=False)
+    met = limits_in_words(found.limits, found.checked)
+    yield Heading(f"Machines that meet {met}", 1, new_page=False)
     for j, omega in enumerate(found.omega):
         share, (low, high) = found.share[j], found.share_interval[j]
         speed = f" at {rpm(omega)} rpm" if np.isfinite(omega) else ""
         yield Text(
-            f"of {found.size} machines{speed} meet every limit in every load case "
+            f"of {found.size} machines{speed} meet {met} in every load case "
             f"({_share(low)} to {_share(high)} with 95 % confidence)."
             f"{_jump_words(found, j)}{_cost_words(found, j)}",
             lead=_share(share),
         )
+    left_out = limits_left_out(found.limits, found.checked)
+    if left_out:
+        yield Note(f"Not looked at: {', '.join(left_out)}.")
     columns = (
         Column("Limit"), Column("Allowed"), *(
             Column(f"{rpm(omega)} rpm" if np.isfinite(omega) else "Met", "%", numeric=True)
@@ -148,11 +162,12 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
         cells(QUANTITIES[name].label, _bounds(found, name), *_percents(found.by_limit[b]))
         for b, name in enumerate(found.checked)
     ]
+    every = "all looked at" if left_out else "all"
     rows += [
-        cells(f"all, case {case}", "", *_percents(found.by_case[c]))
+        cells(f"{every}, case {case}", "", *_percents(found.by_case[c]))
         for c, case in enumerate(found.cases)
     ]
-    rows.append(cells("all, every case", "", *_percents(found.share)))
+    rows.append(cells(f"{every}, every case", "", *_percents(found.share)))
     yield Table("Machines that meet each limit", columns, tuple(rows))
     yield from (Note(text) for text in found.notes)
 

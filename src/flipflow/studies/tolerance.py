@@ -13,7 +13,7 @@ from flipflow import __version__
 from flipflow.batch.reasons import FOUND
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind
-from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.limits import PASSAGES, PASSING_FIELDS, Limits, limit_bounds
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.system import Machine
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -49,7 +49,7 @@ class Tolerance(Result):
     limits
         What was to be met.
     checked
-        Names of the limits that were, (B,).
+        Names of the limits that were looked at, (B,); "every limit" below means these.
     size
         Number of machines S.
     passing
@@ -203,6 +203,32 @@ def tolerance(study: Study, limits: Limits) -> Tolerance:
         scaled_interval=scaled_interval,
         notes=tuple(_notes(study, unchecked)),
         version=__version__,
+    )
+
+
+def limits_in_words(limits: Limits, checked: tuple[str, ...]) -> str:
+    """What a machine that passes has met: "every limit", or "the 3 limits looked at"."""
+    if not limits_left_out(limits, checked):
+        return "every limit"
+    return f"the {len(checked)} limits looked at" if len(checked) > 1 else "the one limit looked at"
+
+
+def limits_left_out(limits: Limits, checked: tuple[str, ...]) -> tuple[str, ...]:
+    """The limits that were given and not looked at, in words."""
+    running = [QUANTITIES[name].label for name in limits.given if name not in checked]
+    passing = [
+        f"{QUANTITIES[field.name].label} at {passage}"
+        for passage in PASSAGES
+        for field in PASSING_FIELDS[passage]
+        if getattr(getattr(limits, passage), field.name) is not None
+    ]
+    return (*running, *passing)
+
+
+def limits_known(study: Study, limits: Limits) -> tuple[str, ...]:
+    """Names of the limits whose quantities a study holds."""
+    return tuple(
+        name for name in limits.given if name in study.values or QUANTITIES[name].of == "operation"
     )
 
 
