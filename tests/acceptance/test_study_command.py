@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.batch.chunk_store import Layout, Variable, create_store
 from flipflow.io.study_file import read_study_file
 from flipflow.studies.study import go_on
 
@@ -151,6 +152,26 @@ def test_store_info(command, here):
     assert "no such folder" in err
 
 
+def test_a_folder_that_is_no_store(command, here):
+    (here / "empty").mkdir()
+    for words, told in (("none.zarr", "no such folder"), ("empty", "it is no store of a study")):
+        code, _, err = command("store", "info", words)
+        assert code == 2
+        assert told in err
+        assert "the folder that flipflow study wrote, NAME.zarr or that of --store" in err
+        assert "ff." not in err
+
+
+def test_a_store_of_a_design_is_told_from_one_of_a_study(command, here):
+    manifest = {"schema": "flipflow/design-search/1"}
+    growing = {"excess": Variable(("candidate",), np.array(np.nan))}
+    create_store(here / "search", Layout(manifest, {}, growing, {"candidate": 4}, 4))
+    for words in (("store", "info", "search"), ("study", "--resume", "search")):
+        code, _, err = command(*words)
+        assert code == 4
+        assert "search holds the search of a design, and no study; flipflow design goes on" in err
+
+
 def test_worker_processes_find_the_same(command, here):
     pytest.importorskip("distributed")
     assert command("study", "map.toml", "--store", "one")[0] == 0
@@ -182,7 +203,7 @@ def test_stopped_it_keeps_what_is_finished_and_goes_on(command, here, number):
     finished = len(list(here.glob("long.zarr/checksum/c.*")))
     assert error == (
         f"Stopped by the user; {finished} of 256 chunks are in long.zarr, and flipflow study "
-        "--resume long.zarr goes on.\n"
+        "long.toml --resume long.zarr goes on.\n"
     )
     assert 2 <= finished < 256
     half = ff.open_study(here / "long.zarr")

@@ -73,7 +73,7 @@ def study(
             with progress("starting") as tell, executor_of(workers, scheduler) as executor:
                 found = asked.run(executor, tell)
         except KeyboardInterrupt:
-            raise _stopped(asked.store) from None
+            raise _stopped(file, asked.store) from None
         judged = asked.judged(found)
         _write(found, judged, asked, target)
 
@@ -157,8 +157,13 @@ def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: 
     return _Asked(one, place)
 
 
-def _stopped(store: Path) -> Exception:
-    """The error that ends a command after Ctrl-C, with what is kept."""
+def _stopped(file: str | None, store: Path) -> Exception:
+    """The error that ends a command after Ctrl-C, with what is kept.
+
+    The file is named, for limits and title are in it, and not in the store.
+    """
+    import shlex  # noqa: PLC0415  keeps --help quick
+
     from flipflow.batch.chunk_store import FINISHED, ChunkStore  # noqa: PLC0415  quick --help
     from flipflow.cli.destination import NOTHING, STOPPED  # noqa: PLC0415
     from flipflow.errors import Cancelled  # noqa: PLC0415
@@ -167,9 +172,10 @@ def _stopped(store: Path) -> Exception:
         return Cancelled(f"{STOPPED}; {NOTHING}.")
     kept = ChunkStore(store)
     finished = sum(state.word == FINISHED for state in kept.states())
+    words = ["flipflow", "study", *([file] if file else []), RESUME, str(store)]
     return Cancelled(
-        f"{STOPPED}; {finished} of {kept.chunks} chunks are in {store}, and flipflow study "
-        f"{RESUME} {store} goes on."
+        f"{STOPPED}; {finished} of {kept.chunks} chunks are in {store}, and "
+        f"{shlex.join(words)} goes on."
     )
 
 
