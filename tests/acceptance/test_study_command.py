@@ -98,7 +98,10 @@ def test_a_study_and_its_report(command, here):
         "Machines that meet the 3 limits looked at",
         "Not looked at: main frame acceleration",
         "all looked at, every case",
-        "What tolerances cost",
+        "What tolerances cost at 850 rpm",
+        "What the machines do at 850 rpm",
+        "What moves each quantity at 850 rpm",
+        "normal, 2700 kN/m, standard deviation 90.0 kN/m",
         "Machines of the study",
     ):
         assert words in page
@@ -118,12 +121,14 @@ def test_a_study_and_its_report(command, here):
     assert files(here / "spread.zarr") == before
     code, _, _ = command("study", "--resume", "spread.zarr", "-o", "other")
     assert code == 0
-    assert "What the machines do" in (here / "other/report.html").read_text()
+    assert "What the machines do at 850 rpm" in (here / "other/report.html").read_text()
 
 
 def test_a_grid_is_drawn_as_a_map(command, here):
     code, out, _ = command("study", "map.toml")
     assert code == 0
+    assert "What the machines do at 850 rpm:" in out
+    assert "This is the first speed of the study" in out
     assert max(map(len, out.splitlines())) <= 80
     names = {path.name for path in (here / "map-flipflow").iterdir()}
     assert {"map.html", "report.html"} <= names

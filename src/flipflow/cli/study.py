@@ -204,7 +204,12 @@ def _write(found: Study, judged: Tolerance | None, asked: _Asked, target: Destin
             if result is not None:
                 summary(result, console())
         if judged is None:
-            show(spread_table(found), console())
+            table = spread_table(found)
+            console().print()
+            say(console(), f"{table.title}:")
+            show(table, console())
+            if table.caption:
+                say(console(), table.caption)
         console().print(f"Store: {asked.store}", soft_wrap=True)
     target.tell()
 

@@ -14,6 +14,7 @@ from flipflow.errors import InputError, MissingExtra
 from flipflow.model.arguments import checked_index, checked_word
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.numerals import rpm
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -136,7 +137,7 @@ def curves_figure(study: Study, field: str) -> Figure:
             for c, case in enumerate(study.cases)
         )
         panels.append(Panel(_field_axis(study, field, x), Axis(one.label, one.shown_unit), traces))
-    title = f"{symbol_of(field)} varied{_speed_words(study, 0)}"
+    title = f"{symbol_of(field)} varied{speed_in_words(study.omega[0])}"
     caption = "Each line: a load case. Where a line is broken the quantity has no value."
     return Figure(title, caption, tuple(panels), height=230 * len(panels) + 60)
 
@@ -457,12 +458,10 @@ def _where(study: Study, place: Place, one: Quantity | None) -> str:
     """Load case and speed of a panel."""
     case = f"load case {study.cases[place.case]}" if len(study.cases) > 1 else ""
     whole = one is not None and one.of == "response"
-    speed = "" if whole else _speed_words(study, place.at).removeprefix(" ")
+    speed = "" if whole else speed_in_words(study.omega[place.at]).removeprefix(" ")
     return " ".join(filter(None, (case, speed)))
 
 
-def _speed_words(study: Study, at: int) -> str:
-    omega = float(study.omega[at])
-    if not np.isfinite(omega):
-        return ""
-    return f" at {omega * RPM:.4g} rpm"
+def speed_in_words(omega: float) -> str:
+    """A blank and "at 850 rpm"; nothing for a study of whole responses alone."""
+    return f" at {rpm(float(omega))} rpm" if np.isfinite(omega) else ""

@@ -18,6 +18,7 @@ from flipflow.plotting.study import (
     curves_figure,
     map_figure,
     parallel_figure,
+    speed_in_words,
     study_tornado,
     wide_fields,
 )
@@ -120,11 +121,12 @@ def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> I
         yield FigureBlock(curves_figure(found, wide[0]))
         return
     if found.sampling == "grid" and len(wide) > 1:
-        yield Heading("Maps", 1, new_page=False)
+        yield Heading(f"Maps{speed_in_words(found.omega[0])}", 1, new_page=False)
         for name in motions[:MOST_FIGURES]:
             yield FigureBlock(map_figure(found, name, limits))
         return
-    yield Heading("What moves each quantity", 1, new_page=False)
+    heading = f"What moves each quantity{speed_in_words(found.omega[0])}"
+    yield Heading(heading, 1, new_page=False)
     for name in motions[:MOST_FIGURES]:
         if np.isfinite(found.nominal[name]).all():
             yield FigureBlock(study_tornado(found, name, Place()))
@@ -142,9 +144,8 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
     yield Heading(f"Machines that meet {met}", 1, new_page=False)
     for j, omega in enumerate(found.omega):
         share, (low, high) = found.share[j], found.share_interval[j]
-        speed = f" at {rpm(omega)} rpm" if np.isfinite(omega) else ""
         yield Text(
-            f"of {found.size} machines{speed} meet {met} in every load case "
+            f"of {found.size} machines{speed_in_words(omega)} meet {met} in every load case "
             f"({_share(low)} to {_share(high)} with 95 % confidence)."
             f"{_jump_words(found, j)}{_cost_words(found, j)}",
             lead=_share(share),
@@ -195,8 +196,26 @@ def spread_table(found: Study) -> Table:
                 numbers = [nominal, *_quantiles(values)]
                 texts = [_value(one, float(x)) for x in numbers]
                 rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
-    caption = "At the first speed. Machines that have jumped are never counted with the others."
-    return Table("What the machines do", columns, tuple(rows), caption)
+    title = f"What the machines do{speed_in_words(found.omega[0])}"
+    return Table(title, columns, tuple(rows), " ".join(_spread_words(found)))
+
+
+def _spread_words(found: Study) -> Iterator[str]:
+    """What the table of the spread leaves out."""
+    if found.omega.size > 1:
+        yield "This is the first speed of the study; the others are in the table of machines."
+    if all(name in found.values for name in FOLDS):
+        yield "Machines that have jumped are never counted with the others."
+    for name in found.quantities:
+        one = quantity_named(name, found.machine)
+        for c, case in enumerate(found.cases):
+            counted = sum(values.size for _, values in _groups(found, one, c))
+            if counted < found.size:
+                of_case = f" in case {case}" if len(found.cases) > 1 else ""
+                yield (
+                    f"{one.label[:1].upper()}{one.label[1:]}{of_case}: {counted} of {found.size} "
+                    "machines are counted, the rest have none."
+                )
 
 
 def _groups(found: Study, one: Quantity, case: int) -> Iterator[tuple[str, Real]]:
@@ -237,7 +256,7 @@ def _range(name: str, one: Distribution) -> str:
         return quantity(value, shown, unit) if isinstance(value, float) else str(value)
 
     if isinstance(one, Normal):
-        return f"{words(one.mean)} +/- {words(one.std)}"
+        return f"normal, {words(one.mean)}, standard deviation {words(one.std)}"
     if isinstance(one, Choice) and len(one.values) <= 4:
         return ", ".join(map(words, one.values))
     low, high = one.ends
@@ -264,6 +283,8 @@ def _jump_words(found: Tolerance, j: int) -> str:
 
 def _cost_words(found: Tolerance, j: int) -> str:
     name = found.costliest(j)
+    if name is None and np.isfinite(found.halved[:, j]).any():
+        return " Of the tolerances, halved one at a time, none stands out."
     if name is None:
         return ""
     i = found.names.index(name)

@@ -120,11 +120,12 @@ class Tolerance(Result):
         return np.asarray(self.halved - self.share)
 
     def costliest(self, at: int = 0) -> str | None:
-        """The field whose tolerance costs most at the frequency of index ``at``; None: no cost."""
-        gain = self.gain[:, at]
-        if not np.isfinite(gain).any() or np.nanmax(gain) <= 0.0:
-            return None
-        return self.names[int(np.nanargmax(gain))]
+        """The field whose tolerance costs most at the frequency of index ``at``.
+
+        None where no gain stands out of the confidence intervals.
+        """
+        gain = np.where(stands_out(self)[:, at], self.gain[:, at], 0.0)
+        return self.names[int(np.argmax(gain))] if (gain > 0.0).any() else None
 
 
 def tolerance(study: Study, limits: Limits) -> Tolerance:
@@ -204,6 +205,18 @@ def tolerance(study: Study, limits: Limits) -> Tolerance:
         notes=tuple(_notes(study, unchecked)),
         version=__version__,
     )
+
+
+def stands_out(found: Tolerance) -> Flags:
+    """Where half a tolerance changes the share by more than chance, (D, F).
+
+    Neither share lies within the confidence interval of the other.
+    """
+    share, interval = found.share, found.share_interval
+    low, high = found.halved_interval[..., 0], found.halved_interval[..., 1]
+    above = (found.halved > interval[:, 1]) & (low > share)
+    below = (found.halved < interval[:, 0]) & (high < share)
+    return np.asarray(above | below)
 
 
 def limits_in_words(limits: Limits, checked: tuple[str, ...]) -> str:
