@@ -9,13 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.batch.chunk_store import Layout, Variable, create_store
+from flipflow.batch import chunk_store
+from flipflow.batch.chunk_store import Layout, create_store
+from flipflow.io.labelled import Arrays, Variable
 from flipflow.io.study_file import read_study_file
+from flipflow.io.tables import table_columns
 from flipflow.studies.study import go_on
 
 pytest.importorskip("zarr")
@@ -127,6 +131,9 @@ def test_a_study_and_its_report(command, here):
 def test_a_grid_is_drawn_as_a_map(command, here):
     code, out, _ = command("study", "map.toml")
     assert code == 0
+    head = (here / "map-flipflow/machines.csv").read_text().splitlines()[0]
+    assert "relative_amplitude_empty_850 rpm [m]" in head
+    assert "nominal" not in head
     assert "What the machines do at 850 rpm:" in out
     assert "This is the first speed of the study" in out
     assert max(map(len, out.splitlines())) <= 80
@@ -135,6 +142,21 @@ def test_a_grid_is_drawn_as_a_map(command, here):
     page = (here / "map-flipflow/report.html").read_text()
     assert "Shaded: machines that meet the 2 limits looked at. Not looked at: main frame" in page
     assert ff.open_study("map.zarr").grid_shape == (3, 2)
+
+
+def test_columns_are_named_by_speeds_that_can_be_told_apart():
+    """In rpm with four digits; more where four are the same."""
+    omega = np.array([8.5, 850.0, 850.04, 1207.3]) * np.pi / 30.0
+    axis, values = Variable(("omega",), omega, "rad/s"), np.zeros((2, 4))
+    arrays = Arrays(
+        "", "sample", {"omega": axis}, {"size": Variable(("sample", "omega"), values)}, {}
+    )
+    names = [name for name, _ in table_columns(arrays)]
+    assert names == ["size_8.5 rpm", "size_850 rpm", "size_850.04 rpm", "size_1207.3 rpm"]
+    near = Variable(("omega",), omega[[0, 1, 3]], "rad/s")
+    arrays = replace(arrays, coordinates={"omega": near}, variables={
+        "size": Variable(("sample", "omega"), values[:, :3])})  # fmt: skip
+    assert [name for name, _ in table_columns(arrays)][-1] == "size_1207 rpm"
 
 
 def test_store_info(command, here):
@@ -169,7 +191,7 @@ def test_a_folder_that_is_no_store(command, here):
 
 def test_a_store_of_a_design_is_told_from_one_of_a_study(command, here):
     manifest = {"schema": "flipflow/design-search/1"}
-    growing = {"excess": Variable(("candidate",), np.array(np.nan))}
+    growing = {"excess": chunk_store.Variable(("candidate",), np.array(np.nan))}
     create_store(here / "search", Layout(manifest, {}, growing, {"candidate": 4}, 4))
     for words in (("store", "info", "search"), ("study", "--resume", "search")):
         code, _, err = command(*words)

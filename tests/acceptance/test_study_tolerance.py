@@ -11,6 +11,8 @@ from scipy import stats
 
 import flipflow as ff
 from flipflow.plotting.dispatch import figure
+from flipflow.plotting.plotly import described
+from flipflow.plotting.study import parallel_figure
 from flipflow.report.blocks import Text
 from flipflow.report.registry import blocks_of
 from flipflow.report.study import spread_table
@@ -160,6 +162,26 @@ def test_a_gain_within_the_confidence_interval_is_none(linear):
     assert none.costliest() is None
     words = [block.text for block in blocks_of(none) if isinstance(block, Text)]
     assert words[0].endswith("halved one at a time, none stands out.")
+
+
+def test_many_machines_are_translucent_lines(linear):
+    """A line each, so that overlaid ones are darker; colours are named in legend and caption."""
+    m = linear.eccentric_moment
+    drawn = {}
+    for n in (16, 256):
+        found = ff.study(linear, {"eccentric_moment": (0.9 * m, 1.1 * m)}, "relative_amplitude",
+                         OMEGA, sampling=ff.Sample(n=n))  # fmt: skip
+        passing = np.arange(n) % 2 == 0
+        drawn[n] = parallel_figure(found, passing, met="the one limit looked at")
+        names = [trace.name for trace in drawn[n].panels[0].traces if trace.legend]
+        assert names == ["does not", "meets the one limit looked at"]
+        assert "Green: the machine meets the one limit looked at; red:" in drawn[n].caption
+    lines = {n: [t for t in one.panels[0].traces if not t.legend] for n, one in drawn.items()}
+    assert {n: len(some) for n, some in lines.items()} == {16: 16, 256: 256}
+    assert {t.opacity for t in lines[16]} == {1.0}
+    assert max(t.opacity for t in lines[256]) < 0.3
+    whole = described(drawn[256])["data"]
+    assert {item.get("opacity", 1.0) for item in whole} == {1.0, lines[256][0].opacity}
 
 
 def test_limits_that_were_not_looked_at_are_named():

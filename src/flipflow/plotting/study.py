@@ -37,6 +37,7 @@ Real = NDArray[np.float64]
 LEVELS = 7  # contours of a map, about
 MOST_AXES = 10  # of parallel coordinates: the fields, then quantities
 MOST_LINES = 300  # machines of parallel coordinates
+CLEAR_LINES, LEAST_OPACITY = 30, 0.12  # lines that may be opaque; of very many
 FIELD_SCALES = {"mm": MM, "kN/m": 1e-3, "kN s/m": 1e-3, "kg mm": 1e3}
 
 
@@ -203,14 +204,11 @@ def parallel_figure(
     groups = [(f"meets {met}", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
     if passing is None:
         groups = [("machine", fine[rows], "main")]
-    x = np.arange(len(columns) + 1.0)
-    x[-1] = np.nan  # parts the line of one machine from the next
-    traces = []
-    for name, chosen, colour in groups[::-1]:
-        count = int(chosen.sum())
-        broken = np.concatenate([heights[chosen], np.full((count, 1), np.nan)], axis=1)
-        if count:
-            traces.append(Trace(f"{name}", np.tile(x, count), broken.ravel(), colour=colour))
+    traces = [
+        trace
+        for name, chosen, colour in groups[::-1]
+        for trace in _machine_lines(name, heights[chosen], colour)
+    ]
     ticks = tuple((float(k), label) for k, (label, _) in enumerate(columns))
     notes = tuple(_end_notes(columns))
     uprights = tuple(Line("x", float(k), "", "mark", "solid") for k in range(len(columns)))
@@ -224,7 +222,23 @@ def parallel_figure(
         "Each line is a machine: its fields, then what it does; the ends of every axis are the "
         f"least and the greatest value.{shown}"
     )
+    if passing is not None:
+        caption += f" Green: the machine meets {met}; red: it does not."
     return Figure("Machines of the study", caption, (panel,), height=400)
+
+
+def _machine_lines(name: str, heights: Real, colour: str) -> Iterator[Trace]:
+    """A line for each machine, (n, axes), and one without points for the legend.
+
+    Lines of their own, for overlaid parts of one translucent line are no darker.
+    """
+    count, axes = heights.shape
+    if count == 0:
+        return
+    yield Trace(name, np.full(1, np.nan), np.full(1, np.nan), colour=colour, bold=True)
+    opacity = float(np.clip(CLEAR_LINES / count, LEAST_OPACITY, 1.0))
+    for row in heights:
+        yield Trace(name, np.arange(float(axes)), row, colour=colour, legend=False, opacity=opacity)
 
 
 class _Grid:
