@@ -20,6 +20,7 @@ from flipflow.batch.chunk_store import Layout, create_store
 from flipflow.io.labelled import Arrays, Variable
 from flipflow.io.study_file import read_study_file
 from flipflow.io.tables import table_columns
+from flipflow.model.fields import FIELD
 from flipflow.studies.study import go_on
 
 pytest.importorskip("zarr")
@@ -86,6 +87,20 @@ def test_a_file_says_what_a_call_says(here):
     assert (one.sampling.n, one.sampling.seed, one.sampling.method) == (32, 4, "sobol")
     assert [load.name for load in one.load_cases] == ["empty", "hot"]
     assert one.omega == pytest.approx([850.0 * np.pi / 30.0])
+
+
+def test_a_tolerance_in_the_unit_of_its_field(here):
+    """About the machine's own value; of one piece by ``_each``."""
+    written = 'clearance = "+-0.5 mm"\nshear_stiffness_each = "+- 9 kN/m"\nstop_damping = "+-4 %"'
+    (here / "own.toml").write_text(f'machine = "ffs0827"\n[vary]\n{written}\n')
+    one = read_study_file(here / "own.toml")
+    own = one.project.screen
+    each = 9e3 * getattr(own, FIELD["shear_stiffness"].count)
+    assert one.vary == {
+        "clearance": pytest.approx((own.clearance - 5e-4, own.clearance + 5e-4)),
+        "shear_stiffness": pytest.approx((own.shear_stiffness - each, own.shear_stiffness + each)),
+        "stop_damping": pytest.approx((0.96 * own.stop_damping, 1.04 * own.stop_damping)),
+    }
 
 
 def test_a_study_and_its_report(command, here):
@@ -266,6 +281,10 @@ def test_a_terminal_sees_the_time_left(here):
         (("clearance =", "clearence ="), ("vary.clearence", "'clearance'")),
         (('"5.4 mm..6.6 mm"', '"5.4 mm"'), ("vary.clearance", "5.4 mm..6.6 mm")),
         (('"5.4 mm..6.6 mm"', "5.4"), ("vary.clearance = 5.4", "a list of values")),
+        (('"5.4 mm..6.6 mm"', '"+-0.5 kg"'), ("vary.clearance", "mass", "length")),
+        (('"5.4 mm..6.6 mm"', '"+-8 mm"'), ("vary.clearance",)),
+        (('"5.4 mm..6.6 mm"', '"+-0 mm"'), ("vary.clearance",)),
+        (('"5.4 mm..6.6 mm"', '"+-"'), ("vary.clearance",)),
         (('"5.4 mm..6.6 mm"', '["5 mm"]'), ("vary.clearance",)),
         (('"5.4 mm..6.6 mm"', '["5 mm", "6 kg"]'), ("vary.clearance", "6 kg")),
         (('"5.4 mm..6.6 mm"', '{from = "5 mm", to = "6 mm"}'), ("vary.clearance.values",)),
