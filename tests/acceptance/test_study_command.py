@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from flipflow.io.labelled import Arrays, Variable
 from flipflow.io.study_file import read_study_file
 from flipflow.io.tables import table_columns
 from flipflow.model.fields import FIELD
+from flipflow.model.quantities import QUANTITIES
 from flipflow.studies.study import go_on
 
 pytest.importorskip("zarr")
@@ -172,6 +175,13 @@ def test_columns_are_named_by_speeds_that_can_be_told_apart():
     arrays = replace(arrays, coordinates={"omega": near}, variables={
         "size": Variable(("sample", "omega"), values[:, :3])})  # fmt: skip
     assert [name for name, _ in table_columns(arrays)][-1] == "size_1207 rpm"
+
+
+def test_the_page_of_studies_lists_every_quantity():
+    page = (Path(__file__).parents[2] / "docs/tutorials/studies.md").read_text(encoding="utf-8")
+    table = page.partition("## What can be asked")[2].partition("\n## ")[0]
+    asked = {name for name, one in QUANTITIES.items() if one.of != "operation"}
+    assert set(re.findall(r"`(\w+)`", table)) == asked
 
 
 def test_store_info(command, here):
