@@ -119,6 +119,7 @@ def test_a_study_and_its_report(command, here):
     for words in (
         "Machines that meet the 3 limits looked at",
         "Not looked at: main frame acceleration",
+        "Machines that meet each limit looked at",
         "all looked at, every case",
         "What tolerances cost at 850 rpm",
         "What the machines do at 850 rpm",

@@ -169,7 +169,8 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
         for c, case in enumerate(found.cases)
     ]
     rows.append(cells(f"{every}, every case", "", *_percents(found.share)))
-    yield Table("Machines that meet each limit", columns, tuple(rows))
+    title = f"Machines that meet each limit{' looked at' if left_out else ''}"
+    yield Table(title, columns, tuple(rows))
     yield from (Note(text) for text in found.notes)
 
 
