@@ -142,8 +142,9 @@ def test_a_study_and_its_report(command, here):
     assert code == 0
     assert "32 machines at 850 rpm" in " ".join(again.split())
     assert files(here / "spread.zarr") == before
-    code, _, _ = command("study", "--resume", "spread.zarr", "-o", "other")
+    code, out, _ = command("study", "--resume", "spread.zarr", "-o", "other")
     assert code == 0
+    assert "no limit is judged; limits and title are in the study file" in " ".join(out.split())
     assert "What the machines do at 850 rpm" in (here / "other/report.html").read_text()
 
 

@@ -210,6 +210,9 @@ def _write(found: Study, judged: Tolerance | None, asked: _Asked, target: Destin
             show(table, console())
             if table.caption:
                 say(console(), table.caption)
+        if asked.file is None:
+            told = f"limits and title are in the study file, flipflow study FILE {RESUME}"
+            say(console(), f"Note: no limit is judged; {told} {asked.store} reads them.", "yellow")
         console().print(f"Store: {asked.store}", soft_wrap=True)
     target.tell()
 
