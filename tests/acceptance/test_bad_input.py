@@ -207,6 +207,20 @@ def test_missing_file_names_what_is_bundled(run):
     assert_one_sentence(run("ffs0872"), "ffs0872", "did you mean 'ffs0827'")
 
 
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ("[duty]", "this is a duty file, which flipflow design reads"),
+        ("[vary]", "this is a study file, which flipflow study reads"),
+    ],
+)
+def test_a_file_of_another_command(command, tmp_path, section, words):
+    path = tmp_path / "other.toml"
+    path.write_text(f'machine = "ffs0827"\n{section}\n')
+    code, _, err = command("check", str(path))
+    assert (code, err) == (2, f"Error: section = '{section}': {words}.\n")
+
+
 def test_folder(run, tmp_path):
     result = run(tmp_path)
     assert_one_sentence(result, "machine file", "folder")

@@ -375,6 +375,14 @@ def test_a_machine_file_that_is_written_reads_back_equal(name, tmp_path):
         )
 
 
+def test_scatter_is_written_with_or_without_a_sign(tmp_path):
+    place = tmp_path / "duty.toml"
+    for written in ('"10 %"', '"+-10 %"', '"+- 10 %"', "0.1"):
+        scatter = f"[scatter]\nclearance = {written}\n[limits]"
+        place.write_text(IMPOSSIBLE_DUTY.replace("[limits]", scatter, 1), encoding="utf-8")
+        assert ff.load_duty(place).scatter == {"clearance": pytest.approx(0.1)}
+
+
 WRONG = {
     ('relative_amplitude = "12 mm"', "relative_amplitude = 12"): "duty.relative_amplitude",
     ('speed = "800 rpm"', 'speed = ["800 rpm"]'): "duty.speed",

@@ -5,16 +5,25 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.batch import chunk_store
+from flipflow.batch.chunk_store import Layout, create_store
+from flipflow.io.labelled import Arrays, Variable
 from flipflow.io.study_file import read_study_file
+from flipflow.io.tables import table_columns
+from flipflow.model.fields import FIELD
+from flipflow.model.quantities import QUANTITIES
 from flipflow.studies.study import go_on
 
 pytest.importorskip("zarr")
@@ -83,17 +92,39 @@ def test_a_file_says_what_a_call_says(here):
     assert one.omega == pytest.approx([850.0 * np.pi / 30.0])
 
 
+def test_a_tolerance_in_the_unit_of_its_field(here):
+    """About the machine's own value; of one piece by ``_each``."""
+    written = 'clearance = "+-0.5 mm"\nshear_stiffness_each = "+- 9 kN/m"\nstop_damping = "+-4 %"'
+    (here / "own.toml").write_text(f'machine = "ffs0827"\n[vary]\n{written}\n')
+    one = read_study_file(here / "own.toml")
+    own = one.project.screen
+    each = 9e3 * getattr(own, FIELD["shear_stiffness"].count)
+    assert one.vary == {
+        "clearance": pytest.approx((own.clearance - 5e-4, own.clearance + 5e-4)),
+        "shear_stiffness": pytest.approx((own.shear_stiffness - each, own.shear_stiffness + each)),
+        "stop_damping": pytest.approx((0.96 * own.stop_damping, 1.04 * own.stop_damping)),
+    }
+
+
 def test_a_study_and_its_report(command, here):
     code, out, err = command("study", "spread.toml", "--json", "found.json")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
-    assert "of 32 machines at 850 rpm meet every limit in every load case" in " ".join(out.split())
+    said = " ".join(out.split())
+    assert "32 machines at 850 rpm meet the 3 limits looked at in every load case" in said
+    assert "Not looked at: main frame acceleration, floating frame acceleration, shear" in said
     names = sorted(path.name for path in (here / "spread-flipflow").iterdir())
     assert names == ["machines.csv", "report.html", "results.json", "study.html", "tolerance.html"]
     page = (here / "spread-flipflow/report.html").read_text()
     for words in (
-        "Machines that meet every limit",
-        "What tolerances cost",
+        "Machines that meet the 3 limits looked at",
+        "Not looked at: main frame acceleration",
+        "Machines that meet each limit looked at",
+        "all looked at, every case",
+        "What tolerances cost at 850 rpm",
+        "What the machines do at 850 rpm",
+        "What moves each quantity at 850 rpm",
+        "normal, 2700 kN/m, standard deviation 90.0 kN/m",
         "Machines of the study",
     ):
         assert words in page
@@ -111,18 +142,48 @@ def test_a_study_and_its_report(command, here):
     assert code == 0
     assert "32 machines at 850 rpm" in " ".join(again.split())
     assert files(here / "spread.zarr") == before
-    code, _, _ = command("study", "--resume", "spread.zarr", "-o", "other")
+    code, out, _ = command("study", "--resume", "spread.zarr", "-o", "other")
     assert code == 0
-    assert "What the machines do" in (here / "other/report.html").read_text()
+    assert "no limit is judged; limits and title are in the study file" in " ".join(out.split())
+    assert "What the machines do at 850 rpm" in (here / "other/report.html").read_text()
 
 
 def test_a_grid_is_drawn_as_a_map(command, here):
     code, out, _ = command("study", "map.toml")
     assert code == 0
+    head = (here / "map-flipflow/machines.csv").read_text().splitlines()[0]
+    assert "relative_amplitude_empty_850 rpm [m]" in head
+    assert "nominal" not in head
+    assert "What the machines do at 850 rpm:" in out
+    assert "This is the first speed of the study" in out
     assert max(map(len, out.splitlines())) <= 80
     names = {path.name for path in (here / "map-flipflow").iterdir()}
     assert {"map.html", "report.html"} <= names
+    page = (here / "map-flipflow/report.html").read_text()
+    assert "Shaded: machines that meet the 2 limits looked at. Not looked at: main frame" in page
     assert ff.open_study("map.zarr").grid_shape == (3, 2)
+
+
+def test_columns_are_named_by_speeds_that_can_be_told_apart():
+    """In rpm with four digits; more where four are the same."""
+    omega = np.array([8.5, 850.0, 850.04, 1207.3]) * np.pi / 30.0
+    axis, values = Variable(("omega",), omega, "rad/s"), np.zeros((2, 4))
+    arrays = Arrays(
+        "", "sample", {"omega": axis}, {"size": Variable(("sample", "omega"), values)}, {}
+    )
+    names = [name for name, _ in table_columns(arrays)]
+    assert names == ["size_8.5 rpm", "size_850 rpm", "size_850.04 rpm", "size_1207.3 rpm"]
+    near = Variable(("omega",), omega[[0, 1, 3]], "rad/s")
+    arrays = replace(arrays, coordinates={"omega": near}, variables={
+        "size": Variable(("sample", "omega"), values[:, :3])})  # fmt: skip
+    assert [name for name, _ in table_columns(arrays)][-1] == "size_1207 rpm"
+
+
+def test_the_page_of_studies_lists_every_quantity():
+    page = (Path(__file__).parents[2] / "docs/tutorials/studies.md").read_text(encoding="utf-8")
+    table = page.partition("## What can be asked")[2].partition("\n## ")[0]
+    asked = {name for name, one in QUANTITIES.items() if one.of != "operation"}
+    assert set(re.findall(r"`(\w+)`", table)) == asked
 
 
 def test_store_info(command, here):
@@ -143,6 +204,26 @@ def test_store_info(command, here):
     code, _, err = command("store", "info", "none.zarr")
     assert code == 2
     assert "no such folder" in err
+
+
+def test_a_folder_that_is_no_store(command, here):
+    (here / "empty").mkdir()
+    for words, told in (("none.zarr", "no such folder"), ("empty", "it is no store of a study")):
+        code, _, err = command("store", "info", words)
+        assert code == 2
+        assert told in err
+        assert "the folder that flipflow study wrote, NAME.zarr or that of --store" in err
+        assert "ff." not in err
+
+
+def test_a_store_of_a_design_is_told_from_one_of_a_study(command, here):
+    manifest = {"schema": "flipflow/design-search/1"}
+    growing = {"excess": chunk_store.Variable(("candidate",), np.array(np.nan))}
+    create_store(here / "search", Layout(manifest, {}, growing, {"candidate": 4}, 4))
+    for words in (("store", "info", "search"), ("study", "--resume", "search")):
+        code, _, err = command(*words)
+        assert code == 4
+        assert "search holds the search of a design, and no study; flipflow design goes on" in err
 
 
 def test_worker_processes_find_the_same(command, here):
@@ -176,7 +257,7 @@ def test_stopped_it_keeps_what_is_finished_and_goes_on(command, here, number):
     finished = len(list(here.glob("long.zarr/checksum/c.*")))
     assert error == (
         f"Stopped by the user; {finished} of 256 chunks are in long.zarr, and flipflow study "
-        "--resume long.zarr goes on.\n"
+        "long.toml --resume long.zarr goes on.\n"
     )
     assert 2 <= finished < 256
     half = ff.open_study(here / "long.zarr")
@@ -212,6 +293,10 @@ def test_a_terminal_sees_the_time_left(here):
         (("clearance =", "clearence ="), ("vary.clearence", "'clearance'")),
         (('"5.4 mm..6.6 mm"', '"5.4 mm"'), ("vary.clearance", "5.4 mm..6.6 mm")),
         (('"5.4 mm..6.6 mm"', "5.4"), ("vary.clearance = 5.4", "a list of values")),
+        (('"5.4 mm..6.6 mm"', '"+-0.5 kg"'), ("vary.clearance", "mass", "length")),
+        (('"5.4 mm..6.6 mm"', '"+-8 mm"'), ("vary.clearance",)),
+        (('"5.4 mm..6.6 mm"', '"+-0 mm"'), ("vary.clearance",)),
+        (('"5.4 mm..6.6 mm"', '"+-"'), ("vary.clearance",)),
         (('"5.4 mm..6.6 mm"', '["5 mm"]'), ("vary.clearance",)),
         (('"5.4 mm..6.6 mm"', '["5 mm", "6 kg"]'), ("vary.clearance", "6 kg")),
         (('"5.4 mm..6.6 mm"', '{from = "5 mm", to = "6 mm"}'), ("vary.clearance.values",)),

@@ -10,8 +10,18 @@ import pytest
 from scipy import stats
 
 import flipflow as ff
+from flipflow.plotting.dispatch import figure
+from flipflow.plotting.plotly import described
+from flipflow.plotting.study import parallel_figure
+from flipflow.report.blocks import Text
+from flipflow.report.registry import blocks_of
 from flipflow.report.study import spread_table
-from flipflow.studies.tolerance import confidence_interval
+from flipflow.studies.tolerance import (
+    confidence_interval,
+    limits_in_words,
+    limits_left_out,
+    stands_out,
+)
 
 pytestmark = pytest.mark.numerical
 OMEGA = 89.0
@@ -128,6 +138,60 @@ def test_a_fold_that_moves_through_the_speed_is_a_share_that_jumps(screen):
     assert (first[1], second[1]) == ("empty", "empty, jumped")
     assert (int(first[-1]), int(second[-1])) == ((~beyond).sum(), beyond.sum())
     assert {row[1] for row in rows if row[0] == "upper jump speed"} == {"empty"}
+    assert "counted, the rest have none" not in spread_table(found).caption
+    values = dict(found.values)
+    values["omega_ub"] = np.where(np.arange(64)[:, None] < 50, values["omega_ub"], np.nan)
+    said = spread_table(replace(found, values=values)).caption
+    assert "Upper jump speed: 50 of 64 machines are counted, the rest have none." in said
+
+
+def test_a_gain_within_the_confidence_interval_is_none(linear):
+    """Of 90 machines, a tolerance that moves nothing brings shares that differ by chance."""
+    m = linear.eccentric_moment
+    vary = {"eccentric_moment": (0.9 * m, 1.1 * m), "main_mass": (915.99, 916.01)}
+    most = 1.04 * amplitude(linear)
+    few, many = (judged(linear, vary, most, n=n, method="monte-carlo") for n in (90, 4096))
+    assert few.gain[1, 0] != 0.0
+    assert not stands_out(few)[1, 0]
+    assert stands_out(many)[:, 0].tolist() == [True, False]
+    assert many.costliest() == "eccentric_moment"
+    assert [bar.colour for bar in figure(many).panels[1].bars] == ["allowed", "mark"]
+    assert "may be chance" in figure(many).caption
+    none = replace(few, halved=few.halved[1:], halved_interval=few.halved_interval[1:],
+                   names=few.names[1:], distributions=few.distributions[1:])  # fmt: skip
+    assert none.costliest() is None
+    words = [block.text for block in blocks_of(none) if isinstance(block, Text)]
+    assert words[0].endswith("halved one at a time, none stands out.")
+
+
+def test_many_machines_are_translucent_lines(linear):
+    """A line each, so that overlaid ones are darker; colours are named in legend and caption."""
+    m = linear.eccentric_moment
+    drawn = {}
+    for n in (16, 256):
+        found = ff.study(linear, {"eccentric_moment": (0.9 * m, 1.1 * m)}, "relative_amplitude",
+                         OMEGA, sampling=ff.Sample(n=n))  # fmt: skip
+        passing = np.arange(n) % 2 == 0
+        drawn[n] = parallel_figure(found, passing, met="the one limit looked at")
+        names = [trace.name for trace in drawn[n].panels[0].traces if trace.legend]
+        assert names == ["does not", "meets the one limit looked at"]
+        assert "Green: the machine meets the one limit looked at; red:" in drawn[n].caption
+    lines = {n: [t for t in one.panels[0].traces if not t.legend] for n, one in drawn.items()}
+    assert {n: len(some) for n, some in lines.items()} == {16: 16, 256: 256}
+    assert {t.opacity for t in lines[16]} == {1.0}
+    assert max(t.opacity for t in lines[256]) < 0.3
+    whole = described(drawn[256])["data"]
+    assert {item.get("opacity", 1.0) for item in whole} == {1.0, lines[256][0].opacity}
+
+
+def test_limits_that_were_not_looked_at_are_named():
+    start = ff.PassingLimits(stop_force=9e3)
+    limits = ff.Limits(stop_force=8e3, shear_strain=0.2, start=start)
+    assert limits_in_words(limits, ("stop_force",)) == "the one limit looked at"
+    named = ("shear strain", "stop force at start")
+    assert limits_left_out(limits, ("stop_force",)) == named
+    limits = replace(limits, start=None)
+    assert limits_in_words(limits, ("stop_force", "shear_strain")) == "every limit"
 
 
 def test_what_is_refused(linear):

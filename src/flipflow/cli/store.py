@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from flipflow.report.blocks import Block
 
 MOST_NAMED = 20
+REMEDY = "give the folder that flipflow study wrote, NAME.zarr or that of --store"
 
 
 def info(
@@ -23,10 +24,14 @@ def info(
 
     Ends with exit code 4 where something is damaged.
     """
-    from flipflow.batch.chunk_store import DAMAGED, ChunkStore  # noqa: PLC0415  quick --help
-    from flipflow.errors import StoreError  # noqa: PLC0415
+    from flipflow.batch.chunk_store import DAMAGED, META, ChunkStore  # noqa: PLC0415  quick --help
+    from flipflow.errors import InputError, StoreError  # noqa: PLC0415
     from flipflow.report.terminal import show  # noqa: PLC0415
 
+    if not store.is_dir():
+        raise InputError("STORE", str(store), f"there is no such folder; {REMEDY}")
+    if not (store / META).exists():
+        raise InputError("STORE", str(store), f"it is no store of a study; {REMEDY}")
     kept = ChunkStore(store)
     states = list(kept.states())
     damaged = [state for state in states if state.word == DAMAGED]

@@ -73,7 +73,7 @@ def study(
             with progress("starting") as tell, executor_of(workers, scheduler) as executor:
                 found = asked.run(executor, tell)
         except KeyboardInterrupt:
-            raise _stopped(asked.store) from None
+            raise _stopped(file, asked.store) from None
         judged = asked.judged(found)
         _write(found, judged, asked, target)
 
@@ -120,17 +120,18 @@ class _Asked:
         """The share that meets the limits of the machine file, where it can be told."""
         from dataclasses import replace  # noqa: PLC0415  keeps --help quick
 
-        from flipflow.studies.tolerance import tolerance  # noqa: PLC0415
+        from flipflow.studies.tolerance import limits_known, tolerance  # noqa: PLC0415
 
         if self.file is None or found.sampling == "grid":
             return None
         limits = self.file.project.limits
-        known = [name for name in limits.given if name in found.values or name == "speed"]
+        known = limits_known(found, limits)
         if not known:
             return None
         others = {name: None for name in limits.given if name not in known}
         kept = replace(limits, **others)  # type: ignore[arg-type]
-        return tolerance(found, kept)
+        # The report tells the limits of the file that were not looked at.
+        return replace(tolerance(found, kept), limits=limits)
 
 
 def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: bool) -> _Asked:
@@ -156,8 +157,13 @@ def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: 
     return _Asked(one, place)
 
 
-def _stopped(store: Path) -> Exception:
-    """The error that ends a command after Ctrl-C, with what is kept."""
+def _stopped(file: str | None, store: Path) -> Exception:
+    """The error that ends a command after Ctrl-C, with what is kept.
+
+    The file is named, for limits and title are in it, and not in the store.
+    """
+    import shlex  # noqa: PLC0415  keeps --help quick
+
     from flipflow.batch.chunk_store import FINISHED, ChunkStore  # noqa: PLC0415  quick --help
     from flipflow.cli.destination import NOTHING, STOPPED  # noqa: PLC0415
     from flipflow.errors import Cancelled  # noqa: PLC0415
@@ -166,9 +172,10 @@ def _stopped(store: Path) -> Exception:
         return Cancelled(f"{STOPPED}; {NOTHING}.")
     kept = ChunkStore(store)
     finished = sum(state.word == FINISHED for state in kept.states())
+    words = ["flipflow", "study", *([file] if file else []), RESUME, str(store)]
     return Cancelled(
-        f"{STOPPED}; {finished} of {kept.chunks} chunks are in {store}, and flipflow study "
-        f"{RESUME} {store} goes on."
+        f"{STOPPED}; {finished} of {kept.chunks} chunks are in {store}, and "
+        f"{shlex.join(words)} goes on."
     )
 
 
@@ -197,7 +204,15 @@ def _write(found: Study, judged: Tolerance | None, asked: _Asked, target: Destin
             if result is not None:
                 summary(result, console())
         if judged is None:
-            show(spread_table(found), console())
+            table = spread_table(found)
+            console().print()
+            say(console(), f"{table.title}:")
+            show(table, console())
+            if table.caption:
+                say(console(), table.caption)
+        if asked.file is None:
+            told = f"limits and title are in the study file, flipflow study FILE {RESUME}"
+            say(console(), f"Note: no limit is judged; {told} {asked.store} reads them.", "yellow")
         console().print(f"Store: {asked.store}", soft_wrap=True)
     target.tell()
 

@@ -46,9 +46,9 @@ class SpecialPoint:
     Parameters
     ----------
     kind
-        "fold" (a saddle-node: the amplitude jumps here), "contact begin", "contact end",
-        "symmetry breaking", "period doubling", "Neimark-Sacker" or "branch point" (another branch
-        crosses, as where a rotor loses the symmetry of its stops).
+        "fold" (a saddle-node: the amplitude jumps here where the motion is stable on one side),
+        "contact begin", "contact end", "symmetry breaking", "period doubling", "Neimark-Sacker" or
+        "branch point" (another branch crosses, as where a rotor loses the symmetry of its stops).
     orbit
         The motion at the point.
     position

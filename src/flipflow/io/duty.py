@@ -26,7 +26,7 @@ from flipflow.io.study_file import (
 )
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Notes, Table, read_number
-from flipflow.io.vary import field_named
+from flipflow.io.vary import PLUS_MINUS, field_named
 from flipflow.model.duty import OBJECTIVES, Duty, SpringType
 from flipflow.model.limits import LIMIT_FIELDS, Limits
 from flipflow.model.project import Project
@@ -133,7 +133,8 @@ def _scatter(table: Mapping[str, Any]) -> dict[str, float]:
     for key, written in flat_keys(table).items():
         label = f"scatter.{key}"
         name = field_named(key, key).name
-        found[name] = parse_quantity(written, "", field=label, example="15 %")
+        share = written.strip().removeprefix(PLUS_MINUS) if isinstance(written, str) else written
+        found[name] = parse_quantity(share, "", field=label, example="15 %")
     return found
 
 

@@ -34,6 +34,14 @@ from flipflow.model.limits import (
 from flipflow.model.project import Document, Project
 from flipflow.model.screen import FlipFlowScreen
 
+# Sections of the files that name a machine file, what such a file is called, and its command.
+OTHER_FILES = {
+    "duty": ("duty", "flipflow design"),
+    "free": ("duty", "flipflow design"),
+    "study": ("study", "flipflow study"),
+    "vary": ("study", "flipflow study"),
+}
+
 
 def load(name_or_path: str | os.PathLike[str], *, force: bool = False) -> FlipFlowScreen:
     """Load the screen of a bundled machine or of a machine file.
@@ -115,6 +123,7 @@ def _plausible(project: Project, *, force: bool) -> Project:
 
 def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
     """Check that every section is there in the right shape and holds only known keys."""
+    _refuse_other_files(tables)
     refuse_unknown(tables, ["format", *(name for name in SECTIONS if "." not in name)], place="")
     sections: Tables = {}
     for name, entries in SECTIONS.items():
@@ -135,6 +144,15 @@ def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
             "load_cases", shown, "write each case as a section of its own, [[load_cases]]"
         )
     return sections, cases
+
+
+def _refuse_other_files(tables: Mapping[str, object]) -> None:
+    """Name the command of a file that is no machine's, but names one."""
+    if isinstance(tables.get("machine"), str):
+        for section, command in OTHER_FILES.items():
+            if section in tables:
+                remedy = f"this is a {command[0]} file, which {command[1]} reads"
+                raise InputError("section", f"[{section}]", remedy)
 
 
 def _check_format(tables: Mapping[str, object], notes: Notes) -> None:

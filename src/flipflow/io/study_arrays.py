@@ -10,7 +10,7 @@ from flipflow.studies.candidates import quantity_of
 from flipflow.studies.design import Proposal
 from flipflow.studies.study import Study
 from flipflow.studies.study_plan import unit_of
-from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.tolerance import Tolerance, limits_in_words
 
 
 def study_arrays(found: Study) -> Arrays:
@@ -53,7 +53,7 @@ def tolerance_arrays(found: Tolerance) -> Arrays:
     """Shares by frequency."""
     ends = ("frequency", "end")
     return Arrays(
-        "Machines that meet every limit",
+        f"Machines that meet {limits_in_words(found.limits, found.checked)}",
         "frequency",
         {
             "omega": column("frequency", found.omega, "rad/s"),

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from flipflow.errors import MissingExtra
 from flipflow.io import spreadsheet
 from flipflow.io.labelled import Arrays, Variable
+from flipflow.model.constants import RPM
+from flipflow.model.numerals import digits
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,16 +75,32 @@ def table_columns(arrays: Arrays) -> Iterator[tuple[str, Variable]]:
         if one.dims == (arrays.index,):
             yield name, one
         elif len(one.dims) > 1 and one.dims[0] == arrays.index:
+            sizes = zip(one.dims[1:], one.data.shape[1:], strict=True)
+            labels = [_labels(arrays, dim, count) for dim, count in sizes]
             for place in np.ndindex(one.data.shape[1:]):
-                words = [_label(arrays, dim, k) for dim, k in zip(one.dims[1:], place, strict=True)]
+                words = [some[k] for some, k in zip(labels, place, strict=True)]
                 values = one.data[(slice(None), *place)]
                 yield "_".join([name, *words]), Variable((arrays.index,), values, one.units)
 
 
-def _label(arrays: Arrays, dim: str, place: int) -> str:
-    """What stands at a place of a dimension: its coordinate, else the place itself."""
+def _labels(arrays: Arrays, dim: str, count: int) -> list[str]:
+    """What stands at the places of a dimension: its coordinate, else the place itself.
+
+    Numbers have four digits, more where these do not tell them apart; speeds stand in rpm.
+    """
     known = arrays.coordinates.get(dim)
-    return str(place if known is None else known.data[place])
+    if known is None:
+        return [str(place) for place in range(count)]
+    if known.data.dtype.kind != "f":
+        return [str(one) for one in known.data]
+    speeds = known.units == "rad/s"
+    numbers, unit = (known.data * RPM, " rpm") if speeds else (known.data, "")
+    found: list[str] = []
+    for precision in range(4, 18):
+        found = [f"{digits(float(one), precision)}{unit}" for one in numbers]
+        if len(set(found)) == np.unique(numbers).size:
+            break
+    return found
 
 
 def csv_text(arrays: Arrays) -> str:

@@ -21,10 +21,10 @@ WORDS = ", ".join(key for key, field in BY_KEY.items() if not field.whole)
 def read_vary(words: Iterable[str], screen: FlipFlowScreen) -> dict[str, object]:
     """Convert words to the mapping that analyses take, SI.
 
-    A word is ``field=low..high`` (uniform), ``field=+-5 %`` (uniform about the machine's value) or
-    ``field=mean +/- std`` (normal). The field is named as in Python, by its place in the file such
-    as ``stops.clearance``, or by its last part where no other section has it. ``_each`` behind a
-    name means one piece.
+    A word is ``field=low..high`` (uniform), ``field=+-5 %`` or ``field=+-0.5 mm`` (uniform about
+    the machine's value) or ``field=mean +/- std`` (normal). The field is named as in Python, by its
+    place in the file such as ``stops.clearance``, or by its last part where no other section has
+    it. ``_each`` behind a name means one piece.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen, count: 
 
 def _range(field: Field, text: str, word: str, screen: FlipFlowScreen, count: float) -> object:
     if text.startswith(PLUS_MINUS):
-        return _about(field, text.removeprefix(PLUS_MINUS), word, screen)
+        return _about(field, text.removeprefix(PLUS_MINUS).strip(), word, screen, count)
     if SPREAD in text:
         mean, std = (count * _number(field, part) for part in text.split(SPREAD, 1))
         if not std > 0.0:
@@ -108,11 +108,19 @@ def _range(field: Field, text: str, word: str, screen: FlipFlowScreen, count: fl
     return count * _number(field, low), count * _number(field, high)
 
 
-def _about(field: Field, text: str, word: str, screen: FlipFlowScreen) -> tuple[float, float]:
+def _about(
+    field: Field, text: str, word: str, screen: FlipFlowScreen, count: float
+) -> tuple[float, float]:
+    """An interval about the machine's own value: by a share of it, or by so much in its unit."""
     value = getattr(screen, field.name)
-    share = parse_quantity(text.strip(), "", field=f"{OPTION} {field.name}", example="5 %")
     if value is None or value in (0.0, float("inf")):
         raise InputError(OPTION, word, "the machine has no value to vary about, give low..high")
+    if field.unit and any(letter.isalpha() for letter in text.lower().replace("e", "")):
+        wide = count * _number(field, text)
+        if not wide > 0.0:
+            raise InputError(OPTION, word, "give a tolerance above 0")
+        return value - wide, value + wide
+    share = parse_quantity(text, "", field=f"{OPTION} {field.name}", example="5 %")
     if not 0.0 < share < 1.0:
         raise InputError(OPTION, word, "give a share between 0 % and 100 %")
     return value * (1.0 - share), value * (1.0 + share)

@@ -72,6 +72,8 @@ class Trace:
         Another dash than the role's.
     x_also
         x in other units, for the hover text: pairs of unit and values.
+    opacity
+        Of a line: below 1 it shows what lies beneath, so that many lines show where they are dense.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Trace:
     lower: Real | None = None
     dash: str = ""
     x_also: tuple[tuple[str, Real], ...] = ()
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

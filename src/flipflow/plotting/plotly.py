@@ -225,6 +225,8 @@ def _look(trace: Trace, colour: str) -> Json:
             "dash": trace.dash or DASHES.get(trace.role, "solid"),
         },
     }
+    if trace.opacity < 1.0:
+        look["opacity"] = trace.opacity
     if trace.symbol:
         shape = SYMBOLS.get(trace.symbol, trace.symbol)
         # Marks only tell lines apart, so a few along the line will do.

@@ -244,7 +244,7 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
         beneath = trace.role == "beneath"
         style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
                   "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
-                  "markevery": _marks(trace)}  # fmt: skip
+                  "markevery": _marks(trace), "alpha": trace.opacity}  # fmt: skip
     (handle,) = axes.plot(trace.x, trace.y, marker=MARKERS.get(trace.symbol or "", ""), **style)
     handles.setdefault(trace.name, handle)
 

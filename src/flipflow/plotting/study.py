@@ -14,6 +14,7 @@ from flipflow.errors import InputError, MissingExtra
 from flipflow.model.arguments import checked_index, checked_word
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.numerals import rpm
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -24,12 +25,19 @@ from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.sensitivity import SHOWN, tornado_figure
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.study import Study
-from flipflow.studies.tolerance import FOLDS, jumped_motions
+from flipflow.studies.tolerance import (
+    FOLDS,
+    jumped_motions,
+    limits_in_words,
+    limits_known,
+    limits_left_out,
+)
 
 Real = NDArray[np.float64]
 LEVELS = 7  # contours of a map, about
 MOST_AXES = 10  # of parallel coordinates: the fields, then quantities
 MOST_LINES = 300  # machines of parallel coordinates
+CLEAR_LINES, LEAST_OPACITY = 30, 0.12  # lines that may be opaque; of very many
 FIELD_SCALES = {"mm": MM, "kN/m": 1e-3, "kN s/m": 1e-3, "kg mm": 1e3}
 
 
@@ -95,7 +103,7 @@ def map_figure(
     cells: tuple[Cells, ...] = ()
     if limits is not None:
         traces += _limit_contours(grid, limits)
-        cells = (_met_cells(grid, limits),)
+        cells = (_met_cells(grid, limits),) if limits_known(study, limits) else ()
     traces += _fold_contours(grid)
     notes = tuple(_level_notes(traces))
     panel = Panel(
@@ -103,7 +111,7 @@ def map_figure(
         tuple(trace for trace in traces if trace.x.size), cells=cells, notes=notes,
         title=_where(study, place, one),
     )  # fmt: skip
-    shaded = " Shaded: every limit is met." if cells else ""
+    shaded = "" if limits is None else _shaded_words(study, limits)
     jumps = (
         " Dashed: beyond this line the machine has jumped, and no contour leads across. Dotted: "
         "from this line on two motions are possible."
@@ -130,7 +138,7 @@ def curves_figure(study: Study, field: str) -> Figure:
             for c, case in enumerate(study.cases)
         )
         panels.append(Panel(_field_axis(study, field, x), Axis(one.label, one.shown_unit), traces))
-    title = f"{symbol_of(field)} varied{_speed_words(study, 0)}"
+    title = f"{symbol_of(field)} varied{speed_in_words(study.omega[0])}"
     caption = "Each line: a load case. Where a line is broken the quantity has no value."
     return Figure(title, caption, tuple(panels), height=230 * len(panels) + 60)
 
@@ -169,7 +177,11 @@ def study_tornado(study: Study, quantity: str, place: Place | None = None) -> Fi
 
 
 def parallel_figure(
-    study: Study, passing: NDArray[np.bool_] | None = None, place: Place | None = None
+    study: Study,
+    passing: NDArray[np.bool_] | None = None,
+    place: Place | None = None,
+    *,
+    met: str = "every limit",
 ) -> Figure:
     """Each machine a line across its fields and quantities.
 
@@ -181,23 +193,22 @@ def parallel_figure(
         Which machines meet every limit, (S,); the others are drawn in another colour.
     place
         Load case and frequency.
+    met
+        What those have met, in words.
     """
     place = place or Place()
     fine = np.ones(study.size, bool) if passing is None else np.asarray(passing)
     columns = list(_axes(study, place))[:MOST_AXES]
     rows = np.linspace(0, study.size - 1, min(study.size, MOST_LINES)).astype(int)
     heights = np.stack([_share(values) for _, values in columns], axis=1)[rows]
-    groups = [("meets every limit", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
+    groups = [(f"meets {met}", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
     if passing is None:
         groups = [("machine", fine[rows], "main")]
-    x = np.arange(len(columns) + 1.0)
-    x[-1] = np.nan  # parts the line of one machine from the next
-    traces = []
-    for name, chosen, colour in groups[::-1]:
-        count = int(chosen.sum())
-        broken = np.concatenate([heights[chosen], np.full((count, 1), np.nan)], axis=1)
-        if count:
-            traces.append(Trace(f"{name}", np.tile(x, count), broken.ravel(), colour=colour))
+    traces = [
+        trace
+        for name, chosen, colour in groups[::-1]
+        for trace in _machine_lines(name, heights[chosen], colour)
+    ]
     ticks = tuple((float(k), label) for k, (label, _) in enumerate(columns))
     notes = tuple(_end_notes(columns))
     uprights = tuple(Line("x", float(k), "", "mark", "solid") for k in range(len(columns)))
@@ -211,7 +222,23 @@ def parallel_figure(
         "Each line is a machine: its fields, then what it does; the ends of every axis are the "
         f"least and the greatest value.{shown}"
     )
+    if passing is not None:
+        caption += f" Green: the machine meets {met}; red: it does not."
     return Figure("Machines of the study", caption, (panel,), height=400)
+
+
+def _machine_lines(name: str, heights: Real, colour: str) -> Iterator[Trace]:
+    """A line for each machine, (n, axes), and one without points for the legend.
+
+    Lines of their own, for overlaid parts of one translucent line are no darker.
+    """
+    count, axes = heights.shape
+    if count == 0:
+        return
+    yield Trace(name, np.full(1, np.nan), np.full(1, np.nan), colour=colour, bold=True)
+    opacity = float(np.clip(CLEAR_LINES / count, LEAST_OPACITY, 1.0))
+    for row in heights:
+        yield Trace(name, np.arange(float(axes)), row, colour=colour, legend=False, opacity=opacity)
 
 
 class _Grid:
@@ -288,12 +315,22 @@ def _fold_contours(grid: _Grid) -> Iterator[Trace]:
 def _met_cells(grid: _Grid, limits: Limits) -> Cells:
     """Machines that meet every limit, as cells around the points of the grid."""
     met = np.ones((grid.y.size, grid.x.size), bool)
-    for name in limits.given:
-        if name in grid.study.values:
-            low, high = limit_bounds(limits, name)
-            values = grid.values(name)
-            met &= (values >= low) & (values <= high)
+    for name in limits_known(grid.study, limits):
+        low, high = limit_bounds(limits, name)
+        operation = QUANTITIES[name].of == "operation"
+        values = grid.study.omega[grid.place.at] if operation else grid.values(name)
+        met &= (values >= low) & (values <= high)
     return Cells(_edges(grid.x), _edges(grid.y), met.astype(np.int64), ("none", "case 3"))
+
+
+def _shaded_words(study: Study, limits: Limits) -> str:
+    """What the shading of a map means, and which limits it does not know."""
+    known = limits_known(study, limits)
+    if not known:
+        return ""
+    left_out = limits_left_out(limits, known)
+    others = f" Not looked at: {', '.join(left_out)}." if left_out else ""
+    return f" Shaded: machines that meet {limits_in_words(limits, known)}.{others}"
 
 
 def _joined(
@@ -435,12 +472,10 @@ def _where(study: Study, place: Place, one: Quantity | None) -> str:
     """Load case and speed of a panel."""
     case = f"load case {study.cases[place.case]}" if len(study.cases) > 1 else ""
     whole = one is not None and one.of == "response"
-    speed = "" if whole else _speed_words(study, place.at).removeprefix(" ")
+    speed = "" if whole else speed_in_words(study.omega[place.at]).removeprefix(" ")
     return " ".join(filter(None, (case, speed)))
 
 
-def _speed_words(study: Study, at: int) -> str:
-    omega = float(study.omega[at])
-    if not np.isfinite(omega):
-        return ""
-    return f" at {omega * RPM:.4g} rpm"
+def speed_in_words(omega: float) -> str:
+    """A blank and "at 850 rpm"; nothing for a study of whole responses alone."""
+    return f" at {rpm(float(omega))} rpm" if np.isfinite(omega) else ""

@@ -7,8 +7,8 @@ import numpy as np
 from flipflow.model.arguments import checked_index
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
-from flipflow.plotting.study import symbol_of
-from flipflow.studies.tolerance import Tolerance
+from flipflow.plotting.study import speed_in_words, symbol_of
+from flipflow.studies.tolerance import Tolerance, limits_in_words, stands_out
 
 
 def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
@@ -29,7 +29,8 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
     if not known.any():
         factors, share, low, high = np.ones(1), own[None], interval[:1], interval[1:]
     band = Trace("95 % confidence", factors, high, "case band", "case band", lower=low)
-    line = Trace("share that meets every limit", factors, share, colour="relative", bold=True)
+    met = limits_in_words(found.limits, found.checked)
+    line = Trace(f"share that meets {met}", factors, share, colour="relative", bold=True)
     above = Panel(
         Axis("all tolerances times", ""), Axis("machines that pass", "%", (0.0, 102.0)),
         (band, line), lines=(Line("x", 1.0, "as given", "mark"),),
@@ -53,16 +54,29 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
             ),
         )  # fmt: skip
     caption = (
-        "Above: the share of built machines that meet every limit in every load case, against a "
-        "factor on all tolerances. Below: the same with one tolerance alone half as wide; the "
-        "longest bar to the right is the tolerance that costs most."
+        f"Above: the share of built machines that meet {met} in every load case, against a "
+        "factor on all tolerances. Below: the same with one tolerance alone half as wide; a bar "
+        f"to the right is what that would gain.{_noise_words(found, at, order)}"
     )
-    return Figure("What tolerances cost", caption, panels, height=300 + 60 + 30 * len(order))
+    title = f"What tolerances cost{speed_in_words(found.omega[at])}"
+    return Figure(title, caption, panels, height=300 + 60 + 30 * len(order))
+
+
+def _noise_words(found: Tolerance, at: int, order: list[int]) -> str:
+    """What grey bars are, where there are some."""
+    if bool(stands_out(found)[order, at].all()):
+        return ""
+    return (
+        " Grey: the change lies within the 95 % confidence interval, so that it may be chance; "
+        "more machines would tell."
+    )
 
 
 def _bar(found: Tolerance, field: int, at: int, height: float) -> Bar:
     """From the share as given to that with the tolerance of one field halved."""
     low, high = sorted(100.0 * share for share in (found.share[at], found.halved[field, at]))
     colour = "allowed" if found.gain[field, at] >= 0.0 else "limit"
+    if not stands_out(found)[field, at]:
+        colour = "mark"
     words = f"{100.0 * found.halved[field, at]:.1f} %"
     return Bar("", height, low, high, 0.5, colour, text=words)

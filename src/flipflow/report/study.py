@@ -18,6 +18,7 @@ from flipflow.plotting.study import (
     curves_figure,
     map_figure,
     parallel_figure,
+    speed_in_words,
     study_tornado,
     wide_fields,
 )
@@ -36,7 +37,13 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import NOTHING, bounds, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.study import Study
-from flipflow.studies.tolerance import FOLDS, Tolerance, jumped_motions
+from flipflow.studies.tolerance import (
+    FOLDS,
+    Tolerance,
+    jumped_motions,
+    limits_in_words,
+    limits_left_out,
+)
 
 Real = NDArray[np.float64]
 QUANTILES = (0.025, 0.5, 0.975)
@@ -114,30 +121,38 @@ def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> I
         yield FigureBlock(curves_figure(found, wide[0]))
         return
     if found.sampling == "grid" and len(wide) > 1:
-        yield Heading("Maps", 1, new_page=False)
+        yield Heading(f"Maps{speed_in_words(found.omega[0])}", 1, new_page=False)
         for name in motions[:MOST_FIGURES]:
             yield FigureBlock(map_figure(found, name, limits))
         return
-    yield Heading("What moves each quantity", 1, new_page=False)
+    heading = f"What moves each quantity{speed_in_words(found.omega[0])}"
+    yield Heading(heading, 1, new_page=False)
     for name in motions[:MOST_FIGURES]:
         if np.isfinite(found.nominal[name]).all():
             yield FigureBlock(study_tornado(found, name, Place()))
-    yield FigureBlock(parallel_figure(found, None if judged is None else judged.passing[:, 0]))
+    if judged is None:
+        yield FigureBlock(parallel_figure(found))
+        return
+    met = limits_in_words(judged.limits, judged.checked)
+    yield FigureBlock(parallel_figure(found, judged.passing[:, 0], met=met))
 
 
 @section(Tolerance, Part.FIRST_PAGE, 10, brief=True)
 def yield_of_machines(found: Tolerance) -> Iterator[Block]:
     """The share that passes at each speed, each limit, and which tolerance costs most."""
-    yield Heading("Machines that meet every limit", 1, new_page=False)
+    met = limits_in_words(found.limits, found.checked)
+    yield Heading(f"Machines that meet {met}", 1, new_page=False)
     for j, omega in enumerate(found.omega):
         share, (low, high) = found.share[j], found.share_interval[j]
-        speed = f" at {rpm(omega)} rpm" if np.isfinite(omega) else ""
         yield Text(
-            f"of {found.size} machines{speed} meet every limit in every load case "
+            f"of {found.size} machines{speed_in_words(omega)} meet {met} in every load case "
             f"({_share(low)} to {_share(high)} with 95 % confidence)."
             f"{_jump_words(found, j)}{_cost_words(found, j)}",
             lead=_share(share),
         )
+    left_out = limits_left_out(found.limits, found.checked)
+    if left_out:
+        yield Note(f"Not looked at: {', '.join(left_out)}.")
     columns = (
         Column("Limit"), Column("Allowed"), *(
             Column(f"{rpm(omega)} rpm" if np.isfinite(omega) else "Met", "%", numeric=True)
@@ -148,12 +163,14 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
         cells(QUANTITIES[name].label, _bounds(found, name), *_percents(found.by_limit[b]))
         for b, name in enumerate(found.checked)
     ]
+    every = "all looked at" if left_out else "all"
     rows += [
-        cells(f"all, case {case}", "", *_percents(found.by_case[c]))
+        cells(f"{every}, case {case}", "", *_percents(found.by_case[c]))
         for c, case in enumerate(found.cases)
     ]
-    rows.append(cells("all, every case", "", *_percents(found.share)))
-    yield Table("Machines that meet each limit", columns, tuple(rows))
+    rows.append(cells(f"{every}, every case", "", *_percents(found.share)))
+    title = f"Machines that meet each limit{' looked at' if left_out else ''}"
+    yield Table(title, columns, tuple(rows))
     yield from (Note(text) for text in found.notes)
 
 
@@ -180,8 +197,26 @@ def spread_table(found: Study) -> Table:
                 numbers = [nominal, *_quantiles(values)]
                 texts = [_value(one, float(x)) for x in numbers]
                 rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
-    caption = "At the first speed. Machines that have jumped are never counted with the others."
-    return Table("What the machines do", columns, tuple(rows), caption)
+    title = f"What the machines do{speed_in_words(found.omega[0])}"
+    return Table(title, columns, tuple(rows), " ".join(_spread_words(found)))
+
+
+def _spread_words(found: Study) -> Iterator[str]:
+    """What the table of the spread leaves out."""
+    if found.omega.size > 1:
+        yield "This is the first speed of the study; the others are in the table of machines."
+    if all(name in found.values for name in FOLDS):
+        yield "Machines that have jumped are never counted with the others."
+    for name in found.quantities:
+        one = quantity_named(name, found.machine)
+        for c, case in enumerate(found.cases):
+            counted = sum(values.size for _, values in _groups(found, one, c))
+            if counted < found.size:
+                of_case = f" in case {case}" if len(found.cases) > 1 else ""
+                yield (
+                    f"{one.label[:1].upper()}{one.label[1:]}{of_case}: {counted} of {found.size} "
+                    "machines are counted, the rest have none."
+                )
 
 
 def _groups(found: Study, one: Quantity, case: int) -> Iterator[tuple[str, Real]]:
@@ -222,7 +257,7 @@ def _range(name: str, one: Distribution) -> str:
         return quantity(value, shown, unit) if isinstance(value, float) else str(value)
 
     if isinstance(one, Normal):
-        return f"{words(one.mean)} +/- {words(one.std)}"
+        return f"normal, {words(one.mean)}, standard deviation {words(one.std)}"
     if isinstance(one, Choice) and len(one.values) <= 4:
         return ", ".join(map(words, one.values))
     low, high = one.ends
@@ -249,6 +284,8 @@ def _jump_words(found: Tolerance, j: int) -> str:
 
 def _cost_words(found: Tolerance, j: int) -> str:
     name = found.costliest(j)
+    if name is None and np.isfinite(found.halved[:, j]).any():
+        return " Of the tolerances, halved one at a time, none stands out."
     if name is None:
         return ""
     i = found.names.index(name)

@@ -229,6 +229,9 @@ def plan_from(store: ChunkStore) -> Plan:
         For a store of a later version, and for one whose values are not those it was made with.
     """
     known = store.manifest
+    if str(known.get("schema")).startswith("flipflow/design"):
+        told = "holds the search of a design, and no study; flipflow design goes on with it"
+        raise StoreError(f"{store.folder} {told}.")
     if known.get("schema") != SCHEMA:
         raise StoreError(f"{store.folder} holds {known.get('schema')!r}; update flipflow.")
     machine = CODEC.form(Machine).read(known["machine"])

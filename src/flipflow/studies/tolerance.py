@@ -13,7 +13,7 @@ from flipflow import __version__
 from flipflow.batch.reasons import FOUND
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind
-from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.limits import PASSAGES, PASSING_FIELDS, Limits, limit_bounds
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.system import Machine
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -49,7 +49,7 @@ class Tolerance(Result):
     limits
         What was to be met.
     checked
-        Names of the limits that were, (B,).
+        Names of the limits that were looked at, (B,); "every limit" below means these.
     size
         Number of machines S.
     passing
@@ -120,11 +120,12 @@ class Tolerance(Result):
         return np.asarray(self.halved - self.share)
 
     def costliest(self, at: int = 0) -> str | None:
-        """The field whose tolerance costs most at the frequency of index ``at``; None: no cost."""
-        gain = self.gain[:, at]
-        if not np.isfinite(gain).any() or np.nanmax(gain) <= 0.0:
-            return None
-        return self.names[int(np.nanargmax(gain))]
+        """The field whose tolerance costs most at the frequency of index ``at``.
+
+        None where no gain stands out of the confidence intervals.
+        """
+        gain = np.where(stands_out(self)[:, at], self.gain[:, at], 0.0)
+        return self.names[int(np.argmax(gain))] if (gain > 0.0).any() else None
 
 
 def tolerance(study: Study, limits: Limits) -> Tolerance:
@@ -203,6 +204,44 @@ def tolerance(study: Study, limits: Limits) -> Tolerance:
         scaled_interval=scaled_interval,
         notes=tuple(_notes(study, unchecked)),
         version=__version__,
+    )
+
+
+def stands_out(found: Tolerance) -> Flags:
+    """Where half a tolerance changes the share by more than chance, (D, F).
+
+    Neither share lies within the confidence interval of the other.
+    """
+    share, interval = found.share, found.share_interval
+    low, high = found.halved_interval[..., 0], found.halved_interval[..., 1]
+    above = (found.halved > interval[:, 1]) & (low > share)
+    below = (found.halved < interval[:, 0]) & (high < share)
+    return np.asarray(above | below)
+
+
+def limits_in_words(limits: Limits, checked: tuple[str, ...]) -> str:
+    """What a machine that passes has met: "every limit", or "the 3 limits looked at"."""
+    if not limits_left_out(limits, checked):
+        return "every limit"
+    return f"the {len(checked)} limits looked at" if len(checked) > 1 else "the one limit looked at"
+
+
+def limits_left_out(limits: Limits, checked: tuple[str, ...]) -> tuple[str, ...]:
+    """The limits that were given and not looked at, in words."""
+    running = [QUANTITIES[name].label for name in limits.given if name not in checked]
+    passing = [
+        f"{QUANTITIES[field.name].label} at {passage}"
+        for passage in PASSAGES
+        for field in PASSING_FIELDS[passage]
+        if getattr(getattr(limits, passage), field.name) is not None
+    ]
+    return (*running, *passing)
+
+
+def limits_known(study: Study, limits: Limits) -> tuple[str, ...]:
+    """Names of the limits whose quantities a study holds."""
+    return tuple(
+        name for name in limits.given if name in study.values or QUANTITIES[name].of == "operation"
     )
 
 
