@@ -30,6 +30,31 @@ class Rig:
         return ff.MechanicalSystem([[1.0]], [[self.c]], [[1.0]], [stop], force)
 
 
+@dataclass(frozen=True)
+class Hammer:
+    """A tool on a body, with a stop on one side and names of its user for what moves."""
+
+    gap: float = 0.5
+    force: float = 0.3
+    stop: float = 20.0
+    zeta: float = 0.03
+
+    def system(self) -> ff.MechanicalSystem:
+        """As matrices and springs."""
+        K = np.array([[1.5, -0.5], [-0.5, 0.5]])
+        stop = ff.ClearanceSpring([-1.0, 1.0], self.stop, 0.0, self.gap, np.inf)
+        names = {"body": [1.0, 0.0], "tool": [0.0, 1.0], "stretch": [-1.0, 1.0]}
+        return ff.MechanicalSystem(
+            np.diag([1.0, 0.4]), 2.0 * self.zeta * K, K, [stop],
+            ff.HarmonicForce([self.force, 0.0]), names,
+        )  # fmt: skip
+
+
+@cache
+def hammer_branch() -> ff.Branch:
+    return ff.frequency_response(Hammer(), (0.3, 2.5))
+
+
 @cache
 def chain() -> ff.MechanicalSystem:
     """Two masses of its user, without names and without units."""
@@ -155,6 +180,27 @@ def test_a_figure_of_a_command_names_its_machine_and_has_one_title(
     assert "FFS0827" in read
     (title,) = re.findall(r"<h1>(.*?)</h1>", read)
     assert read.count(title) == 1
+
+
+def test_each_coordinate_of_a_user_has_a_look_of_its_own() -> None:
+    """On a page, in a plot, and with more names than there are colours."""
+    names = ["body", "tool", "stretch"]
+    for drawn in (
+        ff.figure(hammer_branch()), ff.figure(ff.linear_response(Hammer(), np.linspace(0.3, 2.0)))
+    ):  # fmt: skip
+        for panel in drawn.panels:
+            lines = [trace for trace in panel.traces if trace.name in names]
+            assert list(dict.fromkeys(trace.name for trace in lines)) == names
+            looks = {(trace.name, trace.colour) for trace in lines}
+            assert len(looks) == len({colour for _, colour in looks}) == len(names)
+    assert {trace.role for trace in ff.figure(hammer_branch()).panels[0].traces} >= {
+        "stable", "unstable",
+    }  # fmt: skip
+    K = 2.0 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
+    named = {f"mass {k}": row for k, row in enumerate(np.eye(8))}
+    long = ff.MechanicalSystem(np.eye(8), 0.1 * K, K, (), ff.HarmonicForce(np.eye(8)[0]), named)
+    drawn = ff.figure(ff.linear_response(long, np.linspace(0.3, 2.0)))
+    assert len({(one.colour, one.symbol) for one in drawn.panels[0].traces}) == 8
 
 
 def _texts(part: object) -> Iterator[str]:

@@ -70,8 +70,8 @@ def branch_figure(
     """
     names = coordinates(branch.system, which)
     curves = [Curve.of(branch, name) for name in names]
-    amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
-    phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
+    amplitude = _traces(branch.system, names, curves, "amplitude")
+    phase = _traces(branch.system, names, curves, "phase")
     axis = speed_axis(branch.omega)
     points = special_point_traces(branch.special_points, names[-1])
     jumps = curves[-1].jumps()
@@ -120,14 +120,13 @@ def _row(name: str, branch: Branch, omega: float | None) -> tuple[Panel, Panel]:
     """Amplitude and phase of one load case side by side, without marks at special points."""
     names = coordinates(branch.system)
     curves = [Curve.of(branch, one) for one in names]
-    pairs = list(zip(names, curves, strict=True))
     axis, lines = speed_axis(branch.omega), _working(omega, text=False)
     left = Panel(
         axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
-        traces=tuple(t for n, c in pairs for t in _traces(n, c, "amplitude")), lines=lines,
+        traces=tuple(_traces(branch.system, names, curves, "amplitude")), lines=lines,
         arrows=_arrows(curves[-1].jumps()), title=within(name, LEGEND_LETTERS),
     )  # fmt: skip
-    phase = tuple(t for n, c in pairs for t in _traces(n, c, "phase"))
+    phase = tuple(_traces(branch.system, names, curves, "phase"))
     return left, Panel(axis, _phase_axis(curves), traces=phase, lines=lines)
 
 
@@ -143,8 +142,8 @@ def linear_figure(response: LinearResponse, which: Coordinate | None = None) -> 
         )
         for name in names
     ]
-    amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
-    phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
+    amplitude = _traces(response.system, names, curves, "amplitude")
+    phase = _traces(response.system, names, curves, "phase")
     axis = speed_axis(response.omega)
     marks = tuple(
         Line("x", w * RPM, f"w0{k}", "mark")
@@ -258,16 +257,28 @@ def near_range(assessment: Assessment) -> tuple[float, float] | None:
     return (low, high) if low < omega < high else None
 
 
-def _traces(which: Coordinate, curve: Curve, quantity: str) -> Iterator[Trace]:
-    name = which if isinstance(which, str) and which in LABELS else ""
-    index = which if isinstance(which, int) else 0
+def _traces(
+    system: MechanicalSystem, names: Sequence[Coordinate], curves: Sequence[Curve], quantity: str
+) -> list[Trace]:
+    """Amplitude or phase of every coordinate, each in its own colour."""
     scale = MM if quantity == "amplitude" else DEGREES
-    yield from curve_traces(
-        label(which), curve, getattr(curve, quantity) * scale,
-        colour=name or case_colour(index),
-        symbol=SYMBOLS.get(name) if name else case_symbol(index),
-        bold=which == "relative", legend=quantity == "amplitude",
-    )  # fmt: skip
+    traces: list[Trace] = []
+    for which, curve in zip(names, curves, strict=True):
+        colour, symbol = coordinate_look(system, which)
+        traces += curve_traces(
+            label(which), curve, getattr(curve, quantity) * scale, colour=colour, symbol=symbol,
+            bold=which == "relative", legend=quantity == "amplitude",
+        )  # fmt: skip
+    return traces
+
+
+def coordinate_look(system: MechanicalSystem, which: Coordinate) -> tuple[str, str | None]:
+    """Colour and symbol of a coordinate: a screen's own, else those of its place among all."""
+    if isinstance(which, str) and which in LABELS:
+        return which, SYMBOLS.get(which)
+    index = list(system.coordinates).index(which) if isinstance(which, str) else which
+    # A colour that comes again has another symbol.
+    return case_colour(index), case_symbol(index + index // CASES)
 
 
 def curve_traces(
