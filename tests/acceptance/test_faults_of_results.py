@@ -8,12 +8,15 @@ from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 
 import flipflow as ff
 from flipflow.plotting.panels import Axis, Line, Note, Panel, PanelGrid, Trace
 
+mpl.use("Agg")
 API = Path(__file__).parents[2] / "docs" / "api" / "index.md"
 
 
@@ -201,6 +204,61 @@ def test_each_coordinate_of_a_user_has_a_look_of_its_own() -> None:
     long = ff.MechanicalSystem(np.eye(8), 0.1 * K, K, (), ff.HarmonicForce(np.eye(8)[0]), named)
     drawn = ff.figure(ff.linear_response(long, np.linspace(0.3, 2.0)))
     assert len({(one.colour, one.symbol) for one in drawn.panels[0].traces}) == 8
+
+
+def test_results_share_axes() -> None:
+    """Each takes one colour of the cycle for all of its parts; what explains them comes once."""
+    sheet, axes = plt.subplots()
+    for gap in (0.3, 0.5, 0.8):
+        ff.frequency_response(Hammer(gap=gap), (0.3, 2.5)).plot(ax=axes, coordinate="stretch")
+    cycle = mpl.rcParams["axes.prop_cycle"].by_key()["color"]
+    drawn = [line for line in axes.get_lines() if np.isfinite(line.get_xdata()).sum() > 2]
+    assert {line.get_color() for line in drawn} == set(cycle[:3])
+    assert {line.get_color() for line in drawn if line.get_linestyle() == "--"} == set(cycle[:3])
+    marks = [
+        line for line in axes.get_lines() if line.get_marker() != "None" and line.get_xdata().size
+    ]
+    assert {line.get_color() for line in marks} == set(cycle[:3])
+    handles, words = axes.get_legend_handles_labels()
+    assert words.count("stretch") == 3
+    others = [word for word in words if word != "stretch"]
+    assert {"unstable", "period doubling"} <= set(others)
+    assert len(others) == len(set(others))
+    colours = {one.get_color() for one, word in zip(handles, words, strict=True) if word in others}
+    assert len(colours) == 1
+    assert not colours & set(cycle)
+    assert axes.get_ylabel() == "amplitude, stretch"
+    plt.close(sheet)
+
+
+def test_curves_of_folds_share_axes() -> None:
+    """The cusp has the colour of its curve."""
+    sheet, axes = plt.subplots()
+    for _ in range(2):
+        fold_curve().plot(ax=axes)
+    assert any(point.kind == "cusp" for point in fold_curve().special_points)
+    one, two = mpl.rcParams["axes.prop_cycle"].by_key()["color"][:2]
+    seen = [line.get_color() for line in axes.get_lines() if line.get_xdata().size]
+    assert seen == [one, one, two, two]
+    assert axes.get_legend_handles_labels()[1].count("cusp") == 1
+    plt.close(sheet)
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        hammer_branch,
+        lambda: ff.linear_response(Hammer(), np.linspace(0.3, 2.0)),
+        lambda: ff.simulate(Hammer(), 1.0, 4),
+        lambda: ff.response_family(Hammer(), {"gap": [0.4, 0.5]}, omega=(0.5, 1.5)),
+        lambda: ff.sweep(Hammer(), np.linspace(1.0, 1.2, 3)),
+        lambda: ff.bifurcation_diagram(Hammer(), "omega", [1.0, 1.1]),
+    ],
+)
+def test_an_axis_names_the_coordinate_that_was_asked_for(result) -> None:
+    axes = result().plot(coordinate="tool")
+    assert "tool" in axes.get_ylabel()
+    plt.close(axes.figure)
 
 
 def _texts(part: object) -> Iterator[str]:

@@ -188,7 +188,7 @@ def test_units_and_coordinates() -> None:
     in_si = ff.figure(branch(), units="SI", coordinate="main").panels[0]
     assert in_si.x.title == "angular frequency, rad/s"
     close("scale", in_si.traces[0].x * 30.0 / math.pi, by_default.traces[0].x, rel=1e-12)
-    assert in_si.y.title == "amplitude, m"
+    assert in_si.y.title == "amplitude, main frame (x1), m"
     of_chain = ff.figure(ff.frequency_response(chain(), (0.5, 1.5))).panels[0]
     assert of_chain.x.title == "angular frequency"
     assert of_chain.y.title == "amplitude"

@@ -76,13 +76,13 @@ def branch_figure(
     points = special_point_traces(branch.special_points, names[-1])
     jumps = curves[-1].jumps()
     top = Panel(
-        axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        axis, _amplitude_axis(curves, which),
         traces=(*amplitude, *stability_key(amplitude), *points),
         lines=(*_working(omega), *_jump_lines(jumps)),
         arrows=_arrows(jumps),
     )  # fmt: skip
     bottom = Panel(
-        axis, _phase_axis(curves), traces=tuple(phase),
+        axis, _phase_axis(curves, which), traces=tuple(phase),
         lines=_working(omega, text=False),
     )  # fmt: skip
     caption = (
@@ -122,7 +122,7 @@ def _row(name: str, branch: Branch, omega: float | None) -> tuple[Panel, Panel]:
     curves = [Curve.of(branch, one) for one in names]
     axis, lines = speed_axis(branch.omega), _working(omega, text=False)
     left = Panel(
-        axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        axis, _amplitude_axis(curves),
         traces=tuple(_traces(branch.system, names, curves, "amplitude")), lines=lines,
         arrows=_arrows(curves[-1].jumps()), title=within(name, LEGEND_LETTERS),
     )  # fmt: skip
@@ -151,9 +151,9 @@ def linear_figure(response: LinearResponse, which: Coordinate | None = None) -> 
         if response.omega.min() <= w <= response.omega.max()
     )
     panels = (
-        Panel(axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        Panel(axis, _amplitude_axis(curves, which),
               traces=tuple(amplitude), lines=marks),
-        Panel(axis, _phase_axis(curves), traces=tuple(phase)),
+        Panel(axis, _phase_axis(curves, which), traces=tuple(phase)),
     )  # fmt: skip
     caption = (
         "As long as no stop is touched. Amplitude is half the peak-to-peak motion; phase is "
@@ -406,7 +406,19 @@ def _jump_lines(jumps: Sequence[Jump], *, brief: bool = False) -> tuple[Line, ..
     )
 
 
-def _phase_axis(curves: Sequence[Curve]) -> Axis:
+def quantity_label(quantity: str, which: Coordinate | None) -> str:
+    """A quantity for an axis, and the coordinate where only one is drawn."""
+    return quantity if which is None else f"{quantity}, {label(which)}"
+
+
+def _amplitude_axis(curves: Sequence[Curve], which: Coordinate | None = None) -> Axis:
+    """Amplitude in mm from 0."""
+    top = max(float(curve.amplitude.max()) for curve in curves) * MM
+    bounds = 0.0, 1.08 * top if top > 0.0 and math.isfinite(top) else 1.0
+    return Axis(quantity_label("amplitude", which), "mm", bounds)
+
+
+def _phase_axis(curves: Sequence[Curve], which: Coordinate | None = None) -> Axis:
     """Phase in degrees, ticked at quarters or halves of a turn."""
     low = min(float(curve.phase.min()) for curve in curves) * DEGREES
     high = max(float(curve.phase.max()) for curve in curves) * DEGREES
@@ -415,9 +427,4 @@ def _phase_axis(curves: Sequence[Curve]) -> Axis:
     ticks = tuple((k * step, f"{k * step:.0f}".replace("-", MINUS)) for k in range(first, last + 1))
     margin = 0.04 * (high - low)
     bounds = (min(low - margin, first * step), max(high + margin, last * step))
-    return Axis("phase", "deg", bounds, ticks)
-
-
-def _from_zero(values: Iterator[Real]) -> tuple[float, float]:
-    top = max(float(value.max()) for value in values)
-    return 0.0, 1.08 * top if top > 0.0 and math.isfinite(top) else 1.0
+    return Axis(quantity_label("phase", which), "deg", bounds, ticks)
