@@ -261,6 +261,59 @@ def test_an_axis_names_the_coordinate_that_was_asked_for(result) -> None:
     plt.close(axes.figure)
 
 
+@dataclass(frozen=True)
+class Shaken:
+    """Its field has the name that a factor has in plain systems."""
+
+    forcing: float = 0.5
+
+    def system(self) -> ff.MechanicalSystem:
+        """As matrices and springs."""
+        stop = ff.ClearanceSpring([1.0], 30.0, 1.0, clearance=1.0)
+        force = ff.HarmonicForce([self.forcing])
+        return ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], [stop], force)
+
+
+@cache
+def hammer_folds() -> ff.FieldBranch:
+    return ff.continue_fold(hammer_branch().folds[-1], "gap", (0.3, 0.8))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        hammer_folds,
+        fold_curve,  # with a cusp
+        lambda: ff.continue_orbit(hammer_branch().orbits_at(2.3)[0], "force", (0.2, 0.5)),
+        lambda: ff.continue_bifurcation(
+            hammer_branch().folds[-1], ("gap", "omega"), ((0.3, 0.8), (1.0, 3.0))
+        ),
+        lambda: ff.continue_orbit(
+            ff.frequency_response(Shaken(), (0.4, 0.8)).orbits_at(0.7)[0], "forcing", (0.3, 0.9)
+        ),
+    ],
+)
+def test_branches_over_a_field_of_a_user_are_kept(made, tmp_path) -> None:
+    """Each motion with its machine as a plain system; what was read can be written again."""
+    first = made()
+    first.save(tmp_path / "one.json")
+    again = ff.open_result(tmp_path / "one.json")
+    again.save(tmp_path / "two.json")
+    assert (tmp_path / "one.json").read_bytes() == (tmp_path / "two.json").read_bytes()
+    assert repr(again) == repr(first)
+    for one, other in zip(first.orbits, again.orbits, strict=True):
+        assert isinstance(other.machine, ff.MechanicalSystem)
+        assert other.amplitude(0) == one.amplitude(0)
+        assert other.stop_force(0).max() == one.stop_force(0).max()
+    for one, other in zip(first.special_points, again.special_points, strict=True):
+        assert other.amplitude(0) == one.amplitude(0)
+    assert ff.figure(again).panels[0].y == ff.figure(first).panels[0].y
+    name = first.field if isinstance(first, ff.FieldBranch) else "gap"
+    if name != "forcing":
+        with pytest.raises(ff.InputError, match=f"field = '{name}'.*springs.0..clearance"):
+            ff.continue_orbit(again.orbits[0], name, (0.0, 9.0))
+
+
 def _texts(part: object) -> Iterator[str]:
     """Every text of a figure that is drawn: not captions, and not what only the mouse shows."""
     if isinstance(part, str):
