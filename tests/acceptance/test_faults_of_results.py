@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
@@ -14,6 +15,7 @@ import pytest
 from matplotlib import pyplot as plt
 
 import flipflow as ff
+from flipflow.errors import IncompleteError
 from flipflow.plotting.panels import Axis, Line, Note, Panel, PanelGrid, Trace
 
 mpl.use("Agg")
@@ -312,6 +314,35 @@ def test_branches_over_a_field_of_a_user_are_kept(made, tmp_path) -> None:
     if name != "forcing":
         with pytest.raises(ff.InputError, match=f"field = '{name}'.*springs.0..clearance"):
             ff.continue_orbit(again.orbits[0], name, (0.0, 9.0))
+
+
+@cache
+def empty() -> ff.Branch:
+    """What is left of a branch whose start was not found."""
+    hard = Hammer(gap=0.01, stop=1e8)
+    branch = ff.frequency_response(hard, (0.8, 1.0), ff.HarmonicBalance(25))
+    assert (branch.omega.size, branch.status) == (0, ff.BranchStatus.NO_START)
+    return branch
+
+
+@pytest.mark.parametrize(
+    "show",
+    [
+        ff.figure,
+        ff.Branch.plot,
+        lambda branch: ff.figure([branch, branch]),
+        lambda branch: ff.figure(branch, multipliers=True),
+    ],
+)
+@pytest.mark.parametrize("met", [False, True])
+def test_a_branch_without_points_says_why_it_has_no_figure(show, met: bool) -> None:
+    """Also where it was to begin on another branch."""
+    begun = dataclasses.replace(hammer_branch().folds[0], position=-1.0)
+    branch = dataclasses.replace(empty(), special_points=(begun,) if met else ())
+    with pytest.raises(
+        IncompleteError, match=r"no points\. No periodic motion.*Start from another"
+    ):
+        show(branch)
 
 
 def _texts(part: object) -> Iterator[str]:

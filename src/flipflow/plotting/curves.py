@@ -47,6 +47,8 @@ class Curve:
         IncompleteError
             When the branch has no points.
         """
+        if branch.omega.size == 0:
+            raise IncompleteError(f"The branch has no points. {branch.status.value}")
         special = branch.special_points
         position = [*range(branch.omega.size), *(point.position for point in special)]
         order = np.argsort(position, kind="stable")

@@ -9,7 +9,7 @@ from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
-from flipflow.errors import InputError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_flag, checked_positive
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
@@ -129,7 +129,10 @@ def figure(
     ------
     InputError
         For anything else.
+    IncompleteError
+        For a branch without points, with why it has none.
     """
+    _refuse_empty(result)
     build = _builder(result, coordinate)
     if checked_flag("multipliers", multipliers):
         if not isinstance(result, (Branch, FieldBranch)):
@@ -139,6 +142,14 @@ def figure(
     return (
         drawn if width is None else drawn.narrowed(PIXELS_A_MM * checked_positive("width", width))
     )
+
+
+def _refuse_empty(result: object) -> None:
+    """Say why a branch has no points, or the first of several of which none has any."""
+    several = result if isinstance(result, (list, tuple)) else (result,)
+    kinds = (Branch, FieldBranch, BifurcationCurve)
+    if several and all(isinstance(one, kinds) and one.omega.size == 0 for one in several):
+        raise IncompleteError(f"The branch has no points. {several[0].status.value}")
 
 
 def _builder(result: object, which: Coordinate | None) -> Callable[[], Figure]:
