@@ -345,6 +345,37 @@ def test_a_branch_without_points_says_why_it_has_no_figure(show, met: bool) -> N
         show(branch)
 
 
+def test_a_fold_between_unstable_motions_is_no_jump() -> None:
+    """Nobody stands there who could jump: neither a line nor an arrow nor a mark says so."""
+    branch = hammer_branch()
+    sides = {
+        fold.omega: {str(branch.stability[int(fold.position) + k]) for k in (0, 1)}
+        for fold in branch.folds
+    }
+    unstable = [omega for omega, words in sides.items() if words == {"unstable"}]
+    assert len(unstable) == 1
+    assert len(sides) == 4
+    panel = ff.figure(branch).panels[0]
+    jumps = [line.at for line in panel.lines if "jump" in line.text]
+    assert sorted(jumps) == pytest.approx(sorted(set(sides) - set(unstable)), rel=1e-12)
+    assert sorted(arrow.x0 for arrow in panel.arrows) == sorted(jumps)
+    for drawn in (panel, ff.figure([branch]).panels[0]):
+        marks = {one.name: one.x.tolist() for one in drawn.traces if one.role == "point"}
+        assert sorted(marks["jump (fold)"]) == pytest.approx(sorted(jumps), rel=1e-12)
+        assert marks["fold, both sides unstable"] == pytest.approx(unstable, rel=1e-12)
+
+
+def test_a_curve_of_folds_between_unstable_motions_is_no_jump_speed() -> None:
+    names = []
+    for fold in hammer_branch().folds:
+        at = fold.omega
+        curve = ff.continue_bifurcation(
+            fold, ("gap", "omega"), ((0.499, 0.501), (0.99 * at, 1.01 * at))
+        )
+        names.append(ff.figure(curve).panels[0].traces[0].name)
+    assert sorted(names) == ["fold, both sides unstable", *["jump speed (fold)"] * 3]
+
+
 def _texts(part: object) -> Iterator[str]:
     """Every text of a figure that is drawn: not captions, and not what only the mouse shows."""
     if isinstance(part, str):

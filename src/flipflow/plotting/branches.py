@@ -18,12 +18,11 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import (
-    KIND_SYMBOLS,
-    KIND_WORDS,
     READING,
     coordinates,
     curve_traces,
     label,
+    mark_of,
     special_point_traces,
     speed_axis,
     stability_key,
@@ -70,7 +69,7 @@ def branches_figure(branches: Sequence[Branch], which: Coordinate | None = None)
             symbol=case_symbol(k), bold=k == 0,
         )  # fmt: skip
     traces += stability_key(traces)
-    traces += special_point_traces([p for b in branches for p in b.special_points], which)
+    traces += special_point_traces(branches, which)
     top = max(float(curve.amplitude.max()) for curve in curves) * MM
     omega = np.concatenate([curve.omega for curve in curves])
     panel = Panel(
@@ -136,14 +135,11 @@ def field_branch_figure(branch: FieldBranch, which: Coordinate | None = None) ->
 
 def _field_points(branch: FieldBranch, y: Real, scale: float, *, legend: bool) -> Iterator[Trace]:
     """Marks at special points over the field, one entry of the legend for each kind."""
-    kinds = np.array([point.kind for point in branch.special_points])
+    marks = [mark_of(branch, point) for point in branch.special_points]
     values = np.array([point.value for point in branch.special_points]) * scale
-    for kind in dict.fromkeys(kinds.tolist()):
-        at = kinds == kind
-        yield Trace(
-            KIND_WORDS.get(kind, kind), values[at], y[at], "point", "jump",
-            symbol=KIND_SYMBOLS.get(kind, "square-open"), legend=legend,
-        )  # fmt: skip
+    for word, symbol in dict.fromkeys(marks):
+        at = np.array([mark == (word, symbol) for mark in marks])
+        yield Trace(word, values[at], y[at], "point", "jump", symbol=symbol, legend=legend)
 
 
 def field_axis(name: str, values: Real) -> tuple[Axis, float]:

@@ -28,7 +28,7 @@ from flipflow.studies.response_family import Member, ResponseFamily
 HEIGHT = 180
 SPEED = "angular frequency"
 BALANCE = "third-order harmonic balance"
-READING = "Solid: stable; dashed: unstable; dotted: on the edge. Crosses: folds, where it jumps."
+READING = "Solid: stable; dashed: unstable; dotted: on the edge. Crosses: folds."
 
 
 def family_figure(

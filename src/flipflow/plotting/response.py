@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.model.system import Coordinate, MechanicalSystem
-from flipflow.plotting.curves import Curve, Jump
+from flipflow.plotting.curves import Curve, Jump, is_jump
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_ROW, legend_rows, within
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
@@ -26,6 +27,7 @@ SYMBOLS = {"main": "square", "floating": "triangle"}
 KIND_WORDS = {
     "fold": "jump (fold)", "contact begin": "contact begins", "contact end": "contact ends",
 }  # fmt: skip
+UNSTABLE_FOLD = "fold, both sides unstable"
 KIND_SYMBOLS = {
     "fold": "diamond", "contact begin": "circle-open", "contact end": "cross",
     "period doubling": "triangle", "symmetry breaking": "square", "Neimark-Sacker": "star",
@@ -73,7 +75,7 @@ def branch_figure(
     amplitude = _traces(branch.system, names, curves, "amplitude")
     phase = _traces(branch.system, names, curves, "phase")
     axis = speed_axis(branch.omega)
-    points = special_point_traces(branch.special_points, names[-1])
+    points = special_point_traces([branch], names[-1])
     jumps = curves[-1].jumps()
     top = Panel(
         axis, _amplitude_axis(curves, which),
@@ -303,19 +305,24 @@ def stability_key(traces: Sequence[Trace]) -> Iterator[Trace]:
             yield Trace(role, NOWHERE, NOWHERE, role, "gap")
 
 
-def special_point_traces(
-    special_points: Sequence[SpecialPoint], which: Coordinate
-) -> Iterator[Trace]:
-    """Marks at special points, one entry of the legend for each kind."""
-    for kind in dict.fromkeys(point.kind for point in special_points):
-        points = [point for point in special_points if point.kind == kind]
+def special_point_traces(branches: Sequence[Branch], which: Coordinate) -> Iterator[Trace]:
+    """Marks at special points of branches, one entry of the legend for each kind."""
+    called = [(mark_of(branch, one), one) for branch in branches for one in branch.special_points]
+    for word, symbol in dict.fromkeys(mark for mark, _ in called):
+        points = [point for mark, point in called if mark == (word, symbol)]
         omega = np.array([point.omega for point in points])
         yield Trace(
-            KIND_WORDS.get(kind, kind), omega * RPM,
+            word, omega * RPM,
             np.array([point.amplitude(which) for point in points]) * MM, "point", "jump",
-            symbol=KIND_SYMBOLS.get(kind, "square-open"),
-            x_also=(("Hz", omega * HZ), ("rad/s", omega)),
+            symbol=symbol, x_also=(("Hz", omega * HZ), ("rad/s", omega)),
         )  # fmt: skip
+
+
+def mark_of(branch: Branch | FieldBranch, point: SpecialPoint) -> tuple[str, str]:
+    """Word and symbol of a special point; a fold between two unstable motions is no jump."""
+    if point.kind == "fold" and not is_jump(branch, point):
+        return UNSTABLE_FOLD, "diamond-open"
+    return KIND_WORDS.get(point.kind, point.kind), KIND_SYMBOLS.get(point.kind, "square-open")
 
 
 def _cases_panel(
