@@ -376,6 +376,54 @@ def test_a_curve_of_folds_between_unstable_motions_is_no_jump_speed() -> None:
     assert sorted(names) == ["fold, both sides unstable", *["jump speed (fold)"] * 3]
 
 
+def test_branches_over_one_field_share_a_figure() -> None:
+    """Each has its own colour and one entry of the legend, and marks have one for all."""
+    other = ff.continue_fold(
+        ff.frequency_response(Rig(), (0.4, 8.0)).folds[1], "c", (0.05, 0.07)
+    )  # fmt: skip
+    drawn = ff.figure([fold_curve(), other])
+    speeds, amplitudes = drawn.panels
+    assert ff.figure(hammer_folds()).panels[1].y.label == "amplitude, body"
+    assert speeds.y.label == "angular frequency"
+    lines = [trace for trace in speeds.traces if trace.role != "point"]
+    assert len({trace.name for trace in lines}) == len({trace.colour for trace in lines}) == 2
+    assert all(trace.name.startswith("fold, ") and trace.legend for trace in lines)
+    assert [trace.name for trace in speeds.traces if trace.role == "point"] == ["cusp"]
+    assert not any(trace.legend for trace in amplitudes.traces)
+    same = ff.figure([fold_curve(), fold_curve()], width=84)
+    names = [trace.name[:8] for trace in same.panels[0].traces if trace.role != "point"]
+    assert names == ["1: fold,", "2: fold,"]
+
+    motions = [
+        ff.continue_orbit(hammer_branch().orbits_at(omega)[0], "gap", (0.4, 0.6))
+        for omega in (0.5, 2.4)
+    ]
+    panel = ff.figure(motions, coordinate="stretch").panels[0]
+    assert {trace.name for trace in panel.traces} == {"1 period, at 0.5", "1 period, at 2.4"}
+    assert panel.y.label == "amplitude, stretch"
+    with pytest.raises(ff.InputError, match="give branches over gap alone"):
+        ff.figure([*motions, fold_curve()])
+    with pytest.raises(ff.InputError, match="curves of folds and motions"):
+        ff.figure([*motions, hammer_folds()])
+    with pytest.raises(ff.InputError, match="give branches over frequency, or over one field"):
+        ff.figure([*motions, hammer_branch()])
+
+
+@pytest.mark.parametrize("made", [hammer_branch, fold_curve, lambda: ff.load_project("ffs0827")])
+def test_a_width_without_room_is_refused_with_the_least_one(made, tmp_path) -> None:
+    result = made()
+    if isinstance(result, ff.Project):
+        result = ff.operating_region(result.screen)
+    with pytest.raises(ff.InputError, match=r"width = 3\.3: give \d+ mm or more") as told:
+        ff.figure(result, width=3.3)
+    least = int(re.search(r"(\d+) mm", str(told.value))[1])
+    assert 20 <= least <= 84
+    for ending in ("png", "html"):
+        ff.figure(result, width=least).write(tmp_path / f"it.{ending}")
+    with pytest.raises(ff.InputError, match=f"give {least} mm"):
+        ff.figure(result, width=least - 0.5)
+
+
 def _texts(part: object) -> Iterator[str]:
     """Every text of a figure that is drawn: not captions, and not what only the mouse shows."""
     if isinstance(part, str):
