@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 
 import flipflow as ff
+from flipflow.errors import IncompleteError
 from flipflow.plotting.panels import Axis, Line, Note, Panel, PanelGrid, Trace
 
+mpl.use("Agg")
 API = Path(__file__).parents[2] / "docs" / "api" / "index.md"
 
 
@@ -28,6 +33,31 @@ class Rig:
         stop = ff.ClearanceSpring([1.0], 30.0, 1.0, clearance=1.0)
         force = ff.HarmonicForce([0.5])
         return ff.MechanicalSystem([[1.0]], [[self.c]], [[1.0]], [stop], force)
+
+
+@dataclass(frozen=True)
+class Hammer:
+    """A tool on a body, with a stop on one side and names of its user for what moves."""
+
+    gap: float = 0.5
+    force: float = 0.3
+    stop: float = 20.0
+    zeta: float = 0.03
+
+    def system(self) -> ff.MechanicalSystem:
+        """As matrices and springs."""
+        K = np.array([[1.5, -0.5], [-0.5, 0.5]])
+        stop = ff.ClearanceSpring([-1.0, 1.0], self.stop, 0.0, self.gap, np.inf)
+        names = {"body": [1.0, 0.0], "tool": [0.0, 1.0], "stretch": [-1.0, 1.0]}
+        return ff.MechanicalSystem(
+            np.diag([1.0, 0.4]), 2.0 * self.zeta * K, K, [stop],
+            ff.HarmonicForce([self.force, 0.0]), names,
+        )  # fmt: skip
+
+
+@cache
+def hammer_branch() -> ff.Branch:
+    return ff.frequency_response(Hammer(), (0.3, 2.5))
 
 
 @cache
@@ -155,6 +185,243 @@ def test_a_figure_of_a_command_names_its_machine_and_has_one_title(
     assert "FFS0827" in read
     (title,) = re.findall(r"<h1>(.*?)</h1>", read)
     assert read.count(title) == 1
+
+
+def test_each_coordinate_of_a_user_has_a_look_of_its_own() -> None:
+    """On a page, in a plot, and with more names than there are colours."""
+    names = ["body", "tool", "stretch"]
+    for drawn in (
+        ff.figure(hammer_branch()), ff.figure(ff.linear_response(Hammer(), np.linspace(0.3, 2.0)))
+    ):  # fmt: skip
+        for panel in drawn.panels:
+            lines = [trace for trace in panel.traces if trace.name in names]
+            assert list(dict.fromkeys(trace.name for trace in lines)) == names
+            looks = {(trace.name, trace.colour) for trace in lines}
+            assert len(looks) == len({colour for _, colour in looks}) == len(names)
+    assert {trace.role for trace in ff.figure(hammer_branch()).panels[0].traces} >= {
+        "stable", "unstable",
+    }  # fmt: skip
+    K = 2.0 * np.eye(8) - np.eye(8, k=1) - np.eye(8, k=-1)
+    named = {f"mass {k}": row for k, row in enumerate(np.eye(8))}
+    long = ff.MechanicalSystem(np.eye(8), 0.1 * K, K, (), ff.HarmonicForce(np.eye(8)[0]), named)
+    drawn = ff.figure(ff.linear_response(long, np.linspace(0.3, 2.0)))
+    assert len({(one.colour, one.symbol) for one in drawn.panels[0].traces}) == 8
+
+
+def test_results_share_axes() -> None:
+    """Each takes one colour of the cycle for all of its parts; what explains them comes once."""
+    sheet, axes = plt.subplots()
+    for gap in (0.3, 0.5, 0.8):
+        ff.frequency_response(Hammer(gap=gap), (0.3, 2.5)).plot(ax=axes, coordinate="stretch")
+    cycle = mpl.rcParams["axes.prop_cycle"].by_key()["color"]
+    drawn = [line for line in axes.get_lines() if np.isfinite(line.get_xdata()).sum() > 2]
+    assert {line.get_color() for line in drawn} == set(cycle[:3])
+    assert {line.get_color() for line in drawn if line.get_linestyle() == "--"} == set(cycle[:3])
+    marks = [
+        line for line in axes.get_lines() if line.get_marker() != "None" and line.get_xdata().size
+    ]
+    assert {line.get_color() for line in marks} == set(cycle[:3])
+    handles, words = axes.get_legend_handles_labels()
+    assert words.count("stretch") == 3
+    others = [word for word in words if word != "stretch"]
+    assert {"unstable", "period doubling"} <= set(others)
+    assert len(others) == len(set(others))
+    colours = {one.get_color() for one, word in zip(handles, words, strict=True) if word in others}
+    assert len(colours) == 1
+    assert not colours & set(cycle)
+    assert axes.get_ylabel() == "amplitude, stretch"
+    plt.close(sheet)
+
+
+def test_curves_of_folds_share_axes() -> None:
+    """The cusp has the colour of its curve."""
+    sheet, axes = plt.subplots()
+    for _ in range(2):
+        fold_curve().plot(ax=axes)
+    assert any(point.kind == "cusp" for point in fold_curve().special_points)
+    one, two = mpl.rcParams["axes.prop_cycle"].by_key()["color"][:2]
+    seen = [line.get_color() for line in axes.get_lines() if line.get_xdata().size]
+    assert seen == [one, one, two, two]
+    assert axes.get_legend_handles_labels()[1].count("cusp") == 1
+    plt.close(sheet)
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        hammer_branch,
+        lambda: ff.linear_response(Hammer(), np.linspace(0.3, 2.0)),
+        lambda: ff.simulate(Hammer(), 1.0, 4),
+        lambda: ff.response_family(Hammer(), {"gap": [0.4, 0.5]}, omega=(0.5, 1.5)),
+        lambda: ff.sweep(Hammer(), np.linspace(1.0, 1.2, 3)),
+        lambda: ff.bifurcation_diagram(Hammer(), "omega", [1.0, 1.1]),
+    ],
+)
+def test_an_axis_names_the_coordinate_that_was_asked_for(result) -> None:
+    axes = result().plot(coordinate="tool")
+    assert "tool" in axes.get_ylabel()
+    plt.close(axes.figure)
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """Its field has the name that a factor has in plain systems."""
+
+    forcing: float = 0.5
+
+    def system(self) -> ff.MechanicalSystem:
+        """As matrices and springs."""
+        stop = ff.ClearanceSpring([1.0], 30.0, 1.0, clearance=1.0)
+        force = ff.HarmonicForce([self.forcing])
+        return ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], [stop], force)
+
+
+@cache
+def hammer_folds() -> ff.FieldBranch:
+    return ff.continue_fold(hammer_branch().folds[-1], "gap", (0.3, 0.8))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        hammer_folds,
+        fold_curve,  # with a cusp
+        lambda: ff.continue_orbit(hammer_branch().orbits_at(2.3)[0], "force", (0.2, 0.5)),
+        lambda: ff.continue_bifurcation(
+            hammer_branch().folds[-1], ("gap", "omega"), ((0.3, 0.8), (1.0, 3.0))
+        ),
+        lambda: ff.continue_orbit(
+            ff.frequency_response(Shaken(), (0.4, 0.8)).orbits_at(0.7)[0], "forcing", (0.3, 0.9)
+        ),
+    ],
+)
+def test_branches_over_a_field_of_a_user_are_kept(made, tmp_path) -> None:
+    """Each motion with its machine as a plain system; what was read can be written again."""
+    first = made()
+    first.save(tmp_path / "one.json")
+    again = ff.open_result(tmp_path / "one.json")
+    again.save(tmp_path / "two.json")
+    assert (tmp_path / "one.json").read_bytes() == (tmp_path / "two.json").read_bytes()
+    assert repr(again) == repr(first)
+    for one, other in zip(first.orbits, again.orbits, strict=True):
+        assert isinstance(other.machine, ff.MechanicalSystem)
+        assert other.amplitude(0) == one.amplitude(0)
+        assert other.stop_force(0).max() == one.stop_force(0).max()
+    for one, other in zip(first.special_points, again.special_points, strict=True):
+        assert other.amplitude(0) == one.amplitude(0)
+    assert ff.figure(again).panels[0].y == ff.figure(first).panels[0].y
+    name = first.field if isinstance(first, ff.FieldBranch) else "gap"
+    if name != "forcing":
+        with pytest.raises(ff.InputError, match=f"field = '{name}'.*springs.0..clearance"):
+            ff.continue_orbit(again.orbits[0], name, (0.0, 9.0))
+
+
+@cache
+def empty() -> ff.Branch:
+    """What is left of a branch whose start was not found."""
+    hard = Hammer(gap=0.01, stop=1e8)
+    branch = ff.frequency_response(hard, (0.8, 1.0), ff.HarmonicBalance(25))
+    assert (branch.omega.size, branch.status) == (0, ff.BranchStatus.NO_START)
+    return branch
+
+
+@pytest.mark.parametrize(
+    "show",
+    [
+        ff.figure,
+        ff.Branch.plot,
+        lambda branch: ff.figure([branch, branch]),
+        lambda branch: ff.figure(branch, multipliers=True),
+    ],
+)
+@pytest.mark.parametrize("met", [False, True])
+def test_a_branch_without_points_says_why_it_has_no_figure(show, met: bool) -> None:
+    """Also where it was to begin on another branch."""
+    begun = dataclasses.replace(hammer_branch().folds[0], position=-1.0)
+    branch = dataclasses.replace(empty(), special_points=(begun,) if met else ())
+    with pytest.raises(
+        IncompleteError, match=r"no points\. No periodic motion.*Start from another"
+    ):
+        show(branch)
+
+
+def test_a_fold_between_unstable_motions_is_no_jump() -> None:
+    """Nobody stands there who could jump: neither a line nor an arrow nor a mark says so."""
+    branch = hammer_branch()
+    sides = {
+        fold.omega: {str(branch.stability[int(fold.position) + k]) for k in (0, 1)}
+        for fold in branch.folds
+    }
+    unstable = [omega for omega, words in sides.items() if words == {"unstable"}]
+    assert len(unstable) == 1
+    assert len(sides) == 4
+    panel = ff.figure(branch).panels[0]
+    jumps = [line.at for line in panel.lines if "jump" in line.text]
+    assert sorted(jumps) == pytest.approx(sorted(set(sides) - set(unstable)), rel=1e-12)
+    assert sorted(arrow.x0 for arrow in panel.arrows) == sorted(jumps)
+    for drawn in (panel, ff.figure([branch]).panels[0]):
+        marks = {one.name: one.x.tolist() for one in drawn.traces if one.role == "point"}
+        assert sorted(marks["jump (fold)"]) == pytest.approx(sorted(jumps), rel=1e-12)
+        assert marks["fold, both sides unstable"] == pytest.approx(unstable, rel=1e-12)
+
+
+def test_a_curve_of_folds_between_unstable_motions_is_no_jump_speed() -> None:
+    names = []
+    for fold in hammer_branch().folds:
+        at = fold.omega
+        curve = ff.continue_bifurcation(
+            fold, ("gap", "omega"), ((0.499, 0.501), (0.99 * at, 1.01 * at))
+        )
+        names.append(ff.figure(curve).panels[0].traces[0].name)
+    assert sorted(names) == ["fold, both sides unstable", *["jump speed (fold)"] * 3]
+
+
+def test_branches_over_one_field_share_a_figure() -> None:
+    """Each has its own colour and one entry of the legend, and marks have one for all."""
+    other = ff.continue_fold(
+        ff.frequency_response(Rig(), (0.4, 8.0)).folds[1], "c", (0.05, 0.07)
+    )  # fmt: skip
+    drawn = ff.figure([fold_curve(), other])
+    speeds, amplitudes = drawn.panels
+    assert ff.figure(hammer_folds()).panels[1].y.label == "amplitude, body"
+    assert speeds.y.label == "angular frequency"
+    lines = [trace for trace in speeds.traces if trace.role != "point"]
+    assert len({trace.name for trace in lines}) == len({trace.colour for trace in lines}) == 2
+    assert all(trace.name.startswith("fold, ") and trace.legend for trace in lines)
+    assert [trace.name for trace in speeds.traces if trace.role == "point"] == ["cusp"]
+    assert not any(trace.legend for trace in amplitudes.traces)
+    same = ff.figure([fold_curve(), fold_curve()], width=84)
+    names = [trace.name[:8] for trace in same.panels[0].traces if trace.role != "point"]
+    assert names == ["1: fold,", "2: fold,"]
+
+    motions = [
+        ff.continue_orbit(hammer_branch().orbits_at(omega)[0], "gap", (0.4, 0.6))
+        for omega in (0.5, 2.4)
+    ]
+    panel = ff.figure(motions, coordinate="stretch").panels[0]
+    assert {trace.name for trace in panel.traces} == {"1 period, at 0.5", "1 period, at 2.4"}
+    assert panel.y.label == "amplitude, stretch"
+    with pytest.raises(ff.InputError, match="give branches over gap alone"):
+        ff.figure([*motions, fold_curve()])
+    with pytest.raises(ff.InputError, match="curves of folds and motions"):
+        ff.figure([*motions, hammer_folds()])
+    with pytest.raises(ff.InputError, match="give branches over frequency, or over one field"):
+        ff.figure([*motions, hammer_branch()])
+
+
+@pytest.mark.parametrize("made", [hammer_branch, fold_curve, lambda: ff.load_project("ffs0827")])
+def test_a_width_without_room_is_refused_with_the_least_one(made, tmp_path) -> None:
+    result = made()
+    if isinstance(result, ff.Project):
+        result = ff.operating_region(result.screen)
+    with pytest.raises(ff.InputError, match=r"width = 3\.3: give \d+ mm or more") as told:
+        ff.figure(result, width=3.3)
+    least = int(re.search(r"(\d+) mm", str(told.value))[1])
+    assert 20 <= least <= 84
+    for ending in ("png", "html"):
+        ff.figure(result, width=least).write(tmp_path / f"it.{ending}")
+    with pytest.raises(ff.InputError, match=f"give {least} mm"):
+        ff.figure(result, width=least - 0.5)
 
 
 def _texts(part: object) -> Iterator[str]:

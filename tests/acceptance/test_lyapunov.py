@@ -6,6 +6,7 @@ several standard errors.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
@@ -340,6 +341,46 @@ def test_a_diagram_keeps_as_many_points_as_asked_of_what_does_not_repeat(chain):
     value, x = diagram.points(0, "down")
     assert value.shape == x.shape == (200,)
     assert np.unique(x).size == 200
+
+
+@pytest.mark.parametrize(
+    ("up", "down", "differ"),
+    [
+        (("undecided", 0), ("quasi-periodic", 0), False),
+        (("periodic", 1), ("undecided", 0), False),
+        (("periodic", 0), ("periodic", 2), False),  # settles, but not to the end
+        (("chaotic", 0), ("chaotic", 0), False),
+        (("chaotic", 0), ("quasi-periodic", 0), True),
+        (("periodic", 1), ("chaotic", 0), True),
+        (("periodic", 1), ("periodic", 2), True),
+    ],
+)
+def test_what_is_not_decided_is_no_second_motion(chain, up, down, differ):
+    """No band is shaded in its figure where nothing is known to differ."""
+    diagram = ff.bifurcation_diagram(chain, "omega", [0.3])
+
+    def way(passed, found):
+        word, periods = found
+        return dataclasses.replace(passed, words=(word,), periods=np.array([periods]))
+
+    told = dataclasses.replace(diagram, up=way(diagram.up, up), down=way(diagram.down, down))
+    assert told.differ.tolist() == [differ]
+    assert len(told.hysteresis) == len(ff.figure(told).panels[0].bands) == int(differ)
+
+
+def test_a_diagram_tells_what_its_points_belong_to(chain):
+    """Word and period stand beside each point; a pass is said in a line."""
+    diagram = ff.bifurcation_diagram(chain, "omega", [0.3, 0.612], points=50, most_turns=500)
+    frame, data = diagram.to_dataframe(), diagram.to_xarray()
+    for way, passed in (("up", diagram.up), ("down", diagram.down)):
+        rows = frame[frame["direction"] == way]
+        for value, word, periods in zip(passed.values, passed.words, passed.periods, strict=True):
+            ours = rows[rows["value"] == value]
+            assert set(ours["word"]) == {word}
+            assert set(ours["periods"]) == {periods}
+            assert len(ours) == (periods or 50)
+    assert data["word"].to_numpy().tolist() == frame["word"].tolist()
+    assert repr(diagram.up) == "Pass(2 values, 0.3 to 0.612, 1 periodic, 1 chaotic, 1 jumps)"
 
 
 def test_a_cancelled_diagram_keeps_what_is_finished(screen):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import pickle
 import re
@@ -176,9 +177,41 @@ def test_netcdf_holds_all_of_a_branch(tmp_path) -> None:
     with xr.open_dataset(tmp_path / "branch.nc", engine="scipy") as data:
         mu = data["multipliers_real"].to_numpy() + 1j * data["multipliers_imag"].to_numpy()
         close("multipliers", mu, branch().multipliers, rel=1e-15)
-        kinds = [kind.decode() for kind in data["special_kind"].to_numpy()]
+        kinds = data["special_kind"].to_numpy().tolist()
         assert kinds == [p.kind for p in branch().special_points]
         assert "omega" in data.coords
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_netcdf_keeps_words_and_truth_values(name: str, tmp_path) -> None:
+    """Opened by xarray as anybody opens it, they are what they were: words can be selected by."""
+    import xarray as xr  # noqa: PLC0415
+
+    result = made(name)
+    result.save(tmp_path / "it.nc")
+    kept = result.to_xarray()
+    with xr.open_dataset(tmp_path / "it.nc") as data:
+        for key, variable in data.variables.items():
+            assert variable.dtype.kind in "fibO", (key, variable)
+            if key in kept.variables and kept[key].dtype.kind in "bU":
+                assert variable.dtype.kind == {"b": "b", "U": "O"}[kept[key].dtype.kind]
+                assert variable.to_numpy().tolist() == kept[key].to_numpy().tolist()
+        if "coordinate" in kept.coords:
+            for one in kept["coordinate"].to_numpy().tolist():
+                assert data.sel(coordinate=one).coordinate == one
+
+
+def test_netcdf_of_names_in_any_script(tmp_path) -> None:
+    import xarray as xr  # noqa: PLC0415
+
+    names = {"Stößel": [1.0, 0.0], "\N{GREEK CAPITAL LETTER DELTA}": [-1.0, 1.0]}
+    named = dataclasses.replace(chain(), coordinates=names)
+    found = ff.linear_response(named, np.linspace(0.5, 2.0, 5))
+    found.save(tmp_path / "it.nc")
+    with xr.open_dataset(tmp_path / "it.nc") as data:
+        for name in names:
+            seen = data.amplitude.sel(coordinate=name).to_numpy()
+            close(name, seen, found.amplitude(name), rel=1e-15)
 
 
 def test_units_and_coordinates() -> None:
@@ -188,7 +221,7 @@ def test_units_and_coordinates() -> None:
     in_si = ff.figure(branch(), units="SI", coordinate="main").panels[0]
     assert in_si.x.title == "angular frequency, rad/s"
     close("scale", in_si.traces[0].x * 30.0 / math.pi, by_default.traces[0].x, rel=1e-12)
-    assert in_si.y.title == "amplitude, m"
+    assert in_si.y.title == "amplitude, main frame (x1), m"
     of_chain = ff.figure(ff.frequency_response(chain(), (0.5, 1.5))).panels[0]
     assert of_chain.x.title == "angular frequency"
     assert of_chain.y.title == "amplitude"

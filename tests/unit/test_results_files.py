@@ -88,7 +88,7 @@ def test_load_cases_with_foreign_letters_are_written(tmp_path):
     changed = dataclasses.replace(project, load_cases=(case,), speed=None)
     write_response(ff.assess(changed, omega=(75.0, 90.0)), tmp_path)
     with xarray.open_dataset(tmp_path / "response.nc") as table:
-        assert {one.decode() for one in table["case"].to_numpy()} == {name}
+        assert set(table["case"].to_numpy()) == {name}
         assert table.sizes["special"] == table["special_case"].size > 0
     assert name in (tmp_path / "response.csv").read_text(encoding="utf-8")
 

@@ -109,7 +109,7 @@ def linear_response(machine: Machine, omega: ArrayLike) -> LinearResponse:
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         Frequencies in rad/s, (n,) or one.
 

@@ -9,7 +9,7 @@ from functools import singledispatch
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
@@ -390,21 +390,29 @@ def _(found: LyapunovExponents) -> Arrays:
 def _(diagram: BifurcationDiagram) -> Arrays:
     system, n = diagram.system, diagram.system.size
     unit = units_of(diagram.machine)["length"]
-    values, ways, states = [], [], [np.zeros((0, 2 * n))]
-    for way in PASSES:
-        passed = getattr(diagram, way)
-        for value, points in zip(passed.values, passed.states, strict=True):
-            values += [float(value)] * points.shape[0]
-            ways += [way] * points.shape[0]
-            states.append(points)
-    x = np.concatenate(states)[:, :n]
+    passes = [getattr(diagram, way) for way in PASSES]
+    states = [points for passed in passes for points in passed.states]
+    counts = [points.shape[0] for points in states]
+    x = np.concatenate([np.zeros((0, 2 * n)), *states])[:, :n]
+
+    def of_each(rows: Sequence[ArrayLike]) -> NDArray[Any]:
+        """What is said of the motions of both passes, for each of their points."""
+        return np.repeat(np.concatenate(rows), counts)
+
     return Arrays(
         f"Bifurcation diagram over {diagram.parameter}",
         "sample",
         {"coordinate": labels(system.named)},
         {
-            "value": column("sample", np.array(values, float)),
-            "direction": column("sample", np.array(ways, str)),
+            "value": column("sample", of_each([passed.values for passed in passes])),
+            "direction": column(
+                "sample",
+                of_each(
+                    [np.full(one.values.size, way) for way, one in zip(PASSES, passes, strict=True)]
+                ),
+            ),
+            "word": column("sample", of_each([np.array(one.words, str) for one in passes])),
+            "periods": column("sample", of_each([passed.periods for passed in passes])),
             "displacement": each("sample", system, lambda c: x @ system.coordinate(c), unit),
         },
         attributes(diagram, parameter=diagram.parameter),

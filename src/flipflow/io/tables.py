@@ -134,12 +134,22 @@ def netcdf_bytes(arrays: Arrays) -> bytes:
             variable = file.createVariable(name, values.dtype, dims)
             if values.size:
                 variable.data[...] = values
-            if one.units:
-                variable.units = one.units.encode()
-            if name not in arrays.coordinates and coordinates:
-                variable.coordinates = coordinates.encode()
+            beside = "" if name in arrays.coordinates else coordinates
+            for word, said in _told(one, beside).items():
+                setattr(variable, word, said.encode())
         file.flush()
         return content.getvalue()
+
+
+def _told(one: Variable, coordinates: str) -> dict[str, str]:
+    """Attributes of a variable of NetCDF: its unit, the coordinates beside it, what it stands for.
+
+    The classic format has neither text nor truth values; these are xarray's words for them.
+    """
+    kinds = {"U": ("_Encoding", "utf-8"), "b": ("dtype", "bool")}
+    known = [kinds[one.data.dtype.kind]] if one.data.dtype.kind in kinds else []
+    told = {"units": one.units, "coordinates": coordinates, **dict(known)}
+    return {word: said for word, said in told.items() if said}
 
 
 def _real_parts(name: str, one: Variable) -> Iterator[tuple[str, Variable]]:

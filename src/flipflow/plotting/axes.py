@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flipflow.errors import InputError, MissingExtra
 from flipflow.model.system import Coordinate
 from flipflow.plotting.dispatch import figure
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DASHES = {"unstable": "--", "undetermined": ":"}
+NEUTRAL = "0.35"  # of entries of the legend that belong to no line
+OF_A_LINE = "jump"  # the colour that marks upon a line have on a page
 
 
 def draw_on(
@@ -57,21 +61,44 @@ def _draw(axes: Axes, panel: Panel) -> None:
 
 
 def _draw_trace(axes: Axes, trace: Trace, colours: dict[str, Any]) -> None:
-    """One trace; parts of one line, such as its unstable stretches, have one colour and entry."""
+    """One trace; parts of one line, such as its unstable stretches, have one colour and entry.
+
+    Marks upon a line have its colour, and one entry for all lines of the Axes: only lines take
+    colours of the cycle.
+    """
     name = trace.name if trace.legend else "_nolegend_"
     if trace.lower is not None:
         axes.fill_between(trace.x, trace.lower, trace.y, alpha=0.2, lw=0.0, label=name)
         return
-    style: dict[str, Any] = {"label": name}
-    if trace.role == "point":
-        hollow = (trace.symbol or "").endswith("-open")
-        mark = MARKERS.get(trace.symbol or "circle", "o")
-        style |= {"ls": "none", "marker": mark} | ({"mfc": "none"} if hollow else {})
-        if trace.x.size > MARKS:
-            style |= {"ms": mark_size(trace.x.size), "mew": 0.0, "marker": "o"}
-    else:
-        style["ls"] = DASHES.get(trace.role, "-")
-    if trace.colour in colours:
+    style = _style(trace)
+    marks = trace.role == "point" and trace.colour == OF_A_LINE
+    explains = not np.isfinite(trace.x).any()
+    if marks or explains:
+        if trace.legend and not _explained(axes, trace.name):
+            axes.plot([], [], label=trace.name, **style, color=NEUTRAL)
+        name = "_nolegend_"
+    if explains:
+        return
+    if marks:
+        style["color"] = next(reversed(colours.values()), NEUTRAL)
+    elif trace.colour in colours:
         style["color"] = colours[trace.colour]
-    (drawn,) = axes.plot(trace.x, trace.y, **style)
-    colours.setdefault(trace.colour, drawn.get_color())
+    (drawn,) = axes.plot(trace.x, trace.y, label=name, **style)
+    if not marks:
+        colours.setdefault(trace.colour, drawn.get_color())
+
+
+def _explained(axes: Axes, name: str) -> bool:
+    """Whether the legend has such an entry already, of a result that was drawn before."""
+    return any(line.get_label() == name and line.get_color() == NEUTRAL for line in axes.lines)
+
+
+def _style(trace: Trace) -> dict[str, Any]:
+    """How matplotlib draws a trace, but for its colour."""
+    if trace.role != "point":
+        return {"ls": DASHES.get(trace.role, "-")}
+    if trace.x.size > MARKS:
+        return {"ls": "none", "marker": "o", "ms": mark_size(trace.x.size), "mew": 0.0}
+    hollow = (trace.symbol or "").endswith("-open")
+    mark = MARKERS.get(trace.symbol or "circle", "o")
+    return {"ls": "none", "marker": mark} | ({"mfc": "none"} if hollow else {})

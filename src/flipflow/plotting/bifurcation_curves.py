@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.errors import InputError
 from flipflow.plotting.branches import field_axis
+from flipflow.plotting.curves import stable_beside
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Panel, Trace
-from flipflow.plotting.response import KIND_SYMBOLS, KIND_WORDS
+from flipflow.plotting.response import KIND_SYMBOLS, KIND_WORDS, UNSTABLE_FOLD
 from flipflow.plotting.scales import RPM
 
 Real = NDArray[np.float64]
@@ -42,7 +43,7 @@ def curves_figure(*curves: BifurcationCurve) -> Figure:
     )
     traces, named = [], set[str]()
     for k, curve in enumerate(curves):
-        name = WORDS.get(curve.kind, curve.kind)
+        name = _name_of(curve)
         traces.append(
             Trace(
                 name, curve.values[:, 0] * x_scale, curve.values[:, 1] * y_scale, "stable",
@@ -64,6 +65,13 @@ def curves_figure(*curves: BifurcationCurve) -> Figure:
     )
     title = f"{' against '.join(name.replace('_', ' ') for name in names)}"
     return Figure(title, caption, (Panel(x_axis, y_axis, traces=tuple(traces)),), height=430)
+
+
+def _name_of(curve: BifurcationCurve) -> str:
+    """What the legend calls a curve; folds between unstable motions alone are no jumps."""
+    if curve.kind == "fold" and all(stable_beside(orbit) is False for orbit in curve.orbits):
+        return UNSTABLE_FOLD
+    return WORDS.get(curve.kind, curve.kind)
 
 
 def _axis(name: str, values: Real) -> tuple[Axis, float]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,11 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import (
-    KIND_SYMBOLS,
-    KIND_WORDS,
     READING,
     coordinates,
     curve_traces,
     label,
+    mark_of,
     special_point_traces,
     speed_axis,
     stability_key,
@@ -32,6 +32,7 @@ from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.units import speed_of
 
 Real = NDArray[np.float64]
+Read = Callable[[FieldBranch], tuple[Real, Real]]
 
 
 def branches_figure(branches: Sequence[Branch], which: Coordinate | None = None) -> Figure:
@@ -59,7 +60,7 @@ def branches_figure(branches: Sequence[Branch], which: Coordinate | None = None)
     """
     if not branches or not all(isinstance(branch, Branch) for branch in branches):
         kinds = [type(branch).__name__ for branch in branches]
-        raise InputError("result", kinds, "give a list of branches over frequency")
+        raise InputError("result", kinds, "give branches over frequency, or over one field")
     which = coordinates(branches[0].system, which)[-1]
     branches = [branch for branch in branches if branch.omega.size] or branches[:1]
     curves = [Curve.of(branch, which) for branch in branches]
@@ -70,7 +71,7 @@ def branches_figure(branches: Sequence[Branch], which: Coordinate | None = None)
             symbol=case_symbol(k), bold=k == 0,
         )  # fmt: skip
     traces += stability_key(traces)
-    traces += special_point_traces([p for b in branches for p in b.special_points], which)
+    traces += special_point_traces(branches, which)
     top = max(float(curve.amplitude.max()) for curve in curves) * MM
     omega = np.concatenate([curve.omega for curve in curves])
     panel = Panel(
@@ -100,33 +101,51 @@ def branch_name(branch: Branch) -> str:
 
 def field_branch_figure(branch: FieldBranch, which: Coordinate | None = None) -> Figure:
     """Amplitude over a field; of a curve of folds first the frequency, then the amplitude."""
-    if not branch.orbits:
-        raise InputError("result", "a branch without points", branch.status.value)
-    words = branch.field.replace("_", " ")
-    axis, scale = field_axis(branch.field, branch.values)
-    system = branch.machine.system()
-    named = which is None and "relative" in system.coordinates
-    (which,) = coordinates(system, which or ("relative" if named else 0))
-    of_folds = bool(np.ptp(branch.omega) > 0.0)
-    height = np.array([point.amplitude(which) for point in branch.special_points]) * MM
-    amplitude = branch.amplitude(which) * MM
-    title = f"amplitude, {label(which)}"
-    bounds = None if of_folds else (0.0, 1.08 * float(amplitude.max()))
-    drawn = [(Axis(title, "mm", bounds), amplitude, height)]
+    return field_branches_figure([branch], which)
+
+
+def field_branches_figure(
+    branches: Sequence[FieldBranch], which: Coordinate | None = None
+) -> Figure:
+    """Several branches over one field of a machine, or several curves of folds.
+
+    Parameters
+    ----------
+    branches
+        At least one that has points. Each has its own colour and entry of the legend.
+    which
+        The coordinate; None: the relative motion of a screen, or the first one there is.
+
+    Raises
+    ------
+    InputError
+        For branches over different fields, and for curves of folds among motions.
+    """
+    branches = [branch for branch in branches if branch.orbits] or branches
+    field, of_folds = _what_is_drawn(branches)
+    words = field.replace("_", " ")
+    axis, scale = field_axis(field, np.concatenate([branch.values for branch in branches]))
+    system = branches[0].machine.system()
+    if which is None:
+        which = "relative" if "relative" in system.coordinates else system.named[0]
+    (which,) = coordinates(system, which)
+    top = max(float(branch.amplitude(which).max()) for branch in branches) * MM
+    bounds = None if of_folds else (0.0, 1.08 * top)
+    rows: list[tuple[Axis, Read]] = [
+        (Axis(f"amplitude, {label(which)}", "mm", bounds), partial(_amplitudes, which))
+    ]
     if of_folds:
-        speed = np.array([point.omega for point in branch.special_points]) * RPM
-        drawn.insert(0, (Axis("shaft speed", "rpm"), branch.omega * RPM, speed))
-    name = "fold" if of_folds else label(which)
+        rows.insert(0, (Axis("shaft speed", "rpm"), _speeds))
+    names = _names_over_a_field(branches, "fold" if of_folds else label(which), of_folds)
     panels = []
-    for k, (upwards, y, at_points) in enumerate(drawn):
-        curve = Curve(branch.values, y, y, branch.stability)
-        # On a curve of folds every motion is on the edge.
-        runs = [("motion", slice(None))] if of_folds else list(curve.runs())
+    for k, (upwards, read) in enumerate(rows):
+        drawn = [(branch, *read(branch)) for branch in branches]
         traces = [
-            Trace(name, branch.values[run] * scale, y[run], role, bold=True, legend=k == 0)  # type: ignore[arg-type]
-            for role, run in runs
+            trace
+            for j, (branch, y, _) in enumerate(drawn)
+            for trace in _field_traces(branch, y, scale, names[j], j, of_folds, legend=k == 0)
         ]
-        marks = _field_points(branch, at_points, scale, legend=k == 0)
+        marks = _field_points([(branch, at) for branch, _, at in drawn], scale, legend=k == 0)
         panels.append(Panel(axis, upwards, (*traces, *stability_key(traces), *marks)))
     caption = f"Half the peak-to-peak motion as {words} is changed."
     if of_folds:
@@ -134,16 +153,75 @@ def field_branch_figure(branch: FieldBranch, which: Coordinate | None = None) ->
     return Figure(f"{'Folds' if of_folds else 'Motions'} over {words}", caption, tuple(panels))
 
 
-def _field_points(branch: FieldBranch, y: Real, scale: float, *, legend: bool) -> Iterator[Trace]:
-    """Marks at special points over the field, one entry of the legend for each kind."""
-    kinds = np.array([point.kind for point in branch.special_points])
-    values = np.array([point.value for point in branch.special_points]) * scale
-    for kind in dict.fromkeys(kinds.tolist()):
-        at = kinds == kind
+def _what_is_drawn(branches: Sequence[FieldBranch]) -> tuple[str, bool]:
+    """The field of all branches, and whether they are curves of folds."""
+    fields = list(dict.fromkeys(branch.field for branch in branches))
+    if len(fields) > 1:
+        raise InputError("result", fields, f"give branches over {fields[0]} alone")
+    of_folds = {bool(np.ptp(branch.omega) > 0.0) for branch in branches}
+    if len(of_folds) > 1:
+        remedy = "draw curves of folds and motions at one frequency in figures of their own"
+        raise InputError("result", [repr(branch) for branch in branches], remedy)
+    return fields[0], of_folds.pop()
+
+
+def _amplitudes(which: Coordinate, branch: FieldBranch) -> tuple[Real, Real]:
+    """Amplitudes in mm along a branch, and at its special points."""
+    marked = np.array([point.amplitude(which) for point in branch.special_points])
+    return branch.amplitude(which) * MM, marked * MM
+
+
+def _speeds(branch: FieldBranch) -> tuple[Real, Real]:
+    """Speeds in rpm along a branch, and at its special points."""
+    return branch.omega * RPM, np.array([point.omega for point in branch.special_points]) * RPM
+
+
+def _names_over_a_field(
+    branches: Sequence[FieldBranch], alone: str, of_folds: bool
+) -> Sequence[str]:
+    """What the legend calls each branch: speeds of folds, periods of motions and their speed."""
+    if len(branches) == 1:
+        return [alone]
+    names = []
+    for branch in branches:
+        low, high = (speed_of(branch, end) for end in (branch.omega.min(), branch.omega.max()))
+        periods = branch.orbits[0].periods
+        turns = "1 period" if periods == 1 else f"{periods} periods"
+        names.append(
+            f"fold, {low.removesuffix(' rpm')} to {high}" if of_folds else f"{turns}, at {low}"
+        )
+    if len(set(names)) < len(names):
+        return [f"{k}: {name}" for k, name in enumerate(names, start=1)]
+    return names
+
+
+def _field_traces(
+    branch: FieldBranch, y: Real, scale: float, name: str, index: int, of_folds: bool, *,
+    legend: bool,
+) -> Iterator[Trace]:  # fmt: skip
+    """The line of one branch; on a curve of folds every motion is on the edge."""
+    runs = Curve(branch.values, y, y, branch.stability).runs()
+    for role, run in [("motion", slice(None))] if of_folds else runs:
         yield Trace(
-            KIND_WORDS.get(kind, kind), values[at], y[at], "point", "jump",
-            symbol=KIND_SYMBOLS.get(kind, "square-open"), legend=legend,
+            name, branch.values[run] * scale, y[run], role, case_colour(index),  # type: ignore[arg-type]
+            symbol=case_symbol(index) if role in ("motion", "stable") else None, bold=index == 0,
+            legend=legend,
         )  # fmt: skip
+        legend = False
+
+
+def _field_points(
+    drawn: Sequence[tuple[FieldBranch, Real]], scale: float, *, legend: bool
+) -> Iterator[Trace]:
+    """Marks at special points over the field, one entry of the legend for each kind."""
+    marks = [
+        (mark_of(branch, point), point.value * scale, float(y))
+        for branch, at in drawn
+        for point, y in zip(branch.special_points, at, strict=True)
+    ]
+    for word, symbol in dict.fromkeys(mark for mark, _, _ in marks):
+        x, y = np.array([(x, y) for mark, x, y in marks if mark == (word, symbol)]).T
+        yield Trace(word, x, y, "point", "jump", symbol=symbol, legend=legend)
 
 
 def field_axis(name: str, values: Real) -> tuple[Axis, float]:

@@ -9,12 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.continuation.branch import Branch
+from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.field_branch import FieldBranch
 from flipflow.errors import IncompleteError
 from flipflow.model.system import Coordinate
+from flipflow.periodic.orbit import Orbit
 
 Real = NDArray[np.float64]
+OF_FOLD = 0.05  # from 1 the multiplier of a fold, that of a truncated series, too
+AT_ONE = 1e-3  # several multipliers stand at 1 in some folds, the square root of rounding apart
 
 
 @dataclass(frozen=True)
@@ -29,12 +33,16 @@ class Jump:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One coordinate along a branch, special points included: (n,) each, in branch order."""
+    """One coordinate along a branch, special points included: (n,) each, in branch order.
+
+    At the folds ``unstable_folds``, omega in rad/s, no machine stands that could jump there.
+    """
 
     omega: Real
     amplitude: Real
     phase: Real
     stability: NDArray[np.str_]
+    unstable_folds: frozenset[float] = frozenset()
 
     @classmethod
     def of(cls, branch: Branch, which: Coordinate) -> Curve:
@@ -47,6 +55,8 @@ class Curve:
         IncompleteError
             When the branch has no points.
         """
+        if branch.omega.size == 0:
+            raise IncompleteError(f"The branch has no points. {branch.status.value}")
         special = branch.special_points
         position = [*range(branch.omega.size), *(point.position for point in special)]
         order = np.argsort(position, kind="stable")
@@ -64,6 +74,7 @@ class Curve:
             amplitude[order],
             np.unwrap(phase[order]),
             np.append(branch.stability, following)[order],
+            frozenset(fold.omega for fold in branch.folds if not is_jump(branch, fold)),
         )
 
     def runs(self) -> Iterator[tuple[str, slice]]:
@@ -85,9 +96,40 @@ class Curve:
         rising = _jumps(self.omega, self.amplitude)
         falling = _jumps(-self.omega[::-1], self.amplitude[::-1])
         return (
-            *(Jump(omega, start, end, rising_speed=True) for omega, start, end in rising),
-            *(Jump(-omega, start, end, rising_speed=False) for omega, start, end in falling),
+            *(
+                Jump(omega, start, end, rising_speed=True)
+                for omega, start, end in rising
+                if omega not in self.unstable_folds
+            ),
+            *(
+                Jump(-omega, start, end, rising_speed=False)
+                for omega, start, end in falling
+                if -omega not in self.unstable_folds
+            ),
         )
+
+
+def is_jump(branch: Branch | FieldBranch, fold: SpecialPoint) -> bool:
+    """Whether a motion that meets its end in a fold is stable, so that a machine jumps there."""
+    told = stable_beside(fold.orbit)
+    if told is not None:
+        return told
+    # At a corner of the branch no multiplier stands at 1: its neighbours tell.
+    last = branch.stability.size - 1
+    sides = int(np.ceil(fold.position)) - 1, int(np.floor(fold.position)) + 1
+    return any(branch.stability[min(max(side, 0), last)] != "unstable" for side in sides)
+
+
+def stable_beside(orbit: Orbit) -> bool | None:
+    """Whether a fold at this motion has a stable side; None where its multipliers do not tell.
+
+    The one that stands at 1 tells both sides apart; of the others none must grow.
+    """
+    away = np.abs(orbit.multipliers - 1.0)
+    if not away.min() < OF_FOLD:
+        return None
+    others = np.delete(orbit.multipliers, int(np.argmin(away)))
+    return not bool((np.abs(others) > 1.0 + AT_ONE).any())
 
 
 def _next(position: float, branch: Branch) -> int:

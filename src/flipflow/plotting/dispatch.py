@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -9,7 +10,7 @@ from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
-from flipflow.errors import InputError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_flag, checked_positive
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
@@ -17,7 +18,7 @@ from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
 from flipflow.plotting.bifurcation import bifurcation_figure
 from flipflow.plotting.bifurcation_curves import curves_figure
-from flipflow.plotting.branches import branches_figure, field_branch_figure
+from flipflow.plotting.branches import branches_figure, field_branch_figure, field_branches_figure
 from flipflow.plotting.compare import comparison_figure
 from flipflow.plotting.design import proposal_figure
 from flipflow.plotting.design_map import design_map_figure
@@ -26,7 +27,7 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.foundation_bars import foundation_figure
 from flipflow.plotting.history import history_figure
 from flipflow.plotting.jump_risk import jump_risk_figure
-from flipflow.plotting.layout import PIXELS_A_MM
+from flipflow.plotting.layout import PIXELS_A_MM, least_width
 from flipflow.plotting.loading import loading_figure
 from flipflow.plotting.lyapunov import lyapunov_figure
 from flipflow.plotting.motion import orbit_figure, orbits_in_time_figure
@@ -107,7 +108,8 @@ def figure(
     ----------
     result
         What an analysis returns: a branch, an orbit, a sweep, an assessment, ...; a list of
-        branches or of bifurcation curves, or the motions of ``periodic_orbits``.
+        branches over frequency, of branches over one field, or of bifurcation curves, or the
+        motions of ``periodic_orbits``.
     coordinate
         What is drawn of the motion, a name or an index; None: what matters most, or all.
     units
@@ -128,17 +130,31 @@ def figure(
     Raises
     ------
     InputError
-        For anything else.
+        For anything else, and for a width without room for panels.
+    IncompleteError
+        For a branch without points, with why it has none.
     """
+    _refuse_empty(result)
     build = _builder(result, coordinate)
     if checked_flag("multipliers", multipliers):
         if not isinstance(result, (Branch, FieldBranch)):
             raise InputError("multipliers", True, "give a branch: only its points have them")
         build = partial(multipliers_figure, result)
     drawn = in_units(build(), units_for(result, units))
-    return (
-        drawn if width is None else drawn.narrowed(PIXELS_A_MM * checked_positive("width", width))
-    )
+    if width is None:
+        return drawn
+    least = math.ceil(least_width(drawn) / PIXELS_A_MM)
+    if checked_positive("width", width) < least:
+        raise InputError("width", width, f"give {least} mm or more")
+    return drawn.narrowed(PIXELS_A_MM * width)
+
+
+def _refuse_empty(result: object) -> None:
+    """Say why a branch has no points, or the first of several of which none has any."""
+    several = result if isinstance(result, (list, tuple)) else (result,)
+    kinds = (Branch, FieldBranch, BifurcationCurve)
+    if several and all(isinstance(one, kinds) and one.omega.size == 0 for one in several):
+        raise IncompleteError(f"The branch has no points. {several[0].status.value}")
 
 
 def _builder(result: object, which: Coordinate | None) -> Callable[[], Figure]:
@@ -166,4 +182,6 @@ def _of_several(result: Sequence[object], which: Coordinate | None) -> Figure:
         return orbits_in_time_figure(result, which)  # type: ignore[arg-type]
     if result and all(isinstance(one, BifurcationCurve) for one in result):
         return curves_figure(*result)  # type: ignore[arg-type]
+    if result and all(isinstance(one, FieldBranch) for one in result):
+        return field_branches_figure(result, which)  # type: ignore[arg-type]
     return branches_figure(result, which)  # type: ignore[arg-type]

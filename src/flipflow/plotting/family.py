@@ -14,14 +14,21 @@ from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
-from flipflow.plotting.response import NOWHERE, coordinates, curve_traces, label, stability_key
+from flipflow.plotting.response import (
+    NOWHERE,
+    coordinates,
+    curve_traces,
+    label,
+    quantity_label,
+    stability_key,
+)
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
 
 HEIGHT = 180
 SPEED = "angular frequency"
 BALANCE = "third-order harmonic balance"
-READING = "Solid: stable; dashed: unstable; dotted: on the edge. Crosses: folds, where it jumps."
+READING = "Solid: stable; dashed: unstable; dotted: on the edge. Crosses: folds."
 
 
 def family_figure(
@@ -53,7 +60,9 @@ def family_figure(
     symbol = FIELD[family.field].symbol if family.field in FIELD else family.field
     words = list(labels) or [_value(family.field, member.value) for member in family.members]
     panels = tuple(
-        _panel(name, family.members, words, beneath, first=k == 0)
+        _panel(
+            name, family.members, words, beneath, quantity_label("amplitude", which), first=k == 0
+        )
         for k, name in enumerate(coordinates(family.machine.system(), which))
     )
     under = f" Wide and pale beneath: {BALANCE}." if beneath is not None else ""
@@ -148,6 +157,7 @@ def _panel(
     members: Sequence[Member],
     labels: Sequence[str],
     beneath: ResponseFamily | None,
+    height: str,
     *,
     first: bool,
 ) -> Panel:
@@ -163,7 +173,7 @@ def _panel(
             traces.append(Trace("fold", NOWHERE, NOWHERE, "point", "gap", "cross"))
     return Panel(
         speed_axis_in_radians(0.0, max(float(one.branch.omega.max()) for one in members)),
-        Axis("amplitude", "mm", (0.0, 1.06 * top)), tuple(traces), title=label(which),
+        Axis(height, "mm", (0.0, 1.06 * top)), tuple(traces), title=label(which),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Panel, Trace
-from flipflow.plotting.response import LABELS, coordinates, label
+from flipflow.plotting.response import LABELS, coordinates, label, quantity_label
 from flipflow.plotting.scales import KN, MM
 from flipflow.plotting.units import speed_of
 from flipflow.transient.history import History
@@ -42,7 +42,7 @@ def history_figure(history: History, which: Coordinate | None = None) -> Figure:
         known = isinstance(name, str) and name in LABELS
         colour = str(name) if known else case_colour(k)
         moving.append((label(name), colour, history.displacement(name) * MM))
-    rows = [("displacement", "mm", moving)]
+    rows = [(quantity_label("displacement", which), "mm", moving)]
     if history.force.shape[1]:
         forces = [
             (f"stop {j + 1}", case_colour(j), history.stop_force(j) * KN)
@@ -71,7 +71,7 @@ def _row(
     whole, close = [], []
     for word, colour, values in curves:
         times, low, high = envelope(t, values, turns)
-        legend = name == "displacement"
+        legend = name.startswith("displacement")
         whole.append(Trace(word, times, high, colour=colour, legend=legend))
         whole.append(Trace(word, times, low, colour=colour, legend=False))
         close.append(Trace(word, t[last], values[last], colour=colour, legend=False))

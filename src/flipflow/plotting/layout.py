@@ -17,6 +17,7 @@ FONT = 32.0 / 3.0  # 8 point
 CHARACTER = 6.3
 LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
 BOTTOM, LEFT, RIGHT = 40, 58, 14
+NARROWEST = 60  # pixels of a panel
 BARE_GAP, ROW_GAP = 26, 48
 LEGEND_MARK = 42
 LARGEST, SMALLEST, MARKS = 5.0, 0.8, 30  # marks in points; up to how many they are large
@@ -83,6 +84,11 @@ def beside_panels(figure: PanelGrid, *, even: bool = True) -> float:
     legend = LEGEND_ROW * legend_rows(figure, even=even)
     heads = sum(_head(row, spans) for row in rows)
     return legend + heads + BOTTOM + ROW_GAP * (len(rows) - 1)
+
+
+def least_width(figure: PanelGrid) -> float:
+    """Width in pixels that panels below each other need beside what is written at their axes."""
+    return max(map(_left, figure.panels)) + NARROWEST + RIGHT
 
 
 def mark_size(count: int) -> float:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
 from flipflow.model.system import Coordinate, MechanicalSystem
-from flipflow.plotting.curves import Curve, Jump
+from flipflow.plotting.curves import Curve, Jump, is_jump
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_ROW, legend_rows, within
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
@@ -26,6 +27,7 @@ SYMBOLS = {"main": "square", "floating": "triangle"}
 KIND_WORDS = {
     "fold": "jump (fold)", "contact begin": "contact begins", "contact end": "contact ends",
 }  # fmt: skip
+UNSTABLE_FOLD = "fold, both sides unstable"
 KIND_SYMBOLS = {
     "fold": "diamond", "contact begin": "circle-open", "contact end": "cross",
     "period doubling": "triangle", "symmetry breaking": "square", "Neimark-Sacker": "star",
@@ -70,19 +72,19 @@ def branch_figure(
     """
     names = coordinates(branch.system, which)
     curves = [Curve.of(branch, name) for name in names]
-    amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
-    phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
+    amplitude = _traces(branch.system, names, curves, "amplitude")
+    phase = _traces(branch.system, names, curves, "phase")
     axis = speed_axis(branch.omega)
-    points = special_point_traces(branch.special_points, names[-1])
+    points = special_point_traces([branch], names[-1])
     jumps = curves[-1].jumps()
     top = Panel(
-        axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        axis, _amplitude_axis(curves, which),
         traces=(*amplitude, *stability_key(amplitude), *points),
         lines=(*_working(omega), *_jump_lines(jumps)),
         arrows=_arrows(jumps),
     )  # fmt: skip
     bottom = Panel(
-        axis, _phase_axis(curves), traces=tuple(phase),
+        axis, _phase_axis(curves, which), traces=tuple(phase),
         lines=_working(omega, text=False),
     )  # fmt: skip
     caption = (
@@ -120,14 +122,13 @@ def _row(name: str, branch: Branch, omega: float | None) -> tuple[Panel, Panel]:
     """Amplitude and phase of one load case side by side, without marks at special points."""
     names = coordinates(branch.system)
     curves = [Curve.of(branch, one) for one in names]
-    pairs = list(zip(names, curves, strict=True))
     axis, lines = speed_axis(branch.omega), _working(omega, text=False)
     left = Panel(
-        axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
-        traces=tuple(t for n, c in pairs for t in _traces(n, c, "amplitude")), lines=lines,
+        axis, _amplitude_axis(curves),
+        traces=tuple(_traces(branch.system, names, curves, "amplitude")), lines=lines,
         arrows=_arrows(curves[-1].jumps()), title=within(name, LEGEND_LETTERS),
     )  # fmt: skip
-    phase = tuple(t for n, c in pairs for t in _traces(n, c, "phase"))
+    phase = tuple(_traces(branch.system, names, curves, "phase"))
     return left, Panel(axis, _phase_axis(curves), traces=phase, lines=lines)
 
 
@@ -143,8 +144,8 @@ def linear_figure(response: LinearResponse, which: Coordinate | None = None) -> 
         )
         for name in names
     ]
-    amplitude = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "amplitude")]
-    phase = [t for n, c in zip(names, curves, strict=True) for t in _traces(n, c, "phase")]
+    amplitude = _traces(response.system, names, curves, "amplitude")
+    phase = _traces(response.system, names, curves, "phase")
     axis = speed_axis(response.omega)
     marks = tuple(
         Line("x", w * RPM, f"w0{k}", "mark")
@@ -152,9 +153,9 @@ def linear_figure(response: LinearResponse, which: Coordinate | None = None) -> 
         if response.omega.min() <= w <= response.omega.max()
     )
     panels = (
-        Panel(axis, Axis("amplitude", "mm", _from_zero(c.amplitude * MM for c in curves)),
+        Panel(axis, _amplitude_axis(curves, which),
               traces=tuple(amplitude), lines=marks),
-        Panel(axis, _phase_axis(curves), traces=tuple(phase)),
+        Panel(axis, _phase_axis(curves, which), traces=tuple(phase)),
     )  # fmt: skip
     caption = (
         "As long as no stop is touched. Amplitude is half the peak-to-peak motion; phase is "
@@ -258,16 +259,28 @@ def near_range(assessment: Assessment) -> tuple[float, float] | None:
     return (low, high) if low < omega < high else None
 
 
-def _traces(which: Coordinate, curve: Curve, quantity: str) -> Iterator[Trace]:
-    name = which if isinstance(which, str) and which in LABELS else ""
-    index = which if isinstance(which, int) else 0
+def _traces(
+    system: MechanicalSystem, names: Sequence[Coordinate], curves: Sequence[Curve], quantity: str
+) -> list[Trace]:
+    """Amplitude or phase of every coordinate, each in its own colour."""
     scale = MM if quantity == "amplitude" else DEGREES
-    yield from curve_traces(
-        label(which), curve, getattr(curve, quantity) * scale,
-        colour=name or case_colour(index),
-        symbol=SYMBOLS.get(name) if name else case_symbol(index),
-        bold=which == "relative", legend=quantity == "amplitude",
-    )  # fmt: skip
+    traces: list[Trace] = []
+    for which, curve in zip(names, curves, strict=True):
+        colour, symbol = coordinate_look(system, which)
+        traces += curve_traces(
+            label(which), curve, getattr(curve, quantity) * scale, colour=colour, symbol=symbol,
+            bold=which == "relative", legend=quantity == "amplitude",
+        )  # fmt: skip
+    return traces
+
+
+def coordinate_look(system: MechanicalSystem, which: Coordinate) -> tuple[str, str | None]:
+    """Colour and symbol of a coordinate: a screen's own, else those of its place among all."""
+    if isinstance(which, str) and which in LABELS:
+        return which, SYMBOLS.get(which)
+    index = list(system.coordinates).index(which) if isinstance(which, str) else which
+    # A colour that comes again has another symbol.
+    return case_colour(index), case_symbol(index + index // CASES)
 
 
 def curve_traces(
@@ -292,19 +305,24 @@ def stability_key(traces: Sequence[Trace]) -> Iterator[Trace]:
             yield Trace(role, NOWHERE, NOWHERE, role, "gap")
 
 
-def special_point_traces(
-    special_points: Sequence[SpecialPoint], which: Coordinate
-) -> Iterator[Trace]:
-    """Marks at special points, one entry of the legend for each kind."""
-    for kind in dict.fromkeys(point.kind for point in special_points):
-        points = [point for point in special_points if point.kind == kind]
+def special_point_traces(branches: Sequence[Branch], which: Coordinate) -> Iterator[Trace]:
+    """Marks at special points of branches, one entry of the legend for each kind."""
+    called = [(mark_of(branch, one), one) for branch in branches for one in branch.special_points]
+    for word, symbol in dict.fromkeys(mark for mark, _ in called):
+        points = [point for mark, point in called if mark == (word, symbol)]
         omega = np.array([point.omega for point in points])
         yield Trace(
-            KIND_WORDS.get(kind, kind), omega * RPM,
+            word, omega * RPM,
             np.array([point.amplitude(which) for point in points]) * MM, "point", "jump",
-            symbol=KIND_SYMBOLS.get(kind, "square-open"),
-            x_also=(("Hz", omega * HZ), ("rad/s", omega)),
+            symbol=symbol, x_also=(("Hz", omega * HZ), ("rad/s", omega)),
         )  # fmt: skip
+
+
+def mark_of(branch: Branch | FieldBranch, point: SpecialPoint) -> tuple[str, str]:
+    """Word and symbol of a special point; a fold between two unstable motions is no jump."""
+    if point.kind == "fold" and not is_jump(branch, point):
+        return UNSTABLE_FOLD, "diamond-open"
+    return KIND_WORDS.get(point.kind, point.kind), KIND_SYMBOLS.get(point.kind, "square-open")
 
 
 def _cases_panel(
@@ -395,7 +413,19 @@ def _jump_lines(jumps: Sequence[Jump], *, brief: bool = False) -> tuple[Line, ..
     )
 
 
-def _phase_axis(curves: Sequence[Curve]) -> Axis:
+def quantity_label(quantity: str, which: Coordinate | None) -> str:
+    """A quantity for an axis, and the coordinate where only one is drawn."""
+    return quantity if which is None else f"{quantity}, {label(which)}"
+
+
+def _amplitude_axis(curves: Sequence[Curve], which: Coordinate | None = None) -> Axis:
+    """Amplitude in mm from 0."""
+    top = max(float(curve.amplitude.max()) for curve in curves) * MM
+    bounds = 0.0, 1.08 * top if top > 0.0 and math.isfinite(top) else 1.0
+    return Axis(quantity_label("amplitude", which), "mm", bounds)
+
+
+def _phase_axis(curves: Sequence[Curve], which: Coordinate | None = None) -> Axis:
     """Phase in degrees, ticked at quarters or halves of a turn."""
     low = min(float(curve.phase.min()) for curve in curves) * DEGREES
     high = max(float(curve.phase.max()) for curve in curves) * DEGREES
@@ -404,9 +434,4 @@ def _phase_axis(curves: Sequence[Curve]) -> Axis:
     ticks = tuple((k * step, f"{k * step:.0f}".replace("-", MINUS)) for k in range(first, last + 1))
     margin = 0.04 * (high - low)
     bounds = (min(low - margin, first * step), max(high + margin, last * step))
-    return Axis("phase", "deg", bounds, ticks)
-
-
-def _from_zero(values: Iterator[Real]) -> tuple[float, float]:
-    top = max(float(value.max()) for value in values)
-    return 0.0, 1.08 * top if top > 0.0 and math.isfinite(top) else 1.0
+    return Axis(quantity_label("phase", which), "deg", bounds, ticks)

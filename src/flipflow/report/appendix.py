@@ -9,7 +9,7 @@ import numpy as np
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.io.units import in_unit
 from flipflow.model.numerals import rpm
-from flipflow.plotting.curves import Curve
+from flipflow.plotting.curves import Curve, is_jump
 from flipflow.plotting.palette import STABILITY_WORDS
 from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Values, cells
 from flipflow.report.numbers import four_digits, multiplier, number, quantity
@@ -58,9 +58,9 @@ def special_points(assessment: Assessment) -> Iterator[Block]:
         Column("Relative amplitude", "mm", numeric=True),
     )
     rows = tuple(
-        _point_row(case.name, point, jumps)
+        _point_row(case.name, point, folds)
         for case in assessment.cases
-        for jumps in (_jumps(case.branch),)
+        for folds in (_folds(case.branch),)
         for point in case.branch.special_points
     )
     caption = (
@@ -129,10 +129,10 @@ def _branch_row(name: str, branch: Branch) -> tuple[Cell, ...]:
     )
 
 
-def _point_row(name: str, point: SpecialPoint, jumps: Mapping[float, str]) -> tuple[Cell, ...]:
+def _point_row(name: str, point: SpecialPoint, folds: Mapping[float, str]) -> tuple[Cell, ...]:
     happens = KINDS.get(point.kind, point.kind)
     if point.kind == "fold":
-        happens = jumps.get(point.omega, "jump speed (fold)")
+        happens = folds[point.omega]
     if point.side and not point.orbit.system.symmetric:
         happens += " (+ side)" if point.side > 0 else " (- side)"
     return cells(
@@ -145,9 +145,13 @@ def _point_row(name: str, point: SpecialPoint, jumps: Mapping[float, str]) -> tu
     )
 
 
-def _jumps(branch: Branch) -> dict[float, str]:
-    """Folds that a slowly changing speed meets, in words."""
-    return {
+def _folds(branch: Branch) -> dict[float, str]:
+    """Folds in words: those that a slowly changing speed meets, and all others."""
+    others = {
+        fold.omega: "jump speed (fold)" if is_jump(branch, fold) else "fold, both sides unstable"
+        for fold in branch.folds
+    }
+    return others | {
         jump.omega: f"jump when the speed {'rises' if jump.rising_speed else 'falls'} (fold)"
         for jump in Curve.of(branch, "relative").jumps()
     }

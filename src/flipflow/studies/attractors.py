@@ -29,7 +29,7 @@ class Attractors:
     Parameters
     ----------
     machine
-        A screen or a system.
+        A screen, a system, or any machine with ``.system()``.
     omega
         Forcing frequency in rad/s.
     rng

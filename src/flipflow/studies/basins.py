@@ -159,7 +159,7 @@ def basins(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         Forcing frequency in rad/s. The unbalance points along +x at the start.
     displacement, velocity

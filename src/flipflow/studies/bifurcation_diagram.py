@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -37,8 +38,10 @@ from flipflow.results.result import Result
 from flipflow.transient.settling import (
     MAX_PERIODS,
     MOST_TURNS,
+    PERIODIC,
     RECENT,
     SAME,
+    UNDECIDED,
     Settled,
     Settling,
     Word,
@@ -78,6 +81,12 @@ class Pass:
     words: tuple[Word, ...]
     turns: NDArray[np.int64]
     jumps: tuple[tuple[float, float], ...]
+
+    def __repr__(self) -> str:
+        ends = f"{self.values[0]:.6g} to {self.values[-1]:.6g}, " if self.values.size else ""
+        words = ", ".join(f"{count} {word}" for word, count in Counter(self.words).items())
+        said = f"{ends}{words}, " if words else ends
+        return f"Pass({self.values.size} values, {said}{len(self.jumps)} jumps)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +149,8 @@ class BifurcationDiagram(Result):
     def differ(self) -> NDArray[np.bool_]:
         """Where another motion is met upwards than downwards, (n,).
 
-        Motions that do not repeat differ where their words do. A motion and its mirror image are
-        two.
+        Motions that do not repeat differ where their words do. One that is undecided, or whose
+        period is not known yet, differs from none. A motion and its mirror image are two.
         """
         found = np.zeros(self.values.size, bool)
         down = {value: k for k, value in enumerate(self.down.values.tolist())}
@@ -162,15 +171,20 @@ class BifurcationDiagram(Result):
 
     def _differ(self, k: int, j: int) -> bool:
         """Whether row k upwards and row j downwards are different motions."""
-        if self.up.periods[k] != self.down.periods[j] or self.up.words[k] != self.down.words[j]:
+        one, other = (
+            (way.words[row], int(way.periods[row])) for way, row in ((self.up, k), (self.down, j))
+        )
+        if {(UNDECIDED, 0), (PERIODIC, 0)} & {one, other}:
+            return False
+        if one != other:
             return True
         if self.up.periods[k] == 0:
             return False
         omega = float(self.up.values[k]) if self.omega is None else self.omega
         scale = np.repeat([1.0, 1.0 / omega], self.system.size)
-        one, other = self.up.states[k] * scale, self.down.states[j] * scale
-        away = np.abs(one[:, None] - other[None]).max(axis=2).min()
-        return bool(away > SAME * max(np.abs(one).max(), np.abs(other).max()))
+        up, down = self.up.states[k] * scale, self.down.states[j] * scale
+        away = np.abs(up[:, None] - down[None]).max(axis=2).min()
+        return bool(away > SAME * max(np.abs(up).max(), np.abs(down).max()))
 
 
 def bifurcation_diagram(

@@ -9,7 +9,7 @@ opened.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -23,7 +23,6 @@ from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
 from flipflow.continuation.field_solver import FieldPoint
 from flipflow.continuation.frequency_response import formulation_of, method_of
-from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_count,
     checked_numbers,
@@ -33,7 +32,7 @@ from flipflow.model.arguments import (
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import Excitation, HarmonicForce, MovingBase, Unbalance
-from flipflow.model.parameters import parameter_of, value_of, with_values
+from flipflow.model.parameters import parameter_names, value_of, with_values
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.model.vary import Choice, Distribution, Interval, Normal
@@ -219,24 +218,62 @@ def _traced_from(read: Document, solver: Solver, maps: Real) -> Traced:
 
 def field_branch_document(branch: FieldBranch) -> dict[str, Any]:
     """A branch over a field of the machine."""
-    return {**_row_document(branch), **FIELD_BRANCH.write(branch)}
+    return {**_row_document(branch, (branch.field,)), **FIELD_BRANCH.write(branch)}
 
 
 def bifurcation_curve_document(curve: BifurcationCurve) -> dict[str, Any]:
     """A curve in two parameters of the machine."""
-    return {**_row_document(curve), **BIFURCATION_CURVE.write(curve)}
+    return {**_row_document(curve, curve.parameters), **BIFURCATION_CURVE.write(curve)}
 
 
-def _row_document(row: FieldBranch | BifurcationCurve) -> dict[str, Any]:
-    """Motions, each of a machine that differs in its parameters alone."""
-    if not isinstance(row.machine, (FlipFlowScreen, MechanicalSystem)):
-        remedy = "only branches of a FlipFlowScreen or a MechanicalSystem can be saved"
-        raise InputError("result", type(row.machine).__name__, remedy)
-    return {
+def _row_document(row: FieldBranch | BifurcationCurve, names: Sequence[str]) -> dict[str, Any]:
+    """Motions, each of a machine that differs in its parameters alone.
+
+    What the fields of a user's class do to its matrices no file can tell: there each motion is
+    kept with its own machine.
+    """
+    document = {
         **_read_off(row, row.machine.system()),
         "machine": machine_document(row.machine),
         "points": [POINT.write(orbit.point) for orbit in row.orbits],
     }
+    if not _tells(row, names):
+        at_points = document["special_points"], [point.orbit for point in row.special_points]
+        for parts, orbits in (at_points, (document["points"], row.orbits)):
+            for part, orbit in zip(parts, orbits, strict=True):
+                part["machine"] = machine_document(orbit.machine)
+    return document
+
+
+def _tells(row: FieldBranch | BifurcationCurve, names: Sequence[str]) -> bool:
+    """Whether the machine, read again from a file, gives those of the motions by their values.
+
+    A user's field may be called as a parameter of plain systems is: both ends are compared.
+    """
+    machine = row.machine
+    known = {"omega", *parameter_names(machine)}.issuperset(names)
+    if not known or not isinstance(machine, (FlipFlowScreen, MechanicalSystem)):
+        return False
+    values = np.reshape(row.values, (-1, len(names))).tolist()
+    ends = zip((values[:1], values[-1:]), (row.orbits[:1], row.orbits[-1:]), strict=True)
+    return all(
+        machine_document(_changed(machine, dict(zip(names, at[0], strict=True))))
+        == machine_document(orbits[0].machine)
+        for at, orbits in ends
+        if orbits
+    )
+
+
+def _changed(machine: Machine, values: Mapping[str, float]) -> Machine:
+    """The machine with other values of parameters; the frequency is none of its own."""
+    return with_values(machine, {name: v for name, v in values.items() if name != "omega"})
+
+
+def _motions_at(machine: Machine, values: Mapping[str, float], one: Document) -> Motions:
+    """Reads a motion that has a machine of its own, or one with such values of parameters."""
+    stored = one.get("machine")
+    own = _changed(machine, values) if stored is None else MACHINES.read(stored)
+    return Motions(own, PiecewiseExact())
 
 
 def bifurcation_curve_from(document: Document) -> BifurcationCurve:
@@ -246,8 +283,7 @@ def bifurcation_curve_from(document: Document) -> BifurcationCurve:
     values = read["values"].reshape(-1, 2)
 
     def orbit_at(at: tuple[float, float], one: Document) -> Orbit:
-        fields = {name: value for name, value in zip(names, at, strict=True) if name != "omega"}
-        return Motions(with_values(machine, fields), PiecewiseExact()).orbit(one, Point)
+        return _motions_at(machine, dict(zip(names, at, strict=True)), one).orbit(one, Point)
 
     def special_point(one: Document) -> CurvePoint:
         at = CODEC.form(tuple[float, float]).read(one["values"])
@@ -267,11 +303,11 @@ def bifurcation_curve_from(document: Document) -> BifurcationCurve:
 def field_branch_from(document: Document) -> FieldBranch:
     """The branch of a document."""
     read = FIELD_BRANCH.read(document)
-    machine = MACHINES.read(document["machine"])
-    parameter = parameter_of(machine, read["field"])
+    machine, field = MACHINES.read(document["machine"]), read["field"]
 
     def orbit_at(value: float, one: Document) -> Orbit:
-        return Motions(parameter.at(value), PiecewiseExact()).orbit(one, FieldPoint, value=value)
+        motions = _motions_at(machine, {field: value}, one)
+        return motions.orbit(one, FieldPoint, value=value)
 
     def special_point(one: Document) -> FieldSpecialPoint:
         value = CODEC.form(float).read(one["value"])

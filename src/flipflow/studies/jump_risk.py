@@ -163,9 +163,9 @@ def jump_risk(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`. Frames are the named coordinates that
-        are single degrees of freedom ("main" and "floating" of a screen), or all degrees of
-        freedom.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``. Frames
+        are the named coordinates that are single degrees of freedom ("main" and "floating" of a
+        screen), or all degrees of freedom.
     motion
         Forcing frequency in rad/s, for the motion that is reached from below; or a stable Orbit.
     largest_impulse

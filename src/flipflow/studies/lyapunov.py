@@ -108,7 +108,7 @@ def lyapunov_exponents(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         Speed in rad/s.
     initial

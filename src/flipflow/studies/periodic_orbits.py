@@ -67,7 +67,7 @@ def periodic_orbits(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         Forcing frequency in rad/s.
     max_periods

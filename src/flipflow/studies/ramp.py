@@ -107,7 +107,7 @@ def ramp(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         First and last speed in rad/s; the last may be the lower.
     rate

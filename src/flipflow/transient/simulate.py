@@ -60,7 +60,7 @@ def simulate(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         Speed in rad/s; the unbalance points along +x at t = 0.
     periods

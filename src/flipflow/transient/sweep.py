@@ -186,7 +186,7 @@ def sweep(
     Parameters
     ----------
     machine
-        A screen or a :class:`~flipflow.MechanicalSystem`.
+        A screen, a :class:`~flipflow.MechanicalSystem`, or any machine with ``.system()``.
     omega
         Frequencies in rad/s in the order to pass, (n,).
     initial
