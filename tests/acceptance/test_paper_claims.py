@@ -289,6 +289,12 @@ def test_unknown_figure_is_one_sentence_that_names_the_known(monkeypatch, capsys
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("vary", "word"),
+    [({}, "one field"), ({"clearance": [1e-3], "main_mass": [9e2]}, "one field"),
+     ({"colour": [1.0]}, "colour"), ({"clearance": []}, "list of values"),
+     ({"clearance": [-1e-3]}, "clearance")],
+)  # fmt: skip
 def test_bad_families_are_refused(screen, vary, word):
     with pytest.raises(InputError, match=word):
         ff.response_family(screen, vary)

@@ -89,10 +89,15 @@ def test_a_saved_branch_over_a_place_opens_again(tmp_path) -> None:
     close("amplitudes", again.amplitude(0), branch.amplitude(0), abs=1e-15)
 
 
-def test_a_branch_of_a_machine_that_no_file_holds_is_not_saved(tmp_path) -> None:
+def test_a_branch_of_a_machine_that_no_file_holds_keeps_that_of_each_motion(tmp_path) -> None:
     branch = ff.continue_orbit(upper(Rig(), 1.4, (0.9, 2.5)), "gap", (0.35, 0.45))
-    with pytest.raises(InputError, match="FlipFlowScreen or a MechanicalSystem"):
-        ff.save(branch, tmp_path / "branch.json")
+    ff.save(branch, tmp_path / "branch.json")
+    opened = ff.open_result(tmp_path / "branch.json")
+    assert opened.field == "gap"
+    np.testing.assert_array_equal(opened.values, branch.values)
+    for one, other in zip(opened.orbits, branch.orbits, strict=True):
+        assert one.amplitude(0) == other.amplitude(0)
+        assert one.system.springs[0].gaps == other.system.springs[0].gaps
 
 
 @pytest.mark.parametrize(
