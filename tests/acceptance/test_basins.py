@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -239,3 +241,11 @@ def test_each_rest_against_a_stop_has_its_own_basin(law):
         end = ff.simulate(machine, omega, 60, initial=start).displacement(0)[-1]
         assert rests[label] == pytest.approx(end, abs=1e-4)
     assert set(found.labels.ravel()) == {0, 1}
+
+
+def test_cells_of_another_shape_are_refused(screen):
+    """What a damaged file may hold."""
+    found = ff.basins(screen, OMEGA, {"relative": X[:3]}, {"relative": V[:3]})
+    for name in ("labels", "turns"):
+        with pytest.raises(InputError, match=rf"{name} = .*give one a cell, \(3, 3\)"):
+            dataclasses.replace(found, **{name: getattr(found, name)[:1]})

@@ -83,6 +83,12 @@ class Basins(Frozen, Result):
     notes: tuple[str, ...] = ()
     version: str = field(default=__version__)
 
+    def __post_init__(self) -> None:
+        cells = tuple(axis.values.size for axis in self.axes)
+        for name, values in (("labels", self.labels), ("turns", self.turns)):
+            if np.shape(values) != cells:
+                raise InputError(name, f"shape {np.shape(values)}", f"give one a cell, {cells}")
+
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.labels.shape))
         omega = f"{self.omega:.6g}{unit_in(self.machine, 'rad/s')}"
