@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flipflow.cli.options import Folder, Force, Json, whole
+from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers, whole
 
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 REPORT, PDF, DATA, MACHINE, FIGURE = (
     "report.html", "report.pdf", "proposal.json", "machine.toml", "candidates.html",
 )  # fmt: skip
-MOST_GENERATIONS, MOST_WORKERS = 9999, 256
+MOST_GENERATIONS = 9999
 STAGE = "design"  # the stages of a design that keep what is found
 
 
@@ -36,16 +36,8 @@ def design(
             help="Folder that keeps the search, to go on with.",
         ),
     ] = None,
-    workers: Annotated[
-        int | None,
-        whole("--workers", "N", 1, MOST_WORKERS, "Run on N worker processes instead of threads."),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Run on a cluster of dask: 'tcp://host:8786'."
-        ),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write the report as PDF, too.")] = False,
     force: Force = False,
 ) -> None:

@@ -166,3 +166,16 @@ def _check_speed(option: str, written: str, omega: float) -> None:
     if not SLOWEST <= round(omega * RPM, 6) <= FASTEST:
         remedy = f"give a speed from {SLOWEST:.0f} rpm to {FASTEST:.0f} rpm"
         raise InputError(option, written, remedy)
+
+
+MOST_WORKERS = 256
+Workers = Annotated[
+    int | None,
+    whole("--workers", "N", 1, MOST_WORKERS, "Run on N worker processes instead of threads."),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler", metavar="ADDRESS", help="Run on a cluster of dask: 'tcp://host:8786'."
+    ),
+]

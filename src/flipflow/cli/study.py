@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flipflow.cli.options import Folder, Force, Json, whole
+from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 STORE, RESUME = "--store", "--resume"
 REPORT, DATA, TABLE = "report.html", "results.json", "machines.csv"
-MOST_WORKERS = 256
 
 
 def study(
@@ -42,16 +41,8 @@ def study(
         Path | None,
         typer.Option("--resume", metavar="DIR", help="Go on with the study in this folder."),
     ] = None,
-    workers: Annotated[
-        int | None,
-        whole("--workers", "N", 1, MOST_WORKERS, "Run on N worker processes instead of threads."),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Run on a cluster of dask: 'tcp://host:8786'."
-        ),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     output: Folder = None,
     json: Json = None,
     force: Force = False,

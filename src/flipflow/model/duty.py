@@ -251,6 +251,11 @@ class Duty:
         return (none, *(dict(zip(self.scatter, corner, strict=True)) for corner in corners))
 
     @property
+    def ends(self) -> tuple[Mapping[str, float], ...]:
+        """Factors with all parts at the least, and at the greatest, of theirs; none: no scatter."""
+        return (self.corners[1], self.corners[-1]) if self.scatter else ()
+
+    @property
     def speeds(self) -> Real:
         """Speeds in rad/s at which the duty is judged: one, or both ends and the middle, (F,)."""
         low, high = self.speed

@@ -329,7 +329,7 @@ class Space:
     ) -> Real:
         """Share of extreme corners, loads and speeds at which there is another motion, (C,)."""
         count = len(next(iter(columns.values())))
-        ends = (corners[1], corners[-1]) if len(corners) > 1 else corners
+        ends = self.duty.ends if len(corners) > 1 else corners
         rows = self._scattered(columns, count, ends)
         told = [
             one_motion_loaded(self.screen, rows, load, self.duty.speeds, processors())

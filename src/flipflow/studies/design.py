@@ -106,8 +106,8 @@ class Proposal(Frozen, Result):
         load case, from rest to speed with its motor, blows, other motions.
     passing
         Yield: the share of machines as they are built, parts drawn evenly within their scatter,
-        that meet every constraint in every case; NaN without scatter or where the search was
-        stopped.
+        that meet every constraint in every case; NaN without scatter, where the search was stopped
+        and where the duty cannot be done.
     passing_interval
         Its 95 % confidence interval, (2,).
     failing
@@ -389,7 +389,8 @@ class _Yield:
 
 
 def _yield(space: Space, outcome: _Outcome) -> _Yield:
-    if outcome.cancelled or not space.duty.scatter:
+    proposed = not outcome.cancelled and outcome.found.judged.fits[0]
+    if not proposed or not space.duty.scatter:
         return _Yield()
     judged = space.around(outcome.found.u).built(outcome.found.u)
     fits, missed = judged.fits, (judged.excess > MET).mean(axis=0).tolist()
@@ -415,9 +416,9 @@ def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polish
                 best, low = middle, 0.5 * (low + high)
             else:
                 high = 0.5 * (low + high)
-    if best.judged.fits[0]:
+    if best.judged.fits[0] and not np.array_equal(best.u, u):
         yield _rounded(space, best)
-    yield _rounded(space, on_the_way(0.0))
+    yield _rounded(space, best if np.array_equal(best.u, u) else on_the_way(0.0))
 
 
 def _rounded(space: Space, found: Polished) -> Polished:
@@ -458,7 +459,8 @@ def _project(duty: Duty, screen: FlipFlowScreen) -> Project:
 def _proof(duty: Duty, screen: FlipFlowScreen, monitor: Monitor | None) -> tuple[Assessment, str]:
     """The drawing judged, and why it fails; so may machines with all parts at one end of theirs."""
     tell = _told(monitor, "proving", POLISHED, 1.0)
-    ends = _ends(duty)
+    words = ("every part at its least", "every part at its greatest")
+    ends = dict(zip(words, duty.ends, strict=True)) if duty.ends else {}
     parts = 1 + len(ends)
     drawn = assess(_project(duty, screen), monitor=lambda _, share: tell(share / parts))
     if drawn.state == FAIL or drawn.start_fails:
@@ -475,14 +477,6 @@ def _proof(duty: Duty, screen: FlipFlowScreen, monitor: Monitor | None) -> tuple
         told = built.verdict if built.start_fails else _other_motion(built, duty)
         why = f"{name}: {told}" if told else ""
     return drawn, why
-
-
-def _ends(duty: Duty) -> dict[str, Mapping[str, float]]:
-    """Factors of the two corners of the scatter at which all parts are at one end of theirs."""
-    if not duty.scatter:
-        return {}
-    _, least, *_, greatest = duty.corners
-    return {"every part at its least": least, "every part at its greatest": greatest}
 
 
 def _other_motion(proof: Assessment, duty: Duty) -> str:
