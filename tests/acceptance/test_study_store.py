@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from contextlib import suppress
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.batch import chunk_store
 from flipflow.errors import StoreError
 
 zarr = pytest.importorskip("zarr")
@@ -70,6 +73,25 @@ def test_a_store_is_what_is_found_in_memory(whole):
     assert (kept.machine, kept.sample, kept.distributions) == (
         found.machine, found.sample, found.distributions,
     )  # fmt: skip
+
+
+def test_an_interrupt_waits_for_the_chunk_that_is_written(tmp_path, monkeypatch):
+    written = chunk_store.write_file
+
+    def interrupted(path, *words):
+        if path.parent.name == "relative_amplitude":
+            signal.raise_signal(signal.SIGINT)
+        written(path, *words)
+
+    monkeypatch.setattr(chunk_store, "write_file", interrupted)
+    answer = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        study(tmp_path / "study.zarr")
+    assert signal.getsignal(signal.SIGINT) is answer
+    gc.collect()  # a coroutine that nobody awaited would warn
+    store = chunk_store.ChunkStore(tmp_path / "study.zarr")
+    words = [state.word for state in store.states()]
+    assert words == ["finished", *["missing"] * (len(words) - 1)]
 
 
 def test_xarray_opens_it_by_itself(whole):

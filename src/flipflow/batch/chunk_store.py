@@ -14,6 +14,8 @@ import hashlib
 import json
 import os
 import shutil
+import signal
+import threading
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -39,6 +41,29 @@ PART = ".part"
 # What zarr raises where a store does not hold what it should.
 DAMAGE = (ValueError, LookupError, TypeError, OSError, AttributeError)
 FINISHED, MISSING, DAMAGED = "finished", "missing", "damaged"
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Answer signals after the block: one within zarr leaves coroutines that nobody awaits."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    kept = {one: signal.getsignal(one) for one in SIGNALS}
+    # What no Python code has set cannot be set again.
+    held = {one: answer for one, answer in kept.items() if answer is not None}
+    for one in held:
+        signal.signal(one, lambda number, _frame: came.append(number))
+    try:
+        yield
+    finally:
+        # The answer to SIGTERM may be that to SIGINT, which is therefore the last to return.
+        for one in reversed(held):
+            signal.signal(one, held[one])
+        for number in dict.fromkeys(came):
+            signal.raise_signal(number)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +128,7 @@ class ChunkState:
         return f"chunk {self.index} ({'; '.join(self.files)})"
 
 
+@_undisturbed()
 def create_store(folder: Path, layout: Layout) -> None:
     """Make a store without chunks; it is there whole or not at all.
 
@@ -237,6 +263,7 @@ class ChunkStore:
         for index in range(self.chunks):
             yield self.state(index)
 
+    @_undisturbed()
     def state(self, index: int) -> ChunkState:
         """The state of a chunk."""
         row = self._file(CHECKSUM, index)
@@ -253,6 +280,7 @@ class ChunkStore:
         ]
         return ChunkState(index, DAMAGED if faults else FINISHED, tuple(faults))
 
+    @_undisturbed()
     def write(self, index: int, values: Mapping[str, Array]) -> None:
         """Write a chunk: all its arrays, then their checksums.
 
@@ -271,6 +299,7 @@ class ChunkStore:
             digests[0, k] = np.frombuffer(content, np.uint8)
         self._put(CHECKSUM, slice(index, index + 1), digests)
 
+    @_undisturbed()
     def read(self, name: str, index: int | None = None) -> Array:
         """The values of an array, or those of one chunk of a growing one.
 
