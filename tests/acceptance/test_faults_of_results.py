@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
@@ -15,7 +16,7 @@ import pytest
 from matplotlib import pyplot as plt
 
 import flipflow as ff
-from flipflow.errors import IncompleteError
+from flipflow.errors import IncompleteError, InputError, StoreError
 from flipflow.plotting.panels import Axis, Line, Note, Panel, PanelGrid, Trace
 
 mpl.use("Agg")
@@ -435,3 +436,24 @@ def _texts(part: object) -> Iterator[str]:
         for field in fields(part):
             if field.name not in {"caption", "x_also", "role", "colour", "symbol", "dash"}:
                 yield from _texts(getattr(part, field.name))
+
+
+@pytest.mark.parametrize("name", ["omega", "return_map"])
+def test_a_file_with_a_number_beyond_all_machines_is_refused(name, tmp_path):
+    """Its square is infinite and warns."""
+    path = tmp_path / "orbit.json"
+    ff.save(ff.periodic_orbits(Rig(), 1.4)[0], path)
+    document = json.loads(path.read_text())
+    document[name] = 1e200 if name == "omega" else [[1e200, 0.0], [0.0, 1.0]]
+    path.write_text(json.dumps(document))
+    with pytest.raises(StoreError, match=rf"{name}: no machine has a number beyond 1e\+150"):
+        ff.open_result(path)
+
+
+def test_a_history_is_of_finite_numbers():
+    found = ff.simulate(Rig(), 1.4, 2)
+    for name in ("t", "x", "a", "force", "omega"):
+        values = getattr(found, name).copy()
+        values[-1] = np.inf
+        with pytest.raises(InputError, match=rf"^{name} = .*give finite numbers"):
+            dataclasses.replace(found, **{name: values})

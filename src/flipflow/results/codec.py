@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import StoreError
+from flipflow.model.arguments import LARGEST, TOO_LARGE
 
 Json = Any
 MOST_WHOLE = 2**63  # what is larger is no count, index or seed
@@ -137,10 +138,17 @@ def array(values: Json, dtype: type = float) -> NDArray[Any]:
             raise ValueError(f"no array without elements has the shape {values['shape']}")
         return np.zeros(values["shape"], dtype)
     if np.issubdtype(dtype, np.complexfloating):
-        pairs = np.asarray(values, dtype=float)
+        pairs = _within_all(np.asarray(values, dtype=float))
         # Not a + 1j b, which is no number where one of them is infinite.
         return pairs.view(np.complex128)[..., 0] if pairs.size else np.zeros(0, dtype)
-    return np.asarray(values, dtype)
+    return _within_all(np.asarray(values, dtype))
+
+
+def _within_all(values: NDArray[Any]) -> NDArray[Any]:
+    """The numbers, of which none is finite and beyond all that is worked with."""
+    if values.dtype.kind == "f" and (np.isfinite(values) & (np.abs(values) > LARGEST)).any():
+        raise ValueError(TOO_LARGE)
+    return values
 
 
 def fields_of(kind: Any) -> dict[str, bool]:
@@ -205,7 +213,8 @@ def _number(document: Json) -> float:
         return math.nan
     if document in ("inf", "-inf"):
         return float(document)
-    float(_real(document))  # refuses a whole number that is too large
+    if LARGEST < abs(float(_real(document))) < math.inf:  # a whole number may not fit at all
+        raise ValueError(TOO_LARGE)
     return document  # type: ignore[no-any-return]
 
 

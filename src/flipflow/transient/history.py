@@ -12,11 +12,13 @@ import numpy as np
 
 from flipflow import __version__
 from flipflow.compiled.arrays import Int, Real
-from flipflow.errors import IncompleteError
-from flipflow.model.arguments import checked_index
+from flipflow.errors import IncompleteError, InputError
+from flipflow.model.arguments import checked_index, checked_reals
 from flipflow.model.contact_law import WHOLE, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.results.result import Result
+
+FINITE = "give finite numbers"
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,9 @@ class History(Result):
             values = getattr(self, name)
             if values is not None:
                 # A view, so that the owner of the data keeps an array it can write to.
-                kept = np.asarray(values, float).view()
+                kept = checked_reals(name, values, FINITE).view()
+                if not np.isfinite(kept).all():
+                    raise InputError(name, values, FINITE)
                 kept.setflags(write=False)
                 object.__setattr__(self, name, kept)
         object.__setattr__(self, "energy", MappingProxyType(dict(self.energy)))
