@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import typing
+from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -60,7 +61,9 @@ def describe():
 
 
 def attributes(cls):
-    for name in sorted({*dir(cls), *fields(cls)}):
+    # What Python's own types bring along hangs on its version.
+    ours = {name for base in cls.__mro__ if base.__module__ != "builtins" for name in vars(base)}
+    for name in sorted(ours | fields(cls)):
         if name.startswith("_"):
             continue
         value = plain(cls, name)
@@ -85,6 +88,8 @@ def signature(value):
     """The signature on one line, annotations as written."""
     if inspect.isclass(value) and issubclass(value, Exception) and "__init__" not in vars(value):
         return "(*args)"
+    if inspect.isclass(value) and issubclass(value, Enum):
+        return "(value)"  # what Python writes of it hangs on its version
     found = inspect.signature(value)
     parameters = [
         p if p.annotation is p.empty else p.replace(annotation=Bare(p.annotation))

@@ -148,9 +148,9 @@ def create_store(folder: Path, layout: Layout) -> None:
         why = f"it cannot be written (there is no folder {str(folder.parent)!r})"
         raise refused(FIELD, folder, f"{why}, make it or name another")
     layout = _with_checksums(layout)
-    sweep(folder)
     aside, lock = folder.parent / f".{folder.name}-{uuid.uuid4().hex}{PART}", -1
     try:
+        sweep(folder)
         aside.mkdir()
     except (OSError, ValueError) as error:
         raise refused(FIELD, folder, because(error, "a folder")) from None

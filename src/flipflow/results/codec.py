@@ -57,6 +57,7 @@ class Codec:
         return self._forms[kind]
 
     def _made(self, kind: Any) -> Form:
+        kind = _spelt_out(kind)
         origin, parts = get_origin(kind), get_args(kind)
         if origin in MAKERS:
             return MAKERS[origin](self, parts)
@@ -161,6 +162,12 @@ def fields_of(kind: Any) -> dict[str, bool]:
         for field in dataclasses.fields(kind)
         if field.init
     }
+
+
+def _spelt_out(kind: Any) -> Any:
+    """A type in place of a name that a ``type`` statement gave it, as numpy's for arrays."""
+    meant = getattr(get_origin(kind), "__value__", None)
+    return kind if meant is None else meant[get_args(kind)]
 
 
 def _jsonable(value: object, words: Mapping[float, str]) -> Json:
@@ -277,7 +284,7 @@ def _mappings(codec: Codec, parts: tuple[Any, ...]) -> Form:
 
 def _unions(codec: Codec, parts: tuple[Any, ...]) -> Form:
     """One of several types: objects are told apart by their fields, null is None."""
-    kinds = [part for part in parts if part is not NoneType]
+    kinds = [_spelt_out(part) for part in parts if part is not NoneType]
 
     def write(value: object) -> Json:
         if value is None:

@@ -188,6 +188,8 @@ def _put_new(place: Path, content: bytes) -> None:
 def because(error: OSError | ValueError, what: str = "a file in a folder") -> str:
     """Why writing ended, and what to do: the second half of a sentence of :func:`refused`."""
     reason = error.strerror if isinstance(error, OSError) else str(error)
+    if "null" in reason:  # said in another way by every version of Python
+        reason = "its name holds a null byte"
     return f"it cannot be written ({reason}), name {what} you own"
 
 

@@ -18,7 +18,7 @@ from flipflow.model.contact_law import WHOLE, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.results.result import Result
 
-FINITE = "give finite numbers"
+FINITE = "give finite numbers, and nan where one is not known"
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class History(Result):
             if values is not None:
                 # A view, so that the owner of the data keeps an array it can write to.
                 kept = checked_reals(name, values, FINITE).view()
-                if not np.isfinite(kept).all():
+                if np.isinf(kept).any():
                     raise InputError(name, values, FINITE)
                 kept.setflags(write=False)
                 object.__setattr__(self, name, kept)
