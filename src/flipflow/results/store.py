@@ -188,7 +188,7 @@ def _put_new(place: Path, content: bytes) -> None:
 def because(error: OSError | ValueError, what: str = "a file in a folder") -> str:
     """Why writing ended, and what to do: the second half of a sentence of :func:`refused`."""
     reason = error.strerror if isinstance(error, OSError) else str(error)
-    if "null" in reason:  # said in another way by every version of Python
+    if isinstance(error, ValueError) and "null" in str(error):  # every Python has its own words
         reason = "its name holds a null byte"
     return f"it cannot be written ({reason}), name {what} you own"
 
