@@ -521,3 +521,21 @@ def test_what_has_no_derivative(screen) -> None:
     fold = special(screen, (190.0, 220.0), "fold")[0]
     with pytest.raises(ff.InputError, match="omega"):
         fold.sensitivity(["omega"])
+
+
+@pytest.mark.parametrize("clearance", [0.6, 3.0])
+def test_the_phase_of_the_force_changes_no_derivative(clearance):
+    """Also where a summit stands at the end of the period, beside its own other end."""
+    stop = (ff.ClearanceSpring([1.0], 3.0, 0.2, clearance),)
+    names = ["springs[0].stiffness", "forcing", "omega"]
+
+    def machine(phase):
+        force = ff.HarmonicForce([0.5 * np.exp(1j * phase)])
+        return ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], stop, force)
+
+    first = ff.periodic_orbits(machine(0.0), 1.3)[0]
+    wanted = first.sensitivity(("amplitude", 0), names)
+    top = first.t[np.argmax(first.displacement(0))] * first.omega
+    for phase in top + np.linspace(-0.02, 0.02, 20):
+        found = ff.periodic_orbits(machine(phase), 1.3)[0]
+        assert found.sensitivity(("amplitude", 0), names) == pytest.approx(wanted, rel=1e-9)

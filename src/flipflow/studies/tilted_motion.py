@@ -440,17 +440,16 @@ class TiltedMotion:
         before, after = np.roll(height, 1), np.roll(height, -1)
         level = height.max() - LOWER * (height.max() - height.min())
         tops = np.flatnonzero((height >= level) & (height >= before) & (height >= after))
-        found = [self._climbed(formula, values, int(k)) for k in tops[:MOST_PEAKS]]
-        return [peak for peak in found if peak is not None]
+        return [self._climbed(formula, values, int(k)) for k in tops[:MOST_PEAKS]]
 
-    def _climbed(self, formula: Formula, values: Complex, k: int) -> Complex | None:
-        """The summit beside a sample; None where it lies beyond an end of the period."""
+    def _climbed(self, formula: Formula, values: Complex, k: int) -> Complex:
+        """The summit beside a sample."""
         piece, t = self._grid.piece, self._grid.t
         slope = values[k, -1].imag
         step = 1 if slope > 0.0 else -1
+        if not 0 <= k + step < t.size:
+            k = 0 if step > 0 else t.size - 1  # the same moment at the other end of the period
         other = k + step
-        if not 0 <= other < t.size:
-            return None
         if piece[other] != piece[k]:
             limit = int(piece[k]) + (1 if step > 0 else 0)
             peak = values[k] + 1j * slope * self._shifts[limit]
