@@ -52,6 +52,7 @@ from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -365,6 +366,10 @@ def functions() -> tuple[Call, ...]:
         Call("tolerance", ff.tolerance,
              {"study": ff.open_study(stored()), "limits": ff.Limits(relative_amplitude=(0.0, 1.0))},
              (Tolerance,)),
+        Call("worst_case", ff.worst_case,
+             {"machine": plain(), "vary": {"main_mass": (900.0, 920.0)},
+              "quantity": "relative_amplitude", "omega": OMEGA, "branch": "from-below",
+              "threads": 1, "monitor": None}, (WorstCase,)),
         Call("switch_branch", ff.switch_branch,
              {"point": doubled(), "interval": (doubled().omega - 0.1, doubled().omega + 0.1),
               "monitor": None}, (Branch,)),

@@ -43,6 +43,7 @@ _HOME = {
     "study": "flipflow.studies.study",
     "open_study": "flipflow.studies.study",
     "tolerance": "flipflow.studies.tolerance",
+    "worst_case": "flipflow.studies.worst_case",
     "design": "flipflow.studies.design",
     "Sample": "flipflow.model.sampling",
     "Choice": "flipflow.model.vary",
@@ -105,6 +106,7 @@ _HOME = {
     "Study": "flipflow.studies.study",
     "Sweep": "flipflow.transient.sweep",
     "Tolerance": "flipflow.studies.tolerance",
+    "WorstCase": "flipflow.studies.worst_case",
     "Trial": "flipflow.studies.design",
     "Cancelled": "flipflow.errors",
     "IncompleteError": "flipflow.errors",
@@ -213,6 +215,8 @@ if TYPE_CHECKING:
     from flipflow.studies.study import study as study
     from flipflow.studies.tolerance import Tolerance as Tolerance
     from flipflow.studies.tolerance import tolerance as tolerance
+    from flipflow.studies.worst_case import WorstCase as WorstCase
+    from flipflow.studies.worst_case import worst_case as worst_case
     from flipflow.transient.history import History as History
     from flipflow.transient.simulate import simulate as simulate
     from flipflow.transient.startup import RunUp as RunUp

@@ -43,6 +43,7 @@ from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
 from flipflow.transient.startup import Peak, RunUp
 from flipflow.transient.sweep import Sweep
@@ -208,6 +209,10 @@ MADE: dict[type, list[Callable[[], object]]] = {
         ),
     ],
     Tolerance: [lambda: ff.tolerance(studied(), ff.Limits(relative_amplitude=(5e-3, 9e-3)))],
+    WorstCase: [
+        lambda: ff.worst_case(screen(), {"clearance": (5e-3, 7e-3)}, "stroke", [85.0, 120.0]),
+        lambda: ff.worst_case(chain(), {"forcing": (0.9, 1.1)}, "stop_force", 0.8),
+    ],
     Proposal: [proposed],
     Assessment: [assessed],
     Reproduction: [lambda: ff.reproduce(figures=("1", "3", "5"))],

@@ -87,6 +87,9 @@ MADE: dict[str, Callable[[], object]] = {
         load_cases=[ff.Load(name="empty"), ff.Load(name="hot", temperature=40.0)],
     ),
     "Tolerance": lambda: ff.tolerance(made("Study"), ff.Limits(relative_amplitude=(5e-3, 9e-3))),
+    "WorstCase": lambda: ff.worst_case(
+        screen(), {"clearance": (5.4e-3, 6.6e-3)}, "relative_amplitude", [89.0, 120.0]
+    ),
     "Comparison": lambda: ff.compare([screen(), screen().replace(clearance=5e-3)], omega=89.0),
     "FoundationLoads": lambda: ff.foundation_loads({"empty": branch().orbits_at(89.0)[0]}),
     "Proposal": lambda: ff.design(

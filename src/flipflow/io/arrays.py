@@ -27,7 +27,12 @@ from flipflow.io.labelled import (
     unit_of,
     units_of,
 )
-from flipflow.io.study_arrays import proposal_arrays, study_arrays, tolerance_arrays
+from flipflow.io.study_arrays import (
+    proposal_arrays,
+    study_arrays,
+    tolerance_arrays,
+    worst_case_arrays,
+)
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.orbit import Orbit
@@ -51,6 +56,7 @@ from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -552,6 +558,7 @@ def _(found: Sensitivity) -> Arrays:
 
 arrays_of.register(Study)(study_arrays)
 arrays_of.register(Tolerance)(tolerance_arrays)
+arrays_of.register(WorstCase)(worst_case_arrays)
 arrays_of.register(Assessment)(assessment_arrays)
 arrays_of.register(Comparison)(comparison_arrays)
 arrays_of.register(FoundationLoads)(foundation_arrays)

@@ -42,6 +42,7 @@ from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -72,6 +73,7 @@ SCHEMAS: dict[type, str] = {
     Sensitivity: "flipflow/sensitivity/1",
     Study: "flipflow/study/1",
     Tolerance: "flipflow/tolerance/1",
+    WorstCase: "flipflow/worst-case/1",
     Proposal: "flipflow/proposal/1",
     Assessment: "flipflow/assessment/1",
     Comparison: "flipflow/comparison/1",

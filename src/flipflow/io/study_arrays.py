@@ -11,6 +11,7 @@ from flipflow.studies.design import Proposal
 from flipflow.studies.study import Study
 from flipflow.studies.study_plan import unit_of
 from flipflow.studies.tolerance import Tolerance, limits_in_words
+from flipflow.studies.worst_case import WorstCase
 
 
 def study_arrays(found: Study) -> Arrays:
@@ -78,6 +79,32 @@ def tolerance_arrays(found: Tolerance) -> Arrays:
             "jumped": Variable(("machine", "frequency"), found.jumped),
         },
         {"flipflow_version": found.version, "machines": found.size},
+    )
+
+
+def worst_case_arrays(found: WorstCase) -> Arrays:
+    """Extremes by frequency, and the machines that have them."""
+    one = quantity_named(found.quantity, found.machine)
+    values = {"nominal": found.nominal, "least": found.least, "greatest": found.greatest}
+    places = {"least": found.least_at, "greatest": found.greatest_at}
+    return Arrays(
+        f"Worst case of {one.label}",
+        "frequency",
+        {"omega": column("frequency", found.omega, "rad/s")},
+        {
+            **{name: column("frequency", value, one.unit) for name, value in values.items()},
+            **{
+                f"{end}_{name}": column("frequency", at[:, j], unit_of(found.machine, name))
+                for end, at in places.items()
+                for j, name in enumerate(found.names)
+            },
+        },
+        {
+            "flipflow_version": found.version,
+            "quantity": found.quantity,
+            "branch": found.branch,
+            "looked_at": found.looked_at,
+        },
     )
 
 

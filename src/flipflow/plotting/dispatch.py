@@ -41,6 +41,7 @@ from flipflow.plotting.sweep import sweep_figure
 from flipflow.plotting.tolerance import tolerance_figure
 from flipflow.plotting.transient import run_up_figure
 from flipflow.plotting.units import in_units, units_for
+from flipflow.plotting.worst_case import worst_case_figure
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.basins import Basins
 from flipflow.studies.bifurcation_diagram import BifurcationDiagram
@@ -58,6 +59,7 @@ from flipflow.studies.response_family import ResponseFamily
 from flipflow.studies.sensitivity import Sensitivity
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
+from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
 from flipflow.transient.startup import RunUp
 from flipflow.transient.sweep import Sweep
@@ -90,6 +92,7 @@ OF_THE_WHOLE: dict[type, Callable[..., Figure]] = {
     FoundationLoads: foundation_figure,
     Study: study_figure,
     Tolerance: tolerance_figure,
+    WorstCase: worst_case_figure,
     Proposal: proposal_figure,
 }
 

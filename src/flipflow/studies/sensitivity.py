@@ -4,34 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
-from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import (
     checked_count,
     checked_generator,
-    checked_interval,
     checked_monitor,
-    checked_speeds,
-    checked_word,
 )
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import value_of
-from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
-from flipflow.model.system import Machine, system_of
+from flipflow.model.quantities import BranchWord
+from flipflow.model.system import Machine
 from flipflow.model.vary import Distribution, Variation, Vary, variations
 from flipflow.results.result import Result
-from flipflow.studies.landmarks import analysed_range
 from flipflow.studies.sensitivity_samples import (
     Columns,
     Question,
     closed_form_values,
     motion_values,
-    values_of,
+    nearest_turn,
+    nominal_values,
+    question_of,
 )
 from flipflow.studies.sobol import LEAST_GROUPS, SobolIndices, saltelli_sample, sobol_indices
 
@@ -235,13 +232,13 @@ def sensitivity(
     ----------
     Saltelli and others, Computer Physics Communications 181 (2010) 259-270, for the estimators.
     """
-    question = _question(machine, quantity, omega, branch)
+    question = question_of(machine, quantity, omega, branch)
     varied = variations(vary, machine)
     workers = checked_count("threads", 1 if threads is None else threads, 256)
     groups = checked_count("n", n, N_MOST, least=LEAST_GROUPS)
     generator = checked_generator(rng)
     checked_monitor(monitor)
-    nominal = _nominal(question)
+    nominal = nominal_values(question)
     points = saltelli_sample(len(varied), groups, generator)
     u = points.reshape(-1, len(varied))
     columns = {one.name: one.distribution.quantile(u[:, i]) for i, one in enumerate(varied)}
@@ -271,9 +268,9 @@ def one_at_a_time(machine: Machine, vary: Vary, quantity: str, omega: float) -> 
     InputError
         As for :func:`sensitivity`.
     """
-    question = _question(machine, quantity, omega, "from-below")
+    question = question_of(machine, quantity, omega, "from-below")
     varied = variations(vary, machine)
-    nominal = _nominal(question)
+    nominal = nominal_values(question)
     rows = _ends(machine, varied)
     ends = np.concatenate(list(_values(question, rows, nominal, 1, None)), axis=1)[:, 0]
     return OneAtATime(
@@ -293,42 +290,6 @@ def _own(machine: Machine, varied: Sequence[Variation]) -> tuple[object, ...]:
     return tuple(value_of(machine, one.name) for one in varied)
 
 
-def _question(machine: Machine, name: str, omega: object, branch: BranchWord) -> Question:
-    system_of(machine)
-    quantity = quantity_named(name, machine)
-    checked_word("branch", branch, get_args(BranchWord))
-    span = analysed_range(machine)
-    if quantity.of == "response":
-        wanted = span if omega is None else checked_interval("omega", omega)
-        return Question(machine, quantity, np.array([np.nan]), wanted, branch)
-    _require_data(machine, quantity)
-    frequencies = _frequencies(omega, name)
-    low, high = float(frequencies.min()), float(frequencies.max())
-    wide = min(span[0], 0.9 * low), max(span[1], 1.1 * high)
-    return Question(machine, quantity, frequencies, wide, branch)
-
-
-def _nominal(question: Question) -> Real:
-    """The quantity of the machine itself, (1, K); a machine that cannot be solved at all raises."""
-    try:
-        values = [list(values_of(question, question.machine))]
-    except IncompleteError:
-        values = [[None] * question.omega.size]
-    return np.array(values, dtype=float)
-
-
-def _require_data(machine: Machine, quantity: Quantity) -> None:
-    absent = quantity.missing(machine)
-    if absent:
-        raise InputError("quantity", quantity.name, missing_words(absent))
-
-
-def _frequencies(omega: object, name: str) -> Real:
-    """Frequencies in rad/s, (K,)."""
-    remedy = f"give frequencies above 0 rad/s at which {name} is meant, one or (n_omega,)"
-    return checked_speeds(omega, remedy)
-
-
 def _values(
     question: Question,
     columns: Columns,
@@ -344,22 +305,14 @@ def _values(
             monitor(f"{question.quantity.label}: {rows} samples", share)
 
     if not question.in_closed_form(tuple(columns)):
-        yield _near(question, motion_values(question, columns, threads, tell), nominal)
+        yield nearest_turn(question, motion_values(question, columns, threads, tell), nominal)
         return
     step = max(BLOCK_VALUES // rows, 1)
     for begin in range(0, question.omega.size, step):
         part = slice(begin, begin + step)
         values = closed_form_values(question, columns, question.omega[part])
-        yield _near(question, values, nominal[:, part])
+        yield nearest_turn(question, values, nominal[:, part])
         tell(min((begin + step) / question.omega.size, 1.0))
-
-
-def _near(question: Question, values: Real, nominal: Real) -> Real:
-    """Angles within half a turn of the machine's own, so that +pi and -pi are no distance."""
-    if question.quantity.unit != "rad":
-        return values
-    about = np.where(np.isfinite(nominal), nominal, 0.0)
-    return np.asarray(about + np.angle(np.exp(1j * (values - about))))
 
 
 def _analysed(values: Real, draws: Any) -> tuple[SobolIndices, Real]:

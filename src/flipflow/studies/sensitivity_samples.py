@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +13,23 @@ from flipflow.batch.side_by_side import side_by_side
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
+from flipflow.model.arguments import checked_interval, checked_speeds, checked_word
 from flipflow.model.fields import FIELD
 from flipflow.model.parameters import with_values
-from flipflow.model.quantities import BranchWord, Quantity, leading_coordinate
+from flipflow.model.quantities import (
+    BranchWord,
+    Quantity,
+    leading_coordinate,
+    missing_words,
+    quantity_named,
+)
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, system_of
 from flipflow.periodic.options import PiecewiseExact
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
-from flipflow.studies.landmarks import RESPONSE_VALUES, Response
+from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
 from flipflow.studies.lane_values import lane_values, on_lanes
 from flipflow.studies.quantity_values import (
     MOTION_VALUES,
@@ -70,6 +77,51 @@ class Question:
             return False
         free = not self.machine.has_stop and not STOP_FIELDS & set(names)
         return free and self.quantity.of == "motion"
+
+
+def question_of(machine: Machine, name: str, omega: object, branch: BranchWord) -> Question:
+    """What is asked of every sample, checked."""
+    system_of(machine)
+    quantity = quantity_named(name, machine)
+    checked_word("branch", branch, get_args(BranchWord))
+    span = analysed_range(machine)
+    if quantity.of == "response":
+        wanted = span if omega is None else checked_interval("omega", omega)
+        return Question(machine, quantity, np.array([np.nan]), wanted, branch)
+    _require_data(machine, quantity)
+    frequencies = _frequencies(omega, name)
+    low, high = float(frequencies.min()), float(frequencies.max())
+    wide = min(span[0], 0.9 * low), max(span[1], 1.1 * high)
+    return Question(machine, quantity, frequencies, wide, branch)
+
+
+def nominal_values(question: Question) -> Real:
+    """The quantity of the machine itself, (1, K); a machine that cannot be solved at all raises."""
+    try:
+        values = [list(values_of(question, question.machine))]
+    except IncompleteError:
+        values = [[None] * question.omega.size]
+    return np.array(values, dtype=float)
+
+
+def _require_data(machine: Machine, quantity: Quantity) -> None:
+    absent = quantity.missing(machine)
+    if absent:
+        raise InputError("quantity", quantity.name, missing_words(absent))
+
+
+def _frequencies(omega: object, name: str) -> Real:
+    """Frequencies in rad/s, (K,)."""
+    remedy = f"give frequencies above 0 rad/s at which {name} is meant, one or (n_omega,)"
+    return checked_speeds(omega, remedy)
+
+
+def nearest_turn(question: Question, values: Real, nominal: Real) -> Real:
+    """Angles within half a turn of the machine's own, so that +pi and -pi are no distance."""
+    if question.quantity.unit != "rad":
+        return values
+    about = np.where(np.isfinite(nominal), nominal, 0.0)
+    return np.asarray(about + np.angle(np.exp(1j * (values - about))))
 
 
 def closed_form_values(question: Question, columns: Columns, omega: Real) -> Real:
