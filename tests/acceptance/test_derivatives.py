@@ -539,3 +539,16 @@ def test_the_phase_of_the_force_changes_no_derivative(clearance):
     for phase in top + np.linspace(-0.02, 0.02, 20):
         found = ff.periodic_orbits(machine(phase), 1.3)[0]
         assert found.sensitivity(("amplitude", 0), names) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_summit_just_beyond_a_change_of_contact():
+    """Rounding decides which of two samples of one moment, before and after it, is higher."""
+    machine, omega = random_machine(50029), 1.0706425372248596
+    names = ["forcing", "omega"]
+    found = ff.periodic_orbits(machine, omega, max_periods=3)
+    assert max(orbit.periods for orbit in found) == 3
+    for orbit in found:
+        (slope,) = differences(orbit, names, [lambda one: one.amplitude(0)], 1e-6)
+        sizes = np.array([size_of(orbit, name) for name in names])
+        got = orbit.sensitivity(("amplitude", 0), names) * sizes
+        assert got == pytest.approx(slope, rel=1e-5)

@@ -447,13 +447,14 @@ class TiltedMotion:
         piece, t = self._grid.piece, self._grid.t
         slope = values[k, -1].imag
         step = 1 if slope > 0.0 else -1
-        if not 0 <= k + step < t.size:
-            k = 0 if step > 0 else t.size - 1  # the same moment at the other end of the period
-        other = k + step
-        if piece[other] != piece[k]:
-            limit = int(piece[k]) + (1 if step > 0 else 0)
-            peak = values[k] + 1j * slope * self._shifts[limit]
-            return np.asarray(peak)
+        other = (k + step) % t.size
+        if piece[other] != piece[k] or abs(other - k) > 1:
+            # The same moment, beyond a change of contact or at the other end of the period.
+            height, beyond = values[k, 0].real, values[other, 0].real
+            if abs(beyond - height) > TIED * abs(height) or not values[other, -1].imag * step > 0.0:
+                limit = int(piece[k]) + (1 if step > 0 else 0)
+                return np.asarray(values[k] + 1j * slope * self._shifts[limit])
+            k, other = other, other + step
 
         def rate(at: float) -> float:
             path = self._path(np.array([at]), piece[k : k + 1])
