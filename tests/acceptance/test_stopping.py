@@ -126,8 +126,9 @@ class Interrupting:
             self.reference = weakref.ref(gone, lambda _: os.kill(os.getpid(), number))
             del gone
 sys.meta_path.insert(0, Interrupting())
-from flipflow.cli.main import main
-main()
+import flipflow.cli.main
+flipflow.cli.main.AGAIN = {again}
+flipflow.cli.main.main()
 """
 
 
@@ -146,14 +147,18 @@ main()
 
 
 @pytest.mark.parametrize("number", BOTH)
-def test_a_signal_that_falls_into_a_callback_is_not_lost(tmp_path, number):
-    words = (sys.executable, "-c", DROPPED, "reproduce", "2c", "-o", "out", str(int(number)))
+@pytest.mark.parametrize("again", [0.02, 1000.0], ids=["soon", "at the end"])
+def test_a_signal_that_falls_into_a_callback_is_not_lost(tmp_path, number, again):
+    program = DROPPED.format(again=again)
+    words = (sys.executable, "-c", program, "reproduce", "2c", "-o", "out", str(int(number)))
     run = subprocess.run(
         words, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300.0
     )
     assert run.returncode == 130
     assert "Traceback" not in run.stderr
     assert run.stderr.endswith(".\n")
+    if again > 1.0:
+        assert run.stderr == "Stopped by the user; it had come to its end.\n"
 
 
 def test_an_interrupt_in_code_made_from_text_ends_with_the_same_code(tmp_path):

@@ -15,7 +15,6 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 STOPPED_CODE = 130
-STOPPED_EARLY = "Stopped by the user; nothing is written.\n"
 OBJECTS = 50_000  # made since garbage was last looked for
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 AGAIN = 0.02  # seconds until a dropped interrupt is raised again
@@ -48,13 +47,17 @@ class Closed(io.TextIOBase):
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
 
 
+def _say_stopped(outcome: str) -> None:
+    with suppress(OSError):
+        os.write(sys.stderr.fileno(), f"Stopped by the user; {outcome}.\n".encode())
+
+
 @contextmanager
 def _stopped_at_once() -> Iterator[None]:
     """End the process at Ctrl-C or SIGTERM as long as nothing has begun."""
 
     def end(_number: int, _frame: FrameType | None) -> None:
-        with suppress(OSError):
-            os.write(sys.stderr.fileno(), STOPPED_EARLY.encode())
+        _say_stopped("nothing is written")
         os._exit(STOPPED_CODE)
 
     with _answered(dict.fromkeys(SIGNALS, end)):
@@ -78,25 +81,38 @@ def _terminated_as_interrupted() -> Iterator[None]:
 @contextmanager
 def _never_lost() -> Iterator[None]:
     """Raise an interrupt again that Python drops: it does so within a finalizer or a callback."""
-    before, waiting = sys.unraisablehook, list[threading.Timer]()
+    before, waiting, dropped = sys.unraisablehook, list[threading.Timer](), threading.Event()
 
-    def again(dropped: sys.UnraisableHookArgs) -> None:
-        if not issubclass(dropped.exc_type, KeyboardInterrupt):
-            before(dropped)
+    def interrupt() -> None:
+        dropped.clear()
+        _thread.interrupt_main()
+
+    def again(one: sys.UnraisableHookArgs) -> None:
+        if not issubclass(one.exc_type, KeyboardInterrupt):
+            before(one)
             return
+        dropped.set()
         # From another thread, after a moment: here it would be dropped once more.
-        later = threading.Timer(AGAIN, _thread.interrupt_main)
+        later = threading.Timer(AGAIN, interrupt)
         later.daemon = True
         waiting.append(later)
         later.start()
 
     sys.unraisablehook = again
     try:
-        yield
+        try:
+            yield
+        finally:
+            for later in waiting:
+                later.cancel()
+                later.join()
+            if dropped.is_set():
+                raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        _say_stopped("it had come to its end")
+        sys.exit(STOPPED_CODE)
     finally:
         sys.unraisablehook = before
-        for later in waiting:
-            later.cancel()
         # An interrupt that passed through code made from text, as dataclasses are, has "python -m"
         # end itself by SIGINT in place of the exit code; running such code forgets it.
         exec("")  # noqa: S102
