@@ -15,6 +15,7 @@ import flipflow as ff
 from flipflow.cli.main import main
 from flipflow.continuation.branch import Branch
 from flipflow.io.project import Project
+from flipflow.model.monitor import Monitor
 from flipflow.paper.reproduce import Reproduction
 from flipflow.studies.assessment import Assessment, assess
 from kernels_ahead import compile_ahead
@@ -136,12 +137,14 @@ def thirty_cases(analysed: Callable[..., Assessment]) -> Assessment:
 
 @pytest.fixture(scope="module")
 def analysed_once(analysed: Callable[..., Assessment]) -> Iterator[None]:
-    """Commands and comparisons take analyses from ``analysed``: what they do with them counts."""
+    """Commands, comparisons and designs take analyses from ``analysed``, each made once."""
 
-    def known(project: Project, *, monitor: object = None, **options: object) -> Assessment:  # noqa: ARG001
+    def known(project: Project, *, monitor: Monitor | None = None, **options: object) -> Assessment:
+        if monitor is not None:
+            monitor("known already", 0.0)
         return analysed(project, **options)
 
     with pytest.MonkeyPatch.context() as patched:
-        for room in ("assessment", "compare"):
+        for room in ("assessment", "compare", "design"):
             patched.setattr(f"flipflow.studies.{room}.assess", known)
         yield
