@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import gc
 import pickle
+import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -15,7 +19,11 @@ import flipflow as ff
 from flipflow.cli.main import main
 from flipflow.continuation.branch import Branch
 from flipflow.io.project import Project
+from flipflow.model.monitor import Monitor
 from flipflow.paper.reproduce import Reproduction
+from flipflow.report.blocks import FigureBlock, Heading
+from flipflow.report.html import KIND, footer_of, page, title_of
+from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment, assess
 from kernels_ahead import compile_ahead
 
@@ -33,6 +41,12 @@ def pytest_configure() -> None:
     """A shell ignores Ctrl-C in what it runs in the background, and so would all that we start."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """The collector of garbage looks no more at modules and tests, which live to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -134,14 +148,56 @@ def thirty_cases(analysed: Callable[..., Assessment]) -> Assessment:
     return analysed(dataclasses.replace(ff.load_project("ffs0827"), load_cases=loads))
 
 
+@pytest.fixture(scope="session")
+def printed_page(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """``printed_page(assessment)``: the PDF that Chromium prints of a report, each once a session.
+
+    With ``begin`` the figures behind the results, which stand on later sheets than the second,
+    are left out: a browser needs most of its time for them.
+    """
+    known: dict[str, Path] = {}
+
+    def printed(assessment: Assessment, *, begin: bool = False) -> Path:
+        blocks = blocks_of(assessment)
+        if begin:
+            late = next(
+                k for k, one in enumerate(blocks)
+                if isinstance(one, Heading) and one.text == "Results"
+            )  # fmt: skip
+            rest = (one for one in blocks[late:] if not isinstance(one, FigureBlock))
+            blocks = (*blocks[:late], *rest)
+        text = page(blocks, title=title_of(assessment), kind=KIND, footer=footer_of(assessment))
+        if text not in known:
+            folder = tmp_path_factory.mktemp("printed")
+            (folder / "report.html").write_text(text, encoding="utf-8")
+            known[text] = _print(folder / "report.html")
+        return known[text]
+
+    return printed
+
+
+def _print(report: Path) -> Path:
+    """A page as Chromium prints it."""
+    sheet = report.with_suffix(".pdf")
+    subprocess.run(
+        [shutil.which("chromium"), "--headless", "--no-sandbox", "--disable-gpu",
+         "--virtual-time-budget=20000", f"--user-data-dir={report.with_name('profile')}",
+         "--no-pdf-header-footer", f"--print-to-pdf={sheet}", report.as_uri()],
+        capture_output=True, timeout=900, check=True,
+    )  # fmt: skip
+    return sheet
+
+
 @pytest.fixture(scope="module")
 def analysed_once(analysed: Callable[..., Assessment]) -> Iterator[None]:
-    """Commands and comparisons take analyses from ``analysed``: what they do with them counts."""
+    """Commands, comparisons and designs take analyses from ``analysed``, each made once."""
 
-    def known(project: Project, *, monitor: object = None, **options: object) -> Assessment:  # noqa: ARG001
+    def known(project: Project, *, monitor: Monitor | None = None, **options: object) -> Assessment:
+        if monitor is not None:
+            monitor("known already", 0.0)
         return analysed(project, **options)
 
     with pytest.MonkeyPatch.context() as patched:
-        for room in ("assessment", "compare"):
+        for room in ("assessment", "compare", "design"):
             patched.setattr(f"flipflow.studies.{room}.assess", known)
         yield

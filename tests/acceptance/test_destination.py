@@ -281,7 +281,7 @@ def test_ctrl_c_in_a_reproduction_keeps_the_figures_that_are_finished(
         return run(screen, names)
 
     monkeypatch.setattr("flipflow.paper.reproduce.reproduce", interrupted)
-    code, out, err = command("reproduce", "3", "4", "5", "-o", "out", "--json", "c.json")
+    code, out, err = command("reproduce", "2c", "4", "5", "-o", "out", "--json", "c.json")
     assert code == 130
     assert err == "Stopped by the user; what was finished is in out and c.json.\n"
     assert "and 2 figures as HTML, SVG and PDF" in out

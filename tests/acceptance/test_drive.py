@@ -350,7 +350,7 @@ def test_fault_3_within_the_allowed_range_asks_for_attention(tmp_path, ratio):
 
 
 def test_fault_4_a_start_above_the_running_limit_is_said(tmp_path):
-    text = template()
+    text = machine(tmp_path).read_text(encoding="utf-8")
     cut = text[: text.index("# What it may do while it starts")]
     rest = text[text.index("# Loads and weather") :]
     path = tmp_path / "bare.toml"
@@ -457,7 +457,7 @@ def test_fault_8_without_the_normal_spring_it_is_said(monkeypatch, capsys, tmp_p
 
 
 def test_an_assumed_drive_that_fails_asks_for_attention(tmp_path):
-    text = template()
+    text = machine(tmp_path).read_text(encoding="utf-8")
     section = text[text.index("[drive]") : text.index("# What the machine may do;")]
     path = tmp_path / "part.toml"
     path.write_text(text.replace(section, '[drive]\nrated_power = "1 kW"\n\n'), encoding="utf-8")
@@ -503,7 +503,7 @@ def test_the_document_of_a_start_carries_the_machine_s_name(monkeypatch, capsys,
 
 
 def test_simulate_tells_start_and_blow_apart(monkeypatch, capsys):
-    words = ("simulate", "ffs0827", "--periods", 60, "--impulse", "3 s: main 300")
+    words = ("simulate", "ffs0827", "--periods", 25, "--impulse", "1.5 s: main 300")
     _, out, _ = command(monkeypatch, capsys, *words)
     assert "start, greatest" in out
     assert "blow, greatest" in out

@@ -42,10 +42,10 @@ def variant(machine, columns, row):
 @pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
 def test_a_lane_ends_on_what_a_machine_settles_on_that_is_brought_up_slowly(screen, law):
     machine = screen.replace(stop_law=law)
-    columns = drawn(machine, FIELDS, 12, 0.6, seed=3)
+    columns = drawn(machine, FIELDS, 6, 0.6, seed=3)
     found, why = values(machine, columns, "relative_amplitude", np.array([100.0, 160.0, 200.0]))
     assert (why == FOUND).mean() > 0.9
-    for row in range(12):
+    for row in range(6):
         alone = variant(machine, columns, row)
         up = ff.sweep(alone, omega=np.linspace(30.0, 200.0, 171)).amplitude("relative")
         for k, at in enumerate((70, 130, 170)):
@@ -187,11 +187,11 @@ class Chain:
 
 
 def test_any_machine_with_a_system_of_its_own():
-    columns = {"gap": np.linspace(0.8, 1.2, 9), "stiffness": np.linspace(4.0, 8.0, 9)}
+    columns = {"gap": np.linspace(0.8, 1.2, 5), "stiffness": np.linspace(4.0, 8.0, 5)}
     omega = np.array([0.4, 1.5])
     found, why = values(Chain(), columns, "amplitude[0]", omega)
     assert (why == FOUND).mean() > 0.5
-    for row in range(9):
+    for row in range(5):
         alone = Chain(float(columns["gap"][row]), float(columns["stiffness"][row]))
         up = ff.sweep(alone, omega=np.linspace(0.1, 1.5, 141)).amplitude(0)
         for k, at in enumerate((30, 140)):

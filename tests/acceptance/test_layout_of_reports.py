@@ -17,7 +17,6 @@ from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.plotly import described
 from flipflow.plotting.response import case_names, cases_figure
 from flipflow.report.blocks import FigureBlock, Heading, Note, Table, Text
-from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess
 
@@ -48,16 +47,8 @@ def figures_of(assessment):
     return [b.figure for b in blocks_of(assessment) if isinstance(b, FigureBlock)]
 
 
-def printed_pages(assessment, folder):
-    """The text of each page of the report as a browser prints it."""
-    report, sheet = folder / "report.html", folder / "report.pdf"
-    report.write_text(html(assessment), encoding="utf-8")
-    subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000",
-         f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer",
-         f"--print-to-pdf={sheet}", report.as_uri()],
-        capture_output=True, timeout=900, check=True,
-    )  # fmt: skip
+def texts(sheet):
+    """The text of each page."""
     text = subprocess.run([READER, "-layout", sheet, "-"], capture_output=True, check=True).stdout
     return text.decode().split("\f")[:-1]
 
@@ -124,8 +115,8 @@ def test_values_without_a_source_are_one_line(project):
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None or READER is None, reason="chromium or pdftotext is missing")
-def test_thirty_cases_stand_on_fewer_than_thirty_pages(thirty_cases, tmp_path):
-    pages = printed_pages(thirty_cases, tmp_path)
+def test_thirty_cases_stand_on_fewer_than_thirty_pages(thirty_cases, printed_page):
+    pages = texts(printed_page(thirty_cases))
     assert len(pages) < 30
     for page in pages[:-1]:
         assert len(page.split()) > 40
@@ -135,10 +126,13 @@ def test_thirty_cases_stand_on_fewer_than_thirty_pages(thirty_cases, tmp_path):
 @pytest.mark.skipif(CHROMIUM is None or READER is None, reason="chromium or pdftotext is missing")
 @pytest.mark.parametrize("count", [1, 4])
 @pytest.mark.parametrize("name", ["FFS0827", "Spannwellensiebmaschine für Rostasche, " + LONG])
-def test_a_long_title_block_leaves_no_page_of_five_lines(project, analysed, tmp_path, count, name):
+def test_a_long_title_block_leaves_no_page_of_five_lines(
+    project, analysed, printed_page, count, name
+):
     document = dataclasses.replace(project.document, customer=CUSTOMER, name=name)
     found = analysed(dataclasses.replace(project, load_cases=project.load_cases[:count]))
     changed = dataclasses.replace(found.project, document=document)
-    _, second, *_ = printed_pages(dataclasses.replace(found, project=changed), tmp_path)
+    changed = dataclasses.replace(found, project=changed)
+    _, second, *_ = texts(printed_page(changed, begin=True))
     assert len(second.split()) > 150
     assert "Model limits" in second

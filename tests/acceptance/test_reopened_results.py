@@ -94,7 +94,7 @@ def proposed() -> Proposal:
     project = ff.load_project("ffs0827")
     return ff.design(
         ff.Duty(
-            project=dataclasses.replace(project, load_cases=project.load_cases[:2]),
+            project=dataclasses.replace(project, load_cases=project.load_cases[:1]),
             target=7e-3,
             tolerance=2e-3,
             speed=(83.8, 83.8),

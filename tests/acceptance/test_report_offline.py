@@ -91,15 +91,13 @@ def test_nothing_is_asked_for(opened):
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils is not installed")
 @pytest.mark.parametrize("count", [1, 4, 8])
-def test_the_first_page_is_one_page(analysed, tmp_path, count):
+def test_the_first_page_is_one_page(analysed, printed_page, count):
     """Printed on A4, page 1 ends with its last line however many load cases there are."""
     project = ff.load_project("ffs0827")
     more = (ff.Load(name=f"half full {k}", stiffness_factor=1.0 + 0.01 * k) for k in range(16))
     loads = (*project.load_cases, *more)[:count]
-    report = tmp_path / "report.html"
     assessed = analysed(dataclasses.replace(project, load_cases=loads))
-    report.write_text(html(assessed), encoding="utf-8")
-    first, second = (" ".join(page.split()) for page in pages(report, tmp_path)[:2])
+    first, second = first_two(printed_page(assessed, begin=count != 4))
     assert "Power, throw dissipated power" in first
     assert second.startswith("The machine" if count <= 4 else "Load cases and notes")
     assert all(load.name in (first if count <= 4 else second) for load in loads)
@@ -107,14 +105,13 @@ def test_the_first_page_is_one_page(analysed, tmp_path, count):
 
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="poppler-utils is not installed")
 @pytest.mark.parametrize("machine", ["ffs0827", "ffs0827-linear", "rig-lin2024"])
-def test_printed_pages_are_filled(analysed, tmp_path, machine):
+def test_printed_pages_are_filled(analysed, printed_page, machine):
     """A figure that does not fit leaves a hole, but no page ends in its upper part."""
-    report = tmp_path / "report.html"
-    report.write_text(html(analysed(machine)), encoding="utf-8")
-    ends = [lowest(page) for page in printed(report, tmp_path, "-bbox").split("</page>")[:-1]]
+    sheet = printed_page(analysed(machine))
+    ends = [lowest(page) for page in read(sheet, "-bbox").split("</page>")[:-1]]
     assert len(ends) > 5
     assert min(ends[:-1]) > FILLED, ends
-    first, second = (" ".join(page.split()) for page in pages(report, tmp_path)[:2])
+    first, second = first_two(sheet)
     assert "Into the ground" in first
     assert "Load case amplitude" in first or second.startswith("Load cases and notes")
 
@@ -126,19 +123,13 @@ def lowest(page):
     return max(foot for foot in feet if foot < FOOTER)
 
 
-def pages(report, folder):
-    """Text of each page as Chromium prints it."""
-    return printed(report, folder, "-layout").split("\f")
+def first_two(sheet):
+    """Text of the first two pages."""
+    return (" ".join(page.split()) for page in read(sheet, "-layout").split("\f")[:2])
 
 
-def printed(report, folder, form):
-    """What pdftotext reads from the report as Chromium prints it."""
-    sheet = folder / "report.pdf"
-    subprocess.run(
-        [CHROMIUM, *QUIET, f"--user-data-dir={folder / 'profile'}", "--no-pdf-header-footer",
-         f"--print-to-pdf={sheet}", report.as_uri()],
-        capture_output=True, timeout=120, check=True,
-    )  # fmt: skip
+def read(sheet, form):
+    """What pdftotext reads."""
     text = subprocess.run(
         [shutil.which("pdftotext"), form, sheet, "-"],
         capture_output=True, text=True, timeout=60, check=True,

@@ -18,6 +18,7 @@ import flipflow as ff
 
 GRAVITY = 9.80665
 CREEP = 0.1  # rad/s, below which the constant friction fades
+STEP, ROWS = 5e-4, 4  # s, longest step; rows of each, so that no peak falls between two
 Real = NDArray[np.float64]
 
 
@@ -57,7 +58,7 @@ def run(
     k3, c3, gap = screen.stop_stiffness, screen.stop_damping, screen.clearance
     alpha = screen.deck_angle
 
-    def stop_force(side: int, s: Real) -> float:
+    def stop_force(side: int, s: Real) -> Real | int:
         return side and k3 * (s[0] - s[1] - side * gap) + c3 * (s[4] - s[5])
 
     def rate(t: float, s: Real, side: int) -> list[float]:
@@ -93,11 +94,13 @@ def run(
         while t < end:
             found = solve_ivp(
                 rate, (t, end), s, "DOP853", args=(side,), rtol=1e-10, atol=1e-12,
-                events=(crossing, slow), max_step=2e-4,
+                events=(crossing, slow), max_step=STEP, dense_output=True,
             )  # fmt: skip
-            rows = found.y.T
-            parts.append((found.t, rows, np.array([stop_force(side, row) for row in rows])))
-            t, s = float(found.t[-1]), rows[-1]
+            steps = np.arange(found.t.size)
+            times = np.interp(np.linspace(0.0, steps[-1], ROWS * steps[-1] + 1), steps, found.t)
+            rows = found.sol(times).T
+            parts.append((times, rows, np.broadcast_to(stop_force(side, rows.T), times.shape)))
+            t, s = float(found.t[-1]), found.y[:, -1]
             if found.t_events[1].size:
                 return Start(*(np.concatenate(each) for each in zip(*parts, strict=True)))
             if found.t_events[0].size:

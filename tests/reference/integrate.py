@@ -145,7 +145,11 @@ class Trajectory:
     def __call__(self, t: np.ndarray) -> np.ndarray:
         """States (n, 2 N) at times t."""
         owner = np.minimum(np.searchsorted(self.ends, t), self.ends.size - 1)
-        return np.array([self.pieces[p](time) for p, time in zip(owner, t, strict=True)])
+        found = np.empty((len(t), self.final.size))
+        for piece in np.unique(owner):
+            own = owner == piece
+            found[own] = self.pieces[piece](t[own]).T
+        return found
 
 
 def flow(
@@ -248,10 +252,18 @@ def right_side(
     A[:n, n:] = np.eye(n)
     A[n:, :n], A[n:, n:], b[n:] = -inverse @ K, -inverse @ C, inverse @ constant
     forces, speeds = machine.forces(omega)
-    F, turning = np.hstack([np.zeros_like(forces), forces @ inverse.T]), 1j * speeds
+    F = np.hstack([np.zeros_like(forces), forces @ inverse.T]).T
+    # One product: (A, b, Re F, -Im F) times (z, 1, cos w t, sin w t).
+    whole = np.hstack([A, b[:, None], F.real, -F.imag])
+    basis = np.ones(whole.shape[1])
+    own, cosines, sines = basis[: 2 * n], *np.split(basis[2 * n + 1 :], 2)
 
     def rate(t: float, z: np.ndarray) -> np.ndarray:
-        return A @ z + b + (np.exp(turning * t) @ F).real
+        own[:] = z
+        angles = speeds * t
+        np.cos(angles, out=cosines)
+        np.sin(angles, out=sines)
+        return whole @ basis
 
     return rate
 

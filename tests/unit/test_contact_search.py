@@ -232,8 +232,8 @@ def test_every_piece_is_the_one_that_the_force_is_in(law: str, damping: float) -
         changes = [(0.0, OPEN), *walked(m, c, OPEN, 10.0), (10.0, OPEN)]
         for (begin, regime), (end, _) in itertools.pairwise(changes):
             met.add(regime)
-            for t in np.linspace(begin, end, 9)[1:-1]:
-                y, v = (float(sampled(m, np.array([t]), order)[0]) for order in (0, 1))
+            times = np.linspace(begin, end, 9)[1:-1]
+            for t, y, v in zip(times, *(sampled(m, times, order) for order in (0, 1)), strict=True):
                 side = 1 if y > 0.3 else -1 if y < -0.5 else 0
                 p = y - 0.3 if side > 0 else -0.5 - y
                 expected = formula(p, damping * side * v) if side else 0.0
