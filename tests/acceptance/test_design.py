@@ -95,7 +95,7 @@ def test_a_grid_finds_nothing_better_by_more_than_its_step():
 
 
 def test_the_same_seed_gives_the_same_machine_and_another_one_as_good():
-    """Must show 2: two seeds agree within 2 % of the band."""
+    """Must show 2: two seeds agree; within 2 % of the band is what was asked for."""
 
     def unproved(sentence: str, share: float) -> None:  # noqa: ARG001
         if "proving" in sentence:
@@ -103,7 +103,7 @@ def test_the_same_seed_gives_the_same_machine_and_another_one_as_good():
 
     same(ff.design(duty(), generations=3), after_three())
     other = ff.design(duty(seed=2), generations=10, monitor=unproved)
-    close("band of another seed", other.chosen.band, proposed().chosen.band, rel=0.02)
+    close("band of another seed", other.chosen.band, proposed().chosen.band, rel=0.005)
 
 
 IMPOSSIBLE_DUTY = """

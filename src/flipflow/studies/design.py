@@ -35,6 +35,7 @@ from flipflow.studies.design_search import (
     by_preference,
     polish,
     search,
+    tightened,
 )
 from flipflow.studies.design_store import search_store
 from flipflow.studies.tolerance import confidence_interval
@@ -416,6 +417,10 @@ def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polish
                 best, low = middle, 0.5 * (low + high)
             else:
                 high = 0.5 * (low + high)
+        if best.judged.fits[0]:
+            tell = _told(monitor, "polishing", POLISHED, POLISHED)
+            tight = tightened(space, best.u, polished.u, tell)
+            best = replace(best, u=tight, judged=space.judge(tight[None], margins=space.duty.loads))
     if best.judged.fits[0] and not np.array_equal(best.u, u):
         yield _rounded(space, best)
     yield _rounded(space, best if np.array_equal(best.u, u) else on_the_way(0.0))

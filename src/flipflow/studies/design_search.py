@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,10 @@ GENERATIONS = 60
 TOGETHER = 8  # candidates that a worker judges at once
 CLOSE = 0.1  # share by which a candidate may be worse in what comes first, for what comes next
 STEP = 1e-4  # of a share, for central differences: lanes are exact, their error is its square
+STRIDES = (0.05, 0.02, 0.008, 0.003, 0.0012)  # of a compass search, in shares of what is free
+LOOKS = 8  # rounds with one stride
+NEARER = 20.0  # strides by which it looks towards its goal, as a share of the way, at most all
+BETTER = 1e-5  # share by which a band must be smaller to be better
 ROUNDS = 40
 ACTIVE = 1e-3  # excess above which a limit that is met binds
 HUGE = 1e3  # stands for infinity in the search
@@ -332,6 +337,37 @@ def _least_band(around: _Around, tell: Tell | None) -> tuple[Real, Judged]:
     ends = np.array([A.min(), A.max()])
     x = _solved(around, ends, sides, np.zeros(sides.shape[0]), np.array([-1.0, 1.0]), tell)
     return _better(around, x, lambda judged: float(judged.band[0]))
+
+
+def tightened(space: Space, u: Real, goal: Real, tell: Tell | None = None) -> Real:
+    """A candidate that fits with a smaller band, where the goal of its polish does not fit.
+
+    What ends the way to the goal, another motion or a jump, has no slopes: a compass search looks
+    along single shares, pairs of them, and towards the goal, at candidates that still fit.
+    """
+    moves = _compass(_moving(space), u.size)
+    band = float(space.judge(u[None], margins=space.duty.loads).band[0])
+    for k, stride in enumerate(STRIDES):
+        if tell is not None:
+            tell(k / len(STRIDES))
+        for _ in range(LOOKS):
+            rows = np.vstack([u + stride * moves, u + min(1.0, NEARER * stride) * (goal - u)])
+            rows = rows.clip(0.0, 1.0)
+            judged = space.judge(rows, margins=space.duty.loads)
+            bands = np.where(judged.fits, judged.band, np.inf)
+            best = int(np.argmin(bands))
+            if not bands[best] < band * (1.0 - BETTER):
+                break
+            u, band = rows[best], float(bands[best])
+    return u
+
+
+def _compass(moving: NDArray[np.int64], size: int) -> Real:
+    """Directions: up and down in single shares of what moves, and in pairs of them."""
+    single = np.eye(size)[moving]
+    pairs = [a + side * b for a, b in combinations(single, 2) for side in (1.0, -1.0)]
+    both = np.array([*single, *pairs]).reshape(-1, size)
+    return np.concatenate([both, -both])
 
 
 def _least_excess(around: _Around, tell: Tell | None) -> tuple[Real, Judged]:
