@@ -12,6 +12,7 @@ import flipflow as ff
 from flipflow.errors import InputError
 from flipflow.model.parameters import with_values
 from flipflow.studies.sensitivity_samples import motion_values, question_of
+from flipflow.studies.worst_case import Search
 
 pytestmark = pytest.mark.numerical
 
@@ -45,6 +46,48 @@ def test_a_resonance_inside_the_interval():
     np.testing.assert_allclose(found.least, 0.4 / np.hypot(far, 0.12 * omega), rtol=1e-12)
     np.testing.assert_allclose(found.greatest_at[:, 0], k, atol=2e-3)
     np.testing.assert_allclose(found.nominal, 0.5 / np.hypot(1.0 - omega**2, 0.1 * omega))
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.005, 0.001])
+def test_a_narrow_resonance_inside_the_interval(damping):
+    """Steps are halved as long as that gains something; the error says what may be missing."""
+    found = ff.worst_case(
+        Oscillator(damping=damping), {"stiffness": (0.8, 1.25)}, "amplitude[0]", 0.97
+    )
+    exact = 0.5 / (damping * 0.97)
+    assert found.greatest[0] == pytest.approx(exact, rel=1e-4)
+    assert exact - found.greatest[0] <= found.error[0]
+
+
+def test_it_begins_at_the_corners_that_single_parameters_point_to():
+    """One look at the machine and at both ends of each, one at the corners."""
+    machine, vary = Oscillator(), {"stiffness": (0.9, 1.1), "damping": (0.08, 0.12)}
+    question = question_of(machine, "amplitude[0]", [0.3, 1.8], "from-below")
+    search = Search(question, tuple(vary), np.array(list(vary.values())), 1, lambda *_: None)
+    search.look(np.array([[0.5, 0.5], [0.0, 0.5], [1.0, 0.5], [0.5, 0.0], [0.5, 1.0]]))
+    corners = np.array(list(search.corners())).tolist()
+    # Below the resonance a stiff spring moves least, above it a soft one.
+    assert corners == [[1.0, 1.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]
+
+
+def test_ends_are_the_ends_to_the_last_bit():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        low, high = rng.uniform(0.05, 0.1), rng.uniform(0.11, 0.2)
+        found = ff.worst_case(Oscillator(), {"damping": (low, high)}, "amplitude[0]", 1.0)
+        assert found.machine_at("least").damping == high
+        assert found.machine_at("greatest").damping == low
+        assert found.places("least")[0, 0] == 1.0
+
+
+def test_a_machine_outside_the_box_is_told(screen):
+    found = ff.worst_case(screen, {"clearance": (6.1e-3, 6.3e-3)}, "stroke", [80.0, 85.0])
+    assert "the machine itself lies outside the interval of clearance" in found.notes
+
+
+def test_one_speed_twice(screen):
+    found = ff.worst_case(screen, {"clearance": (5e-3, 6e-3)}, "stroke", [85.0, 85.0])
+    assert found.least[0] == found.least[1]
 
 
 @pytest.mark.parametrize("branch", ["from-below", "upper", "lower"])
@@ -122,9 +165,25 @@ def test_a_parameter_without_effect_stays(screen):
 def test_what_has_no_value_is_told(screen):
     """Where gaps are wide there is no jump."""
     found = ff.worst_case(screen, {"clearance": (5e-3, 60e-3)}, "omega_lb", (60.0, 250.0))
-    assert found.notes
-    assert "have no value" in found.notes[0]
+    (note,) = found.notes
+    assert note.startswith("not every machine in the box has such a value: ")
     assert np.isfinite(found.greatest).all()
+
+
+@pytest.mark.parametrize(
+    ("quantity", "gaps"), [("omega_lb", (40e-3, 60e-3)), ("jump_margin", (5e-3, 60e-3))]
+)
+def test_what_is_not_known_or_infinite_is_drawn_and_told(screen, quantity, gaps, tmp_path):
+    omega = 120.0 if quantity == "jump_margin" else (60.0, 250.0)
+    found = ff.worst_case(screen, {"clearance": gaps}, quantity, omega)
+    if quantity == "jump_margin":
+        assert found.greatest[0] == np.inf
+        assert 0.0 <= found.least[0] < 1.0
+    else:
+        assert np.isnan(found.greatest[0])
+        assert "no machine that was looked at has a value of omega_lb" in found.notes
+    ff.figure(found).write(tmp_path / "found.svg")
+    assert found._repr_html_()
 
 
 @pytest.mark.parametrize(

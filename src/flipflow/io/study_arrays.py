@@ -90,9 +90,15 @@ def worst_case_arrays(found: WorstCase) -> Arrays:
     return Arrays(
         f"Worst case of {one.label}",
         "frequency",
-        {"omega": column("frequency", found.omega, "rad/s")},
+        {
+            "omega": column("frequency", found.omega, "rad/s"),
+            "field": column("field", np.array(found.names, str)),
+            "end": column("end", np.array(["low", "high"])),
+        },
         {
             **{name: column("frequency", value, one.unit) for name, value in values.items()},
+            "error": column("frequency", found.error, one.unit),
+            "interval": Variable(("field", "end"), found.intervals),
             **{
                 f"{end}_{name}": column("frequency", at[:, j], unit_of(found.machine, name))
                 for end, at in places.items()
@@ -102,6 +108,7 @@ def worst_case_arrays(found: WorstCase) -> Arrays:
         {
             "flipflow_version": found.version,
             "quantity": found.quantity,
+            "span": f"{found.span[0]:.6g} to {found.span[1]:.6g} rad/s",
             "branch": found.branch,
             "looked_at": found.looked_at,
         },

@@ -209,8 +209,8 @@ def workings(
     omega = question.omega.tolist()
     below = question.branch == "from-below"
     narrow = below and not question.quantity.of_folds
-    if response is None and narrow and len(omega) == 1:
-        yield _reached(machine, omega[0])
+    if response is None and narrow and len(set(omega)) == 1:
+        yield from [_reached(machine, omega[0])] * len(omega)
         return
     if response is None:
         response = Response(machine, (min(omega), max(omega)) if narrow else question.span)
