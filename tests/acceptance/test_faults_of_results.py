@@ -446,8 +446,14 @@ def test_a_file_with_a_number_beyond_all_machines_is_refused(name, tmp_path):
     document = json.loads(path.read_text())
     document[name] = 1e200 if name == "omega" else [[1e200, 0.0], [0.0, 1.0]]
     path.write_text(json.dumps(document))
-    with pytest.raises(StoreError, match=rf"{name}: no machine has a number beyond 1e\+150"):
+    with pytest.raises(StoreError, match=rf"{name}: no result has a number beyond 1e\+150"):
         ff.open_result(path)
+
+
+def test_a_motion_that_grows_ends_before_what_no_file_holds():
+    machine = ff.MechanicalSystem([[1.0]], [[-3.0]], [[1.0]], [], ff.HarmonicForce([1.0]))
+    with pytest.raises(IncompleteError, match="grows beyond all numbers"):
+        ff.simulate(machine, 0.9, 30)
 
 
 def test_a_history_is_of_finite_numbers():

@@ -94,6 +94,32 @@ def test_an_interrupt_waits_for_the_chunk_that_is_written(tmp_path, monkeypatch)
     assert words == ["finished", *["missing"] * (len(words) - 1)]
 
 
+def test_an_answer_that_raises_leaves_the_others_in_place(tmp_path, monkeypatch):
+    """SIGTERM of a host program that ends it by an exception of its own."""
+    written, answers = (
+        chunk_store.write_file,
+        [signal.getsignal(one) for one in chunk_store.SIGNALS],
+    )
+
+    def terminated(path, *words):
+        if path.parent.name == "relative_amplitude":
+            signal.raise_signal(signal.SIGTERM)
+        written(path, *words)
+
+    def answer(_number, _frame):
+        raise Stop
+
+    monkeypatch.setattr(chunk_store, "write_file", terminated)
+    before = signal.signal(signal.SIGTERM, answer)
+    try:
+        with pytest.raises(Stop):
+            study(tmp_path / "study.zarr")
+        assert signal.getsignal(signal.SIGINT) is answers[0]
+        assert signal.getsignal(signal.SIGTERM) is answer
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def test_xarray_opens_it_by_itself(whole):
     xarray = pytest.importorskip("xarray")
     with xarray.open_zarr(whole, consolidated=False) as data:

@@ -18,7 +18,7 @@ import signal
 import threading
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -51,19 +51,21 @@ def _undisturbed() -> Iterator[None]:
         yield
         return
     came: list[int] = []
-    kept = {one: signal.getsignal(one) for one in SIGNALS}
-    # What no Python code has set cannot be set again.
-    held = {one: answer for one, answer in kept.items() if answer is not None}
-    for one in held:
-        signal.signal(one, lambda number, _frame: came.append(number))
-    try:
-        yield
-    finally:
-        # The answer to SIGTERM may be that to SIGINT, which is therefore the last to return.
-        for one in reversed(held):
-            signal.signal(one, held[one])
+
+    def answer_late() -> None:
         for number in dict.fromkeys(came):
             signal.raise_signal(number)
+
+    # Whatever an answer raises, all of them return; that to SIGTERM may be that to SIGINT, which is
+    # therefore the last.
+    with ExitStack() as after:
+        after.callback(answer_late)
+        for one in SIGNALS:
+            answer = signal.getsignal(one)
+            if answer is not None:  # what no Python code has set cannot be set again
+                after.callback(signal.signal, one, answer)
+                signal.signal(one, lambda number, _frame: came.append(number))
+        yield
 
 
 @dataclass(frozen=True, eq=False)

@@ -99,14 +99,20 @@ def _never_lost() -> Iterator[None]:
         later.start()
 
     sys.unraisablehook = again
+    code: object = None
     try:
         try:
             yield
+        except SystemExit as ended:
+            code = ended.code
+            raise
         finally:
             for later in waiting:
                 later.cancel()
+            for later in waiting:
                 later.join()
-            if dropped.is_set():
+            # An error has its own code, and keeps it.
+            if dropped.is_set() and not code:
                 raise KeyboardInterrupt
     except KeyboardInterrupt:
         _say_stopped("it had come to its end")

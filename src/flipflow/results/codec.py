@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.errors import StoreError
-from flipflow.model.arguments import LARGEST, TOO_LARGE
+from flipflow.model.arguments import LARGEST
 
 Json = Any
+BEYOND = f"no result has a number beyond {LARGEST:g}"
 MOST_WHOLE = 2**63  # what is larger is no count, index or seed
 
 
@@ -148,7 +149,7 @@ def array(values: Json, dtype: type = float) -> NDArray[Any]:
 def _within_all(values: NDArray[Any]) -> NDArray[Any]:
     """The numbers, of which none is finite and beyond all that is worked with."""
     if values.dtype.kind == "f" and (np.isfinite(values) & (np.abs(values) > LARGEST)).any():
-        raise ValueError(TOO_LARGE)
+        raise ValueError(BEYOND)
     return values
 
 
@@ -165,7 +166,7 @@ def fields_of(kind: Any) -> dict[str, bool]:
 
 
 def _spelt_out(kind: Any) -> Any:
-    """A type in place of a name that a ``type`` statement gave it, as numpy's for arrays."""
+    """A type in place of a ``type`` with parameters, as numpy's for arrays."""
     meant = getattr(get_origin(kind), "__value__", None)
     return kind if meant is None else meant[get_args(kind)]
 
@@ -221,7 +222,7 @@ def _number(document: Json) -> float:
     if document in ("inf", "-inf"):
         return float(document)
     if LARGEST < abs(float(_real(document))) < math.inf:  # a whole number may not fit at all
-        raise ValueError(TOO_LARGE)
+        raise ValueError(BEYOND)
     return document  # type: ignore[no-any-return]
 
 

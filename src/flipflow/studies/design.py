@@ -401,7 +401,7 @@ def _yield(space: Space, outcome: _Outcome) -> _Yield:
 
 
 def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polished]:
-    """A candidate after its polish, or as far on the way there as it fits; then as it was found."""
+    """A candidate as polished; else tightened, or halfway there, as far as it fits; as found."""
     polished = polish(space, u, _told(monitor, "polishing", SEARCHED, POLISHED))
 
     def on_the_way(share: float) -> Polished:
@@ -411,6 +411,7 @@ def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polish
 
     best, low, high = on_the_way(1.0), 0.0, 1.0
     if not best.judged.fits[0]:
+        best = on_the_way(0.0)
         for _ in range(HALVINGS):
             middle = on_the_way(0.5 * (low + high))
             if middle.judged.fits[0]:
@@ -419,8 +420,7 @@ def _versions(space: Space, u: Real, monitor: Monitor | None) -> Iterator[Polish
                 high = 0.5 * (low + high)
         if best.judged.fits[0]:
             tell = _told(monitor, "polishing", POLISHED, POLISHED)
-            tight = tightened(space, best.u, polished.u, tell)
-            best = replace(best, u=tight, judged=space.judge(tight[None], margins=space.duty.loads))
+            yield _rounded(space, tightened(space, best, polished.u, tell))
     if best.judged.fits[0] and not np.array_equal(best.u, u):
         yield _rounded(space, best)
     yield _rounded(space, best if np.array_equal(best.u, u) else on_the_way(0.0))

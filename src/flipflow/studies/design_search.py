@@ -339,27 +339,26 @@ def _least_band(around: _Around, tell: Tell | None) -> tuple[Real, Judged]:
     return _better(around, x, lambda judged: float(judged.band[0]))
 
 
-def tightened(space: Space, u: Real, goal: Real, tell: Tell | None = None) -> Real:
+def tightened(space: Space, found: Polished, goal: Real, tell: Tell | None = None) -> Polished:
     """A candidate that fits with a smaller band, where the goal of its polish does not fit.
 
     What ends the way to the goal, another motion or a jump, has no slopes: a compass search looks
     along single shares, pairs of them, and towards the goal, at candidates that still fit.
     """
-    moves = _compass(_moving(space), u.size)
-    band = float(space.judge(u[None], margins=space.duty.loads).band[0])
+    moves = _compass(_moving(space), found.u.size)
     for k, stride in enumerate(STRIDES):
         if tell is not None:
-            tell(k / len(STRIDES))
+            tell(k / len(STRIDES))  # it lets the user stop
         for _ in range(LOOKS):
-            rows = np.vstack([u + stride * moves, u + min(1.0, NEARER * stride) * (goal - u)])
-            rows = rows.clip(0.0, 1.0)
-            judged = space.judge(rows, margins=space.duty.loads)
+            nearer = found.u + min(1.0, NEARER * stride) * (goal - found.u)
+            rows = np.vstack([found.u + stride * moves, nearer]).clip(0.0, 1.0)
+            judged = space.around(found.u).judge(rows, margins=space.duty.loads)
             bands = np.where(judged.fits, judged.band, np.inf)
-            best = int(np.argmin(bands))
-            if not bands[best] < band * (1.0 - BETTER):
+            best = np.array([np.argmin(bands)])
+            if not bands[best[0]] < float(found.judged.band[0]) * (1.0 - BETTER):
                 break
-            u, band = rows[best], float(bands[best])
-    return u
+            found = Polished(rows[best[0]], _rows(judged, best), {})
+    return found
 
 
 def _compass(moving: NDArray[np.int64], size: int) -> Real:

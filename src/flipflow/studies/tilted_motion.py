@@ -448,7 +448,8 @@ class TiltedMotion:
         slope = values[k, -1].imag
         step = 1 if slope > 0.0 else -1
         other = (k + step) % t.size
-        if piece[other] != piece[k] or abs(other - k) > 1:
+        wrapped = other != k + step
+        if wrapped or piece[other] != piece[k]:
             # The same moment, beyond a change of contact or at the other end of the period.
             height, beyond = values[k, 0].real, values[other, 0].real
             if abs(beyond - height) > TIED * abs(height) or not values[other, -1].imag * step > 0.0:

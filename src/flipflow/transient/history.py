@@ -13,12 +13,12 @@ import numpy as np
 from flipflow import __version__
 from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.arguments import checked_index, checked_reals
+from flipflow.model.arguments import LARGEST, checked_index, checked_reals
 from flipflow.model.contact_law import WHOLE, force_in
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.results.result import Result
 
-FINITE = "give finite numbers, and nan where one is not known"
+FINITE = f"give finite numbers up to {LARGEST:g}, and nan where one is not known"
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class History(Result):
             if values is not None:
                 # A view, so that the owner of the data keeps an array it can write to.
                 kept = checked_reals(name, values, FINITE).view()
-                if np.isinf(kept).any():
+                if (np.abs(kept) > LARGEST).any():
                     raise InputError(name, values, FINITE)
                 kept.setflags(write=False)
                 object.__setattr__(self, name, kept)

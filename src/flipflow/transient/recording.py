@@ -12,6 +12,7 @@ from flipflow.compiled import status
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
+from flipflow.model.arguments import LARGEST
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 from flipflow.transient.sampling import PANEL, Budget, Changes, Table, sample_motion
@@ -134,7 +135,7 @@ class Recording:
         code, row = sample_motion(
             problem, work, omega, t, until, self.row, self.table, changes, budget
         )
-        if code != status.OK or not np.isfinite(work.flow.z).all():
+        if code != status.OK or not (np.abs(work.flow.z) < LARGEST).all():
             budget.work[:] = kept
             return None
         self.row = row
