@@ -38,7 +38,7 @@ COARSE = 6
 MISSING = 1e-4  # share of a value that may be missing for the search to end
 PATIENCE = 2  # steps in which an extreme must have grown for finer ones
 ROUNDS = 32  # with one step
-MORE = 1e-12  # share of a value by which another one must exceed it to be better
+TIED = 1e-9  # share of a value within which two are the same
 DIGITS = 12  # of shares of the ranges, to tell machines that were looked at
 
 
@@ -245,8 +245,8 @@ class Search:
 
     def run(self) -> None:
         """Look at the machine itself, at ends of single parameters, at corners, beside the best."""
-        alone = [self._moved(self.middle[None], side) for side in (-1.0, 1.0)]
-        self.look(np.concatenate([self.middle[None], *alone]))
+        self.look(self.middle[None])
+        self.look(np.concatenate([self._moved(self.middle[None], side) for side in (-1.0, 1.0)]))
         self.look(np.array(list(self.corners())))
         before = [self._extremes] * PATIENCE
         for k, step in enumerate(STEPS):
@@ -292,10 +292,16 @@ class Search:
         return np.asarray(np.where(u == self.middle, self.start, values))
 
     def _rows(self, sign: float) -> Int:
-        """The machine with the greatest value at each frequency, or the least one."""
+        """The machine with the greatest value at each frequency, or the least one.
+
+        Of those that are as good but for rounding it is the first that was looked at, so that what
+        makes no difference stays.
+        """
         height = sign * self.values
-        order = np.lexsort((-np.where(np.isnan(height), 0.0, height), np.isnan(height)), axis=0)
-        return np.asarray(order[0])
+        unknown = np.isnan(height)
+        top = np.where(unknown, -np.inf, height).max(axis=0)
+        near = top - np.where(np.isfinite(top), TIED * np.abs(top), 0.0)
+        return np.asarray(np.argmax(~unknown & (height >= near), axis=0))
 
     @property
     def _places(self) -> Int:
@@ -386,7 +392,7 @@ class Search:
         self.monitor(self._told, self._done)
 
 
-def _grown(before: Real, after: Real, share: float = MORE) -> Bool:
+def _grown(before: Real, after: Real, share: float = TIED) -> Bool:
     """Which extremes have grown by more than a share, or are known and were not."""
     known = np.isnan(before) & ~np.isnan(after)
     far = np.where(np.isfinite(before), share * np.abs(before), 0.0)
