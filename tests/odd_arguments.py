@@ -8,6 +8,7 @@ result of the type that is documented; anything else is a finding. Shared by
 from __future__ import annotations
 
 import atexit
+import contextlib
 import datetime as dt
 import itertools
 import math
@@ -538,7 +539,8 @@ def findings(call: Call, seed: int, draws: int | None) -> list[Finding]:
 def ending(call: Call, arguments: Mapping[str, object]) -> str:
     """How a call ended, where that is wrong; empty where it is right."""
     try:
-        with warnings.catch_warnings():
+        # An odd argument may be taken for the name of a file or a folder.
+        with contextlib.chdir(folder()), warnings.catch_warnings():
             warnings.simplefilter("error")
             result = call.function(**arguments)
     except FlipflowError as error:

@@ -109,6 +109,14 @@ def test_the_harness_sees_what_is_wrong():
     assert {f.ended for f in findings(wrong, SEED, 3)} == {"returned a str"}
 
 
+def test_what_a_call_writes_stands_in_a_folder_of_its_own(tmp_path, monkeypatch):
+    """A word may be taken for the name of a file."""
+    monkeypatch.chdir(tmp_path)
+    writing = Call("writing", lambda path: Path(path).touch(), {"path": "own"}, (type(None),))
+    list(findings(writing, SEED, None))
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("call", "told"),
     [

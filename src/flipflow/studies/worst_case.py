@@ -32,11 +32,10 @@ Bool = NDArray[np.bool_]
 End = Literal["least", "greatest"]
 SIGNS: dict[End, float] = {"least": -1.0, "greatest": 1.0}
 # Shares of the ranges by which one parameter is moved. The whole range comes first: most extremes
-# stand at a corner. What comes after the COARSE ones is for extremes that still grow.
+# stand at a corner. What comes after the COARSE ones is for extremes of which more may be missing.
 STEPS = tuple(0.5**k for k in range(21))
 COARSE = 6
 MISSING = 1e-4  # share of a value that may be missing for the search to end
-PATIENCE = 2  # steps in which an extreme must have grown for finer ones
 ROUNDS = 32  # with one step
 TIED = 1e-9  # share of a value within which two are the same
 DIGITS = 12  # of shares of the ranges, to tell machines that were looked at
@@ -248,18 +247,15 @@ class Search:
         self.look(self.middle[None])
         self.look(np.concatenate([self._moved(self.middle[None], side) for side in (-1.0, 1.0)]))
         self.look(np.array(list(self.corners())))
-        before = [self._extremes] * PATIENCE
         for k, step in enumerate(STEPS):
-            self._done = min(k / COARSE, 0.9)
+            self._done, before = min(k / COARSE, 0.9), self._extremes
             for _ in range(ROUNDS):
                 begun, best = self._extremes, self._best
                 sides = [self._moved(best, side * step) for side in (-1.0, 1.0)]
                 if not self.look(np.concatenate(sides)) or not _grown(begun, self._extremes).any():
                     break
-            before = [*before[1:], self._extremes]
             if k + 1 >= COARSE:
-                growing = _grown(before[0], before[-1], MISSING)
-                self._judge(step, growing[0] | growing[1])
+                self._judge(step, _grown(before, self._extremes, MISSING))
                 if not self.open.any():
                     break
         self.look(self._summits(step))
@@ -353,9 +349,9 @@ class Search:
         """
         missing, little = np.zeros(self.open.size), MISSING * self.size
         further = np.zeros(self.open.size, bool)
-        for _, k, _, top, a, b in self._beside(step):
+        for e, k, _, top, a, b in self._beside(step):
             smooth, level = 0.25 * (top - min(a, b)), top - max(a, b)
-            jump = level <= little[k] and not growing[k]
+            jump = level <= little[k] and not growing[e, k]
             missing[k] = max(missing[k], min(smooth, level) if jump else smooth)
             further[k] |= not jump and smooth > little[k]
         self.error = np.where(self.open, missing, self.error)
