@@ -103,7 +103,7 @@ def test_period_two_is_switched_to(doubled) -> None:
         doubled.orbits_at(fold + 1e-5)
 
 
-@pytest.mark.parametrize("omega", [0.742, 0.7545])
+@pytest.mark.parametrize("omega", [0.742, 0.748, 0.7545])
 def test_period_two_is_what_the_machine_does(chain, doubled, omega: float) -> None:
     """DOP853, 150 turns from the motion pushed by 1e-4: it comes back, after two turns not one."""
     orbit = doubled.orbits_at(omega)[0]

@@ -16,7 +16,7 @@ from flipflow.dynamics.contact_free import complex_amplitudes
 from judge import close
 
 pytestmark = pytest.mark.numerical
-SEED, MACHINES = 20261129, 80
+SEED, MACHINES = 20261129, 200
 SHIFTS = (math.pi / 6.0, math.pi / 3.0, 2.0, 4.0)
 
 
@@ -71,10 +71,10 @@ def test_the_public_state_stays_at_phase_zero() -> None:
         close("trace", orbit.monodromy.trace(), branch.multipliers[i].sum().real, rel=1e-6)
 
 
-@pytest.mark.parametrize("chunk", range(4))
+@pytest.mark.parametrize("chunk", range(8))
 def test_random_machines_to_the_end(chunk: int) -> None:
     """Chains with stops of any damping under both laws; benchmarks/paths.py draws anew."""
-    per = MACHINES // 4
+    per = MACHINES // 8
     for number in range(chunk * per, (chunk + 1) * per):
         machine, interval = draw()(SEED, number)
         branch = ff.frequency_response(machine, interval)
