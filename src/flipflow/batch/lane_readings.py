@@ -1,16 +1,10 @@
-r"""What is read off a lane's motion: extremes, harmonics, forces, peaks of vectors, mean squares.
+"""What is read off a lane's motion: extremes, harmonics, forces, peaks of vectors, mean squares.
 
-A peak is the greatest length over the turn of the vector
-
-.. math:: (c_0 x + c_1 \dot x + c_2 \ddot x + \mathrm{Re}\, A e^{i \omega t},\;
-    \mathrm{Re}\, B e^{i \omega t}),
-
-the second part of which stands for a direction in which the machine is linear.
+A peak is the greatest length of a vector of :mod:`flipflow.dynamics.pieces`, without b.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,19 +18,14 @@ from flipflow.dynamics.contact_search import (
     extremes,
     gap_state,
     integral_of_exponential,
-    modulus,
     new_gap_motion,
     prepare_search,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, segment_motion
 from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
+from flipflow.dynamics.pieces import longest
 from flipflow.periodic.readings import observe_record
-
-PER_RADIAN = 4.0  # samples of a vector's length per radian of its mean frequency
-REFINEMENTS = 40  # steps towards a summit; six are usual
-NEAR = 0.9  # share of the greatest half square below which a sample has no higher summit beside it
-CLOSE = 1e-6  # share of the distance of two samples; the length itself is then right to its square
 
 
 class Asked(NamedTuple):
@@ -221,57 +210,3 @@ def set_vector(
     motion.rate[count] = 1j * omega
     motion.amplitude[0, count], motion.amplitude[1, count] = along * turn, across * turn
     return int(count) + 1
-
-
-@kernel
-def length_at(motion: GapMotion, count: int, t: float) -> tuple[float, float]:
-    """Half the square of the vector's length at a time, and its rate."""
-    exponentials(motion, count, t)
-    along, along_rate = gap_state(motion, count, 0)
-    across, across_rate = gap_state(motion, count, 1)
-    half_square = 0.5 * (along * along + across * across)
-    return half_square, along * along_rate + across * across_rate
-
-
-@kernel
-def longest(motion: GapMotion, count: int, duration: float) -> float:
-    """Greatest length of the vector over [0, duration], of all samples and the summit beside."""
-    weight, second = 0.0, 0.0
-    for i in range(count):
-        size = modulus(motion.amplitude[0, i]) + modulus(motion.amplitude[1, i])
-        weight += size
-        second += size * (motion.rate[i].real ** 2 + motion.rate[i].imag ** 2)
-    samples = 4
-    if weight > 0.0:
-        samples += int(PER_RADIAN * math.sqrt(second / weight) * duration)
-    best, before, rate_before = 0.0, 0.0, 0.0
-    for k in range(samples + 1):
-        t = duration * k / samples
-        value, rate = length_at(motion, count, t)
-        if rate_before > 0.0 and rate < 0.0 and max(value, before) > NEAR * best:
-            top = summit(motion, count, t - duration / samples, t, rate_before, rate)
-            best = max(best, top)
-        best = max(best, value)
-        before, rate_before = value, rate
-    return math.sqrt(2.0 * best)
-
-
-@kernel
-def summit(
-    motion: GapMotion, count: int, a: float, b: float, rate_a: float, rate_b: float
-) -> float:
-    """The half square where its rate is zero between two times, by false position (Illinois)."""
-    value, width = 0.0, b - a
-    for _ in range(REFINEMENTS):
-        t = (a * rate_b - b * rate_a) / (rate_b - rate_a)
-        value, rate = length_at(motion, count, t)
-        if rate == 0.0 or abs(b - a) < CLOSE * width:
-            break
-        if rate * rate_b < 0.0:
-            a, rate_a = b, rate_b
-        else:
-            rate_a *= 0.5
-        if abs(t - b) < CLOSE * width:
-            break
-        b, rate_b = t, rate
-    return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import atexit
 import errno
 import gc
 import io
@@ -26,6 +27,8 @@ def main() -> None:
     sys.stderr = sys.stderr or Closed()
     # At the usual pace a fourteenth of an analysis goes into looking for garbage that is not there.
     gc.set_threshold(OBJECTS, 50, 50)
+    # Nor is there any at the end, where Python takes a tenth of an analysis to look once more.
+    atexit.register(gc.freeze)
     with _stopped_at_once():
         # Loading the commands takes a moment, in which libraries would answer Ctrl-C themselves.
         from flipflow.cli.app import run  # noqa: PLC0415

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.compiled.arrays import Int, Real
-from flipflow.dynamics.motion import ContactInterval, Motion, states_on
+from flipflow.dynamics.motion import ContactInterval, Motion, longest_on, states_on
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_index,
@@ -200,20 +200,38 @@ class Orbit(Frozen, Result):
         if not takes(quantity, 4):
             raise InputError("quantity", quantity, QUANTITY)
 
-        def size(t: Real, _: Pieces, x: Real, v: Real, a: Real) -> Real:
-            handed = (part.copy() for part in (t, x, v, a))
-            values = checked_reals("quantity", quantity(*handed), QUANTITY)
+        def size(t: Real, states: Real) -> Real:
+            values = checked_reals("quantity", quantity(t.copy(), *states.copy()), QUANTITY)
             if values.shape != t.shape:
                 raise InputError("quantity", values, QUANTITY)
             return np.abs(values)
 
-        return self._highest(size)
+        t, piece, states = self._grid
+        values = size(t, states)
+        best, tops = float(values.max()), _tops(values, piece)
+        rows = np.arange(tops.size)
+        low, high = np.maximum(tops - 1, 0), np.minimum(tops + 1, t.size - 1)
+        low, high = (np.where(piece[one] == piece[tops], one, tops) for one in (low, high))
+        begin, end, same = t[low], t[high], np.repeat(piece[tops], ZOOMED)
+        for _ in range(ZOOMS):
+            fine = np.linspace(begin, end, ZOOMED, axis=1)
+            at = fine.ravel()
+            seen = size(at, states_on(self.motion, at, same)).reshape(fine.shape)
+            top = seen.argmax(axis=1)
+            begin = fine[rows, np.maximum(top - 1, 0)]
+            end = fine[rows, np.minimum(top + 1, ZOOMED - 1)]
+        return max([best, *map(_summit, seen)])
 
     def stop_force_peak(self, spring: int = 0) -> float:
         """Greatest |H| of a stop over the period in N."""
-        return self._highest(
-            lambda _, piece, x, v, __: np.abs(self._force(spring, x, v, piece)),
-        )
+        stop = self._spring(spring)
+        regime = self._regime(spring, np.arange(self.motion.start.size))
+        f_k, f_c = shares(stop.law, regime)
+        still, nothing = np.zeros(regime.shape), np.zeros((regime.size, self.system.size))
+        constant = force_in(stop.law, stop.stiffness, stop.damping, stop.gaps, regime, still, still)
+        stiffness = np.outer(f_k * stop.stiffness, stop.direction)
+        damping = np.outer(f_c * stop.damping, stop.direction)
+        return longest_on(self.motion, np.stack([stiffness, damping, nothing], axis=1), constant)
 
     def mean_square_velocity(self, which: Coordinate, spring: int | None = None) -> float:
         """Mean of (d x')^2 over the period in m^2/s^2, by Gauss quadrature on every piece.
@@ -316,28 +334,10 @@ class Orbit(Frozen, Result):
         return np.asarray(self.motion.derivative(times, order) @ self.system.coordinate(which))
 
     @cached_property
-    def _grid(self) -> tuple[Real, Pieces, Real, Real, Real]:
-        """Times, pieces, displacement, velocity, acceleration on the motion's own grid."""
+    def _grid(self) -> tuple[Real, Pieces, Real]:
+        """Times, pieces, and x, x', x'' (3, K, N) on the motion's own grid."""
         t, piece = self.motion.samples()
-        return t, piece, *states_on(self.motion, t, piece)
-
-    def _highest(self, size: Callable[[Real, Pieces, Real, Real, Real], Real]) -> float:
-        """Greatest value over the period of a function of times, pieces and states."""
-        t, piece, *states = self._grid
-        values = size(t, piece, *states)
-        best, tops = float(values.max()), _tops(values, piece)
-        rows = np.arange(tops.size)
-        low, high = np.maximum(tops - 1, 0), np.minimum(tops + 1, t.size - 1)
-        low, high = (np.where(piece[one] == piece[tops], one, tops) for one in (low, high))
-        begin, end, same = t[low], t[high], np.repeat(piece[tops], ZOOMED)
-        for _ in range(ZOOMS):
-            fine = np.linspace(begin, end, ZOOMED, axis=1)
-            at = fine.ravel()
-            seen = size(at, same, *states_on(self.motion, at, same)).reshape(fine.shape)
-            top = seen.argmax(axis=1)
-            begin = fine[rows, np.maximum(top - 1, 0)]
-            end = fine[rows, np.minimum(top + 1, ZOOMED - 1)]
-        return max([best, *map(_summit, seen)])
+        return t, piece, states_on(self.motion, t, piece)
 
     @property
     def touches(self) -> bool:

@@ -176,7 +176,7 @@ def _trace(trace: Trace, panel: Panel, key: str) -> Iterator[Json]:
         yield base | hidden | {"y": _plain(trace.lower), "showlegend": False}
         yield base | hidden | {"y": _plain(trace.y)} | fill
         return
-    also = np.array([values for _, values in trace.x_also]).T
+    also = [_plain(values) for _, values in trace.x_also]
     colour = COLOURS[trace.colour]
     yield (
         base
@@ -184,7 +184,7 @@ def _trace(trace: Trace, panel: Panel, key: str) -> Iterator[Json]:
         | {
             "y": _plain(trace.y),
             "showlegend": trace.legend,
-            "customdata": [_plain(row) for row in also],
+            "customdata": [list(row) for row in zip(*also, strict=True)],
             "hovertemplate": _hover(trace, panel),
         }
     )

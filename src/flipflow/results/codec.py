@@ -173,6 +173,8 @@ def _spelt_out(kind: Any) -> Any:
 
 def _jsonable(value: object, words: Mapping[float, str]) -> Json:
     if isinstance(value, (np.ndarray, np.generic)):
+        if value.dtype.kind == "c":
+            value = np.stack([value.real, value.imag], axis=-1)
         done = value.dtype.kind in "biuf" and np.isfinite(value).all()
         return value.tolist() if done else _jsonable(value.tolist(), words)
     if isinstance(value, Mapping):

@@ -11,6 +11,7 @@ from flipflow.compiled.eigen import eigenvalues
 from flipflow.compiled.workers import compile_parts, work
 from flipflow.continuation import correction
 from flipflow.continuation.frequency_response import first_unknowns
+from flipflow.dynamics.motion import longest_on
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import Unbalance
@@ -43,7 +44,10 @@ def _observe_part() -> None:
     state, omega = np.zeros((1, 2)), np.ones(1)
     solver.extremes(state, omega, np.eye(1))
     solver.errors(state, omega)
-    solver.motion(state[0], 1.0).extremes(np.eye(1))
+    motion = solver.motion(state[0], 1.0)
+    motion.extremes(np.eye(1))
+    motion.derivative(0.0, 0)
+    longest_on(motion, np.zeros((3, 1)), 0.0)
 
 
 def _section_part() -> None:

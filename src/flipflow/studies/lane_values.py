@@ -18,7 +18,7 @@ from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.quantities import BranchWord, Quantity, leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
-from flipflow.studies.quantity_values import MOTION_VALUES, Frame, fields_of_rows
+from flipflow.studies.quantity_values import MOTION_VALUES, Frame, fields_of_rows, vector_terms
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -276,23 +276,10 @@ class _Plan:
 
     def _set_vector(self, name: str, linear: Real, along: Complex, across: Complex) -> None:
         """Coefficients (L, 3, 2) of x, x', x'' and harmonics (L, K) of one vector of a screen."""
-        f, w = self.fields, self.omega
-        if name in ("main", "floating"):
-            linear[:, 2, ("main", "floating").index(name)] = 1.0
-            across[:] = -(w**2) * self.normal
-        elif name == "foundation":
-            linear[:, 0, 0], linear[:, 1, 0] = (
-                np.ravel(f[one]) for one in ("isolation_stiffness", "isolation_damping")
-            )
-            across[:] = (f["normal_stiffness"] + 1j * w * f["normal_damping"]) * self.normal
-        elif name == "shear":
-            for r, one in enumerate(("shear_stiffness", "shear_damping")):
-                linear[:, r, 0], linear[:, r, 1] = np.ravel(f[one]), -np.ravel(f[one])
-        else:
-            mass, force = f["rotating_mass"], f["eccentric_moment"] * w**2
-            linear[:, 2, 0] = -np.ravel(mass)
-            along[:] = force
-            across[:] = -1j * self.sense * force + mass * w**2 * self.normal
+        field = self.fields.__getitem__
+        terms, along[:], across[:] = vector_terms(name, field, self.omega, self.normal, self.sense)
+        for (derivative, degree), value in terms.items():
+            linear[:, derivative, degree] = np.ravel(value)
 
     @property
     def sense(self) -> float:

@@ -10,12 +10,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.dynamics.contact_free import contact_free
+from flipflow.dynamics.motion import longest_on
 from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
 from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import FIELD
@@ -29,7 +30,9 @@ from flipflow.results.frozen import Frozen
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Values = float | Real
+Harmonics = complex | NDArray[Any]
 Frame = Literal["main", "floating"]
+FRAMES = get_args(Frame)  # in the order of the degrees of freedom
 Coordinate = Literal["main", "floating", "relative"]
 
 
@@ -235,21 +238,16 @@ class Working(Frozen):
         return math.nan if self.normal is None else self.normal.amplitude
 
     def peak_acceleration(self, frame: Frame) -> float:
-        degree = 0 if frame == "main" else 1
-        return self._peak(lambda _, __, a: a[:, degree], NormalMotion.acceleration)
+        return self._peak(frame)
 
     def foundation_force(self) -> float:
-        k, c = self.field("isolation_stiffness"), self.field("isolation_damping")
-        return self._peak(lambda x, v, _: k * x[:, 0] + c * v[:, 0], NormalMotion.foundation_force)
+        return self._peak("foundation")
 
     def stop_force(self) -> float:
         return max((self.orbit.stop_force_peak(j) for j in self.stops), default=0.0)
 
     def shear_force(self) -> float:
-        k, c = self.field("shear_stiffness"), self.field("shear_damping")
-        return self.orbit.peak(
-            lambda _t, x, v, _a: k * (x[:, 0] - x[:, 1]) + c * (v[:, 0] - v[:, 1])
-        )
+        return self._peak("shear")
 
     def shear_power(self) -> float:
         return self.field("shear_damping") * self.orbit.mean_square_velocity("relative")
@@ -260,19 +258,7 @@ class Working(Frozen):
         return float(speeds.max())
 
     def bearing_load(self) -> float:
-        normal, mass = self.normal, self.field("rotating_mass")
-        if self.screen is None or normal is None or math.isnan(mass):
-            return math.nan
-        force = self.screen.eccentric_moment * self.omega**2
-        sense = self.screen.normal_sense
-
-        def load(t: Real, _x: Real, _v: Real, a: Real) -> Real:
-            # The frame's acceleration of the rotating mass comes through the bearings, too.
-            along = force * np.cos(self.omega * t) - mass * a[:, 0]
-            across = sense * force * np.sin(self.omega * t) - mass * normal.acceleration(t)
-            return np.hypot(along, across)
-
-        return self.orbit.peak(load)
+        return self._peak("bearing")
 
     def dissipated_power(self) -> float:
         if self.screen is None:
@@ -285,16 +271,39 @@ class Working(Frozen):
             return 0.0
         return min((abs(self.omega - jump) / jump for jump in self.jumps), default=math.inf)
 
-    def _peak(
-        self,
-        along: Callable[[Real, Real, Real], Real],
-        across: Callable[[NormalMotion, Real], Real],
-    ) -> float:
-        """Peak over the turn of the vector (along the surface, normal to it)."""
-        normal = self.normal
-        if normal is None:
+    def _peak(self, name: str) -> float:
+        """Greatest length over the turn of a vector."""
+        Y = math.nan if self.normal is None else self.normal.complex_amplitude
+        sense = 1.0 if self.screen is None else self.screen.normal_sense
+        terms, along, across = vector_terms(name, self.field, self.omega, Y, sense)
+        linear = np.zeros((3, self.orbit.system.size))
+        for place, value in terms.items():
+            linear[place] = value
+        if not np.isfinite([*linear.ravel(), along, across]).all():
             return math.nan
-        return self.orbit.peak(lambda t, x, v, a: np.hypot(along(x, v, a), across(normal, t)))
+        return longest_on(self.orbit.motion, linear, 0.0, complex(along), complex(across))
+
+
+def vector_terms(
+    name: str, field: Callable[[str], Values], omega: Values, normal: Harmonics, sense: float
+) -> tuple[dict[tuple[int, int], Values], Harmonics, Harmonics]:
+    """A vector of a screen along its surface and normal to it, by the name of what it is.
+
+    Coefficients of derivatives of degrees of freedom, by (derivative, degree), and the harmonics A
+    and B of :mod:`flipflow.dynamics.pieces`; ``normal`` is Y.
+    """
+    if name in FRAMES:
+        return {(2, FRAMES.index(name)): 1.0}, 0.0, -(omega**2) * normal
+    if name == "foundation":
+        k, c = field("isolation_stiffness"), field("isolation_damping")
+        across = field("normal_stiffness") + 1j * omega * field("normal_damping")
+        return {(0, 0): k, (1, 0): c}, 0.0, across * normal
+    if name == "shear":
+        k, c = field("shear_stiffness"), field("shear_damping")
+        return {(0, 0): k, (0, 1): -k, (1, 0): c, (1, 1): -c}, 0.0, 0.0
+    # The frame's acceleration of the rotating mass comes through the bearings, too.
+    force, mass = field("eccentric_moment") * omega**2, field("rotating_mass")
+    return {(2, 0): -mass}, force, -1j * sense * force + mass * omega**2 * normal
 
 
 def fields_of_rows(machine: Machine, columns: Mapping[str, NDArray[Any]]) -> dict[str, Real]:

@@ -1,0 +1,77 @@
+"""Greatest lengths of vectors over a motion, against dense samples of the motion itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.dynamics.motion import longest_on, states_on
+from flipflow.studies.quantity_values import Working
+
+LAWS = ("paper", "compression-only", "undamped-rebound", "elasto-gap")
+SAMPLES, CLOSE = 20_000, 1e-6  # a summit between two is seen to the square of their distance
+
+
+def machine(law, seed):
+    """Two masses and two stops, far from the bundled screen, under two harmonics and a weight."""
+    rng = np.random.default_rng(seed)
+    stops = [
+        ff.ClearanceSpring(rng.normal(size=2), 20.0, 0.3, 0.1, 0.25, law=law),
+        ff.ClearanceSpring(rng.normal(size=2), 5.0, 0.1, 0.2, math.inf, law=law),
+    ]
+    excitation = (ff.HarmonicForce([1.0, 0.3j]), ff.HarmonicForce([0.2, 0.1], order=2))
+    K = np.array([[2.0, -1.0], [-1.0, 1.5]])
+    return ff.MechanicalSystem(
+        np.diag([1.0, 0.6]), 0.05 * K, K, stops, excitation, static_force=[0.05, -0.1]
+    )
+
+
+def sampled(motion, linear, constant, along, across):
+    """The greatest of many samples, both sides of every change of contact among them."""
+    t, piece = motion.samples(SAMPLES)
+    x = states_on(motion, t, piece)
+    turn = np.exp(1j * motion.omega * t)
+    first = np.einsum("rn,rkn->k", linear, x) + constant + (along * turn).real
+    return float(np.hypot(first, (across * turn).real).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_greatest_length_is_that_of_dense_samples(law):
+    rng = np.random.default_rng(5)
+    branch = ff.frequency_response(machine(law, 1), (0.6, 1.5))
+    motions = [branch.orbit(k).motion for k in range(0, branch.omega.size, 12)]
+    assert any(motion.start.size > 2 for motion in motions)
+    for motion in motions:
+        linear, constant = rng.normal(size=(3, 2)), rng.normal()
+        along, across = rng.normal(size=2) @ [1.0, 1j], rng.normal(size=2) @ [1.0, 1j]
+        found = longest_on(motion, linear, constant, along, across)
+        seen = sampled(motion, linear, constant, along, across)
+        # No sample is beyond the summit, and the best is next to it.
+        assert seen * (1.0 - 1e-12) <= found <= seen * (1.0 + CLOSE)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_greatest_stop_force_is_that_of_its_formula(law):
+    branch = ff.frequency_response(machine(law, 1), (0.6, 1.5))
+    for k in range(0, branch.omega.size, 30):
+        orbit = branch.orbit(k)
+        t, _ = orbit.motion.samples(SAMPLES)
+        # Contacts end at the last digit, where a force of a law with a jump is another one.
+        inside = np.concatenate([t[1:-1] - 1e-9, t[1:-1] + 1e-9])
+        for spring in range(2):
+            most = np.abs(orbit.stop_force(spring, inside)).max()
+            assert orbit.stop_force_peak(spring) == pytest.approx(most, rel=1e-6, abs=1e-9)
+
+
+def test_a_series_has_the_peaks_of_the_exact_motion():
+    """A Fourier series and the exact motion are read by the same formula."""
+    screen = ff.load("ffs0827")
+    names = ("main_frame_acceleration", "foundation_force", "stop_force", "bearing_load")
+    exact = ff.frequency_response(screen, (100.0, 130.0)).orbits_at(120.0)[-1]
+    series = ff.frequency_response(screen, (100.0, 130.0), ff.HarmonicBalance(25)).orbits_at(120.0)
+    for name in names:
+        close = Working(screen, series[-1]).value(name)
+        assert close == pytest.approx(Working(screen, exact).value(name), rel=2e-2)
