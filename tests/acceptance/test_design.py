@@ -141,6 +141,20 @@ def test_an_impossible_duty_says_what_excludes_what(tmp_path, monkeypatch):
     # Between the 10 mm that the springs allow and the 11.7 mm that are asked at least.
     assert 10e-3 < found.chosen.amplitude[0] < 11.7e-3
     assert ff.load("out/machine.toml") == found.screen
+    # Searched for longer it is the same duty; the report of another one is left alone.
+    Path("other.toml").write_text(
+        IMPOSSIBLE_DUTY.replace('stop_force = "100 kN"', 'stop_force = "90 kN"'), encoding="utf-8"
+    )
+    before = Path("out/proposal.json").read_bytes()
+    refused = CliRunner().invoke(app, ["design", "other.toml", "-o", "out"])
+    assert isinstance(refused.exception, ff.InputError)
+    words = str(refused.exception)
+    assert words.startswith("--output = 'out': it holds the report of another input, give --over")
+    assert Path("out/proposal.json").read_bytes() == before
+    for file, *more in (("duty.toml", "2"), ("other.toml", "2", "--overwrite")):
+        again = CliRunner().invoke(app, ["design", file, "-o", "out", "--generations", *more])
+        assert again.exit_code == IMPOSSIBLE, again.output
+    assert Path("out/proposal.json").read_bytes() != before
 
 
 def springs() -> tuple[ff.SpringType, ...]:

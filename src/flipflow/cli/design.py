@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,6 +40,9 @@ def design(
     workers: Workers = None,
     scheduler: Scheduler = None,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write the report as PDF, too.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the report of another duty.")
+    ] = False,
     force: Force = False,
 ) -> None:
     """Choose the machine for a duty, and prove it.
@@ -49,6 +53,7 @@ def design(
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
+    from flipflow.cli.report_files import duty_key, replaced_files  # noqa: PLC0415
     from flipflow.io.duty import load_duty  # noqa: PLC0415
     from flipflow.report.html import require_templates  # noqa: PLC0415
 
@@ -60,7 +65,10 @@ def design(
         require_typst()
     for warning in duty.project.warnings:
         typer.echo(f"Warning: {warning}", err=True)
-    with Destination(output or Path(f"{duty.name}-flipflow"), json, [file]) as target:
+    folder = output or Path(f"{duty.name}-flipflow")
+    old = replaced_files(folder, DATA, duty_key(duty), overwrite=overwrite)
+    with Destination(folder, json, [file]) as target:
+        target.replaces(old)
         from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
         from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
         from flipflow.studies.design import design as analysis  # noqa: PLC0415
@@ -84,6 +92,7 @@ def design(
 def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     """Report, machine file, numbers; the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.report_files import KEY, duty_key  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.plotting.dispatch import figure  # noqa: PLC0415
     from flipflow.report import summary  # noqa: PLC0415
@@ -100,7 +109,9 @@ def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     else:
         target.replaces([PDF])  # one of another duty would stay beside this report
     document = document_of(found)
-    target.data(DATA, document)
+    files = (REPORT, MACHINE, DATA, FIGURE, *((PDF,) if pdf else ()))
+    key = asdict(replace(duty_key(found.duty), files=files))
+    target.data(DATA, {"schema": document["schema"], KEY: key, **document})
     target.picture(FIGURE, figure(found), found.duty.name)
     target.document(document)
     target.keep()

@@ -14,6 +14,7 @@ from flipflow.errors import InputError
 
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
+    from flipflow.model.duty import Duty
     from flipflow.model.project import Project
     from flipflow.studies.assessment import Assessment
 
@@ -70,7 +71,8 @@ class ReportFiles:
         InputError
             Where the folder holds another report, unless it is to be overwritten.
         """
-        return _kept_in(folder, _key_of(project, self.options), overwrite=self.overwrite)
+        key = _key_of(project, self.options)
+        return replaced_files(folder, RESULTS, key, overwrite=self.overwrite)
 
     def write(
         self, assessment: Assessment, target: Destination, document: Mapping[str, object]
@@ -140,18 +142,30 @@ def _key_of(project: Project, options: Mapping[str, object]) -> ReportKey:
     return ReportKey(digest.hexdigest()[:16], json.loads(json.dumps(options)))
 
 
-def _kept_in(folder: Path, new: ReportKey, *, overwrite: bool) -> tuple[str, ...]:
-    """The files of another report that a folder holds; of the same report none go.
+def duty_key(duty: Duty) -> ReportKey:
+    """The key of the report of a design; how long it was searched for makes no other report."""
+    from flipflow.studies.documents import CODEC  # noqa: PLC0415  keeps --help quick
+
+    said = json.dumps(CODEC.form(type(duty)).write(duty), sort_keys=True)
+    return ReportKey(hashlib.sha256(said.encode()).hexdigest()[:16], {})
+
+
+def replaced_files(
+    folder: Path, document: str, new: ReportKey, *, overwrite: bool
+) -> tuple[str, ...]:
+    """The files of another report that go from a folder; of the same report none go.
+
+    ``document`` is the file in which such a report keeps its key.
 
     Raises
     ------
     InputError
         Where the folder holds another report, unless it is to be overwritten.
     """
-    there = [name for name in (RESULTS, REPORT) if (folder / name).exists()]
+    there = [name for name in (document, REPORT) if (folder / name).exists()]
     if not there:
         return ()
-    old = _read(folder / RESULTS)
+    old = _read(folder / document)
     if old is not None and _same(old, new):
         return ()
     if not overwrite:
