@@ -98,7 +98,7 @@ _HOME = {
     "Ramp": "flipflow.studies.ramp",
     "ResponseFamily": "flipflow.studies.response_family",
     "RungeKutta": "flipflow.transient.time_stepping",
-    "RunUp": "flipflow.transient.startup",
+    "RunUp": "flipflow.transient.run_up",
     "Section": "flipflow.studies.poincare",
     "Sensitivity": "flipflow.studies.sensitivity",
     "SpecialPoint": "flipflow.continuation.branch",
@@ -218,8 +218,8 @@ if TYPE_CHECKING:
     from flipflow.studies.worst_case import WorstCase as WorstCase
     from flipflow.studies.worst_case import worst_case as worst_case
     from flipflow.transient.history import History as History
+    from flipflow.transient.run_up import RunUp as RunUp
     from flipflow.transient.simulate import simulate as simulate
-    from flipflow.transient.startup import RunUp as RunUp
     from flipflow.transient.startup import coast_down as coast_down
     from flipflow.transient.startup import start_up as start_up
     from flipflow.transient.sweep import Sweep as Sweep

@@ -45,7 +45,7 @@ from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
 from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
-from flipflow.transient.startup import Peak, RunUp
+from flipflow.transient.run_up import Peak, RunUp
 from flipflow.transient.sweep import Sweep
 
 SMALL = Path(__file__).parents[1] / "machines" / "small.toml"

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from flipflow.model.drive import Drive, SpeedProfile
     from flipflow.model.monitor import Monitor
     from flipflow.model.project import Project
-    from flipflow.transient.startup import RunUp
+    from flipflow.transient.run_up import RunUp
 
 POWER = ("motor", "friction", "dampers")
 LONGEST = 3600.0  # s

@@ -58,7 +58,7 @@ from flipflow.studies.study import Study
 from flipflow.studies.tolerance import Tolerance
 from flipflow.studies.worst_case import WorstCase
 from flipflow.transient.history import History
-from flipflow.transient.startup import RunUp
+from flipflow.transient.run_up import RunUp
 from flipflow.transient.sweep import Sweep
 
 PASSES: tuple[Direction, ...] = ("up", "down")

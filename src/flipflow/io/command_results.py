@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flipflow.studies.ramp import LateJump
-from flipflow.transient.startup import RunUp
+from flipflow.transient.run_up import RunUp
 from flipflow.transient.sweep import Sweep
 
 

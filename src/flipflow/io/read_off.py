@@ -23,7 +23,7 @@ from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.studies.start_sentence import does_it_start
 from flipflow.transient.history import History
-from flipflow.transient.startup import Peak, RunSummary, RunUp
+from flipflow.transient.run_up import Peak, RunSummary, RunUp
 
 RUN = ("version", "energy", "status", "method", "counters")
 

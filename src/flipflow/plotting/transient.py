@@ -15,8 +15,8 @@ from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, SYMBOLS, coordinates, label
 from flipflow.plotting.scales import KN, MM, RPM
+from flipflow.transient.run_up import RunUp, foundation_force
 from flipflow.transient.speed_run import swings
-from flipflow.transient.startup import RunUp, foundation_force
 
 Real = NDArray[np.float64]
 MOST_POINTS = 1500

@@ -25,7 +25,7 @@ from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.studies.start_sentence import NO_SPEED, drive_words
-from flipflow.transient.startup import RunSummary, RunUp
+from flipflow.transient.run_up import RunSummary, RunUp
 
 GREATEST = (
     ("main_amplitude", "main frame", "mm", "m"),

@@ -18,8 +18,8 @@ from flipflow.model.drive import Drive
 from flipflow.model.load_case import case_words
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import Converter
+from flipflow.transient.run_up import AT_SPEED
 from flipflow.transient.speed_run import unbalance_weight
-from flipflow.transient.startup import AT_SPEED
 
 Interval = tuple[float, float]
 Real = NDArray[np.float64]

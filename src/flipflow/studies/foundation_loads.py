@@ -30,7 +30,7 @@ from flipflow.model.numerals import digits
 from flipflow.model.screen import FlipFlowScreen, Rotation
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.result import Result
-from flipflow.transient.startup import RunUp
+from flipflow.transient.run_up import RunUp
 
 Real = NDArray[np.float64]
 Direction = Literal["along", "normal", "horizontal", "vertical"]

@@ -9,8 +9,9 @@ import numpy as np
 from flipflow.model.drive import Drive
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.transient.run_up import RunUp
 from flipflow.transient.speed_run import hanging_angle, unbalance_weight
-from flipflow.transient.startup import RunUp, start_up
+from flipflow.transient.startup import start_up
 
 ANYWHERE = 8  # angles tried where friction holds the shaft in every one
 WORST_FIRST = ("not started", "captured", "short", "unfinished", "reached")

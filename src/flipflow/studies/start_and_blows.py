@@ -25,13 +25,8 @@ from flipflow.studies.drive_check import (
 from flipflow.studies.held_angles import badness, starts_from_rest
 from flipflow.studies.jump_risk import JumpRisk, jump_risk
 from flipflow.transient.chosen_drive import default_drive, fitted_drive
-from flipflow.transient.startup import (
-    Outcome,
-    Peak,
-    RunSummary,
-    RunUp,
-    coast_down,
-)
+from flipflow.transient.run_up import Outcome, Peak, RunSummary, RunUp
+from flipflow.transient.startup import coast_down
 
 NOT_REACHED = "the start does not reach the working speed"
 FAILED: tuple[Outcome, ...] = ("not started", "captured", "short", "unfinished")
