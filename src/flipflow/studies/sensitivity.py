@@ -24,6 +24,7 @@ from flipflow.results.result import Result
 from flipflow.studies.sensitivity_samples import (
     Columns,
     Question,
+    checked_threads,
     closed_form_values,
     motion_values,
     nearest_turn,
@@ -205,8 +206,9 @@ def sensitivity(
     rng
         Seed or generator.
     threads
-        Threads over chunks of samples where motions are solved for; None: one, because most of
-        the work around a motion is not free to run beside itself.
+        Threads over chunks of samples where motions are solved for; None: one for each processor,
+        but one alone for a quantity of the whole response, most of whose work cannot run beside
+        itself. The result is the same.
     monitor
         Called with a sentence and the share done, 0 to 1. What it raises ends the work.
     branch
@@ -234,7 +236,7 @@ def sensitivity(
     """
     question = question_of(machine, quantity, omega, branch)
     varied = variations(vary, machine)
-    workers = checked_count("threads", 1 if threads is None else threads, 256)
+    workers = checked_threads(question, threads)
     groups = checked_count("n", n, N_MOST, least=LEAST_GROUPS)
     generator = checked_generator(rng)
     checked_monitor(monitor)

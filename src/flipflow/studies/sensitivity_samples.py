@@ -9,11 +9,16 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.batch.side_by_side import side_by_side
+from flipflow.batch.side_by_side import processors, side_by_side
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.arguments import checked_interval, checked_speeds, checked_word
+from flipflow.model.arguments import (
+    checked_count,
+    checked_interval,
+    checked_speeds,
+    checked_word,
+)
 from flipflow.model.fields import FIELD
 from flipflow.model.parameters import with_values
 from flipflow.model.quantities import (
@@ -138,6 +143,12 @@ def closed_form_values(question: Question, columns: Columns, omega: Real) -> Rea
     for name, column in columns.items():
         values[~FIELD[name].allows(np.asarray(column, dtype=float))] = np.nan
     return values
+
+
+def checked_threads(question: Question, threads: object) -> int:
+    """Threads as asked for; None: every processor for lanes, which leave the interpreter free."""
+    free = processors() if on_lanes(question.machine, question.quantity) else 1
+    return checked_count("threads", free if threads is None else threads, 256)
 
 
 def motion_values(

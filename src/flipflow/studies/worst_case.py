@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
 from flipflow.errors import InputError
-from flipflow.model.arguments import checked_count, checked_index, checked_monitor, checked_word
+from flipflow.model.arguments import checked_index, checked_monitor, checked_word
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import value_of, with_values
 from flipflow.model.quantities import BranchWord
@@ -20,6 +20,7 @@ from flipflow.model.vary import Interval, Vary, variations
 from flipflow.results.result import Result
 from flipflow.studies.sensitivity_samples import (
     Question,
+    checked_threads,
     motion_values,
     nearest_turn,
     nominal_values,
@@ -166,7 +167,7 @@ def worst_case(
     branch
         ``"from-below"``, ``"upper"`` or ``"lower"``, as of :func:`~flipflow.sensitivity`.
     threads
-        Threads over chunks of machines; None: one.
+        As of :func:`~flipflow.sensitivity`.
     monitor
         Called with a sentence and the share done, 0 to 1. What it raises ends the work.
 
@@ -193,7 +194,7 @@ def worst_case(
     varied = variations(vary, machine)
     names = tuple(one.name for one in varied)
     intervals = np.array([one.distribution.ends for one in varied], float)
-    workers = checked_count("threads", 1 if threads is None else threads, 256)
+    workers = checked_threads(question, threads)
     search = Search(question, names, intervals, workers, checked_monitor(monitor))
     search.run()
     found = {end: search.extremes(sign) for end, sign in SIGNS.items()}

@@ -1,0 +1,54 @@
+"""Sobol indices of the nonlinear amplitude: how long they take, and how much memory.
+
+    python benchmarks/sobol.py [--samples 4096] [--speeds 100] [--threads 2]
+
+Ten parameters of FFS0827 within 10 % over many frequencies, n (P + 2) machines at each; then six of
+them at one frequency. Every motion is exact, those with contact are counted.
+"""
+
+import argparse
+import resource
+import time
+
+import numpy as np
+
+import flipflow as ff
+
+TEN = (
+    "main_mass", "floating_mass", "shear_stiffness", "shear_damping", "stop_stiffness",
+    "stop_damping", "clearance", "eccentric_moment", "isolation_stiffness", "isolation_damping",
+)  # fmt: skip
+SIX = TEN[:3] + TEN[4:7]
+
+
+def study(screen, names, omega, samples, threads):
+    """Wall and processor seconds of one study, and its indices of order one."""
+    vary = {name: (0.9 * getattr(screen, name), 1.1 * getattr(screen, name)) for name in names}
+    wall, processor = time.perf_counter(), time.process_time()
+    found = ff.sensitivity(
+        screen, vary, "relative_amplitude", omega=omega, n=samples, threads=threads
+    )
+    return time.perf_counter() - wall, time.process_time() - processor, found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=4096)
+    parser.add_argument("--speeds", type=int, default=100)
+    parser.add_argument("--threads", type=int, default=2)
+    given = parser.parse_args()
+    screen = ff.load("ffs0827")
+    study(screen, SIX, 120.0, 64, given.threads)  # compiled beforehand
+    for names, omega in ((SIX, np.array([120.0])), (TEN, np.linspace(60.0, 200.0, given.speeds))):
+        wall, processor, found = study(screen, names, omega, given.samples, given.threads)
+        machines = given.samples * (len(names) + 2)
+        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        print(
+            f"{len(names)} parameters, {machines} machines at {omega.size} frequencies: "
+            f"{wall:.2f} s, {processor:.2f} s of processor, at most {most:.2f} GiB; "
+            f"{found!r}"
+        )
+
+
+if __name__ == "__main__":
+    main()
