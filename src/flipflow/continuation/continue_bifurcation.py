@@ -60,6 +60,12 @@ AT_CORNER = (
     "grazing, and a fold as long as the branch turns back there."
 )
 
+AT_LOWER_CORNER = (
+    "The fold lies where the branch has a corner, because a stop that is touched already in the "
+    "turn begins to be touched once more: it is no fold of the return map, and its curve cannot be "
+    "followed."
+)
+
 
 def continue_bifurcation(
     point: SpecialPoint,
@@ -400,10 +406,10 @@ def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
     if test != SADDLE_NODE or _is_critical(orbit.point):
         return test, 0, start, []
     gap = _grazed(start, exact)
-    beside = None if gap is None else _fold_beside(start, exact)
-    if gap is None or beside is not None:
-        return test, 0, beside or start, []
-    return GRAZING, gap, start, [AT_CORNER]
+    if gap is None:
+        return test, 0, start, [AT_LOWER_CORNER]
+    beside = _fold_beside(start, exact)
+    return (GRAZING, gap, start, [AT_CORNER]) if beside is None else (test, 0, beside, [])
 
 
 def _is_critical(point: Point) -> bool:
