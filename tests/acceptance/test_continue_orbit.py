@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import flipflow as ff
 from flipflow.errors import InputError
@@ -286,3 +287,43 @@ def test_bad_input(exact, leaning, chain) -> None:
     system_orbit = ff.frequency_response(chain, (0.5, 0.55)).orbit(0)
     with pytest.raises(InputError):
         ff.continue_orbit(system_orbit, "clearance", (0.5, 2.0))
+
+
+def test_a_bridge_of_doubled_motions_is_found_from_either_end() -> None:
+    """Near its lower end the doubled motion bends away within a ten-thousandth of the motion."""
+    stops = (
+        ff.ClearanceSpring([1.0], 30.8, 2.97, 2.894, np.inf),
+        ff.ClearanceSpring([1.0], 40.8, 4.9, 1.042, 0.973),
+    )
+    machine = ff.MechanicalSystem([[0.817]], [[0.065]], [[0.277]], stops, ff.Unbalance([0.414]))
+    ends = ff.frequency_response(machine, (0.4, 0.6)).points_of("period doubling")
+    up, down = (ff.switch_branch(end, (0.4, 0.6)) for end in ends)
+    assert up.complete
+    assert down.complete
+    assert up.special_points[-1].omega == pytest.approx(ends[1].omega, abs=1e-9)
+    assert down.special_points[-1].omega == pytest.approx(ends[0].omega, abs=1e-9)
+    ours, theirs = (sorted(point.omega for point in one.special_points) for one in (up, down))
+    close("the same special points", ours, theirs, abs=1e-8)
+    found = [o for o in ff.periodic_orbits(machine, 0.485, max_periods=2) if o.periods == 2]
+    for branch in (up, down):
+        (on,) = branch.orbits_at(0.485)
+        apart = min(abs(on.amplitude(0) - other.amplitude(0)) for other in found)
+        close("amplitude by a search", apart, 0.0, abs=1e-8)
+
+
+def test_doubled_motions_that_end_at_a_corner_are_cut_there() -> None:
+    """Under a law that pushes at once they end where the motion of one period begins to touch."""
+    stop = ff.ClearanceSpring([1.0], 262.0, 9.1, 7.05, law="undamped-rebound")
+    machine = ff.MechanicalSystem(
+        [[1.077]], [[0.162]], [[0.636]], (stop,), ff.HarmonicForce([1.0]), static_force=[1.02]
+    )
+    doubling = ff.frequency_response(machine, (0.5, 0.85)).points_of("period doubling")[-1]
+    branch = ff.switch_branch(doubling, (0.5, 0.85))
+    assert branch.complete
+    assert branch.omega.size < 300
+
+    def room(omega: float) -> float:
+        """Gap that the motion without contact leaves."""
+        return 7.05 - 1.02 / 0.636 - abs(1.0 / (0.636 - 1.077 * omega**2 + 0.162j * omega))
+
+    close("end", branch.omega[-1], brentq(room, 0.6, 0.7), abs=1e-6)

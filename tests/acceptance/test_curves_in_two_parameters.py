@@ -328,3 +328,62 @@ def test_a_curve_that_meets_a_grazing_ends_there_and_says_so():
         # The third summit touches, but for what is left of the last step.
         assert np.sort(np.abs(tops - gap))[0] < 1e-4 * gap
         assert tops.max() > gap
+
+
+def leaning(forcing: float = 1.0) -> ff.MechanicalSystem:
+    """Two masses, the outer one between damped stops and pulled to one side."""
+    stop = ff.ClearanceSpring([-1.0, 1.0], 79.0, 1.62, 1.776, 2.471)
+    return ff.MechanicalSystem(
+        np.diag([2.5, 1.45]), [[2.46, -0.273], [-0.273, 0.273]], [[3.42, -0.379], [-0.379, 0.379]],
+        (stop,), ff.HarmonicForce([0.0, forcing * np.exp(-1.643j)]), static_force=[0.116, -0.689],
+    )  # fmt: skip
+
+
+def test_a_fold_hardly_beyond_a_grazing_of_a_lower_summit_is_followed() -> None:
+    """A summit that is not the highest of its turn touches by a millionth; single branches.
+
+    The curve passes a cusp and then runs along that grazing, of motions on a detached branch.
+    """
+    fold = max(ff.frequency_response(leaning(), (0.55, 0.75)).folds, key=lambda one: one.omega)
+    curve = ff.continue_fold(fold, "forcing", (0.9, 1.2))
+    assert curve.status is ff.BranchStatus.FOLLOWED
+    assert len(curve.orbits) < 600
+    assert [point.kind for point in curve.special_points] == ["cusp"]
+    lower = int(np.argmin(curve.omega[[0, -1]])) * (len(curve.orbits) - 1)
+    for i in (lower, abs(lower - 20)):
+        omega, value = float(curve.omega[i]), float(curve.values[i])
+        beside = ff.periodic_orbits(leaning(value), (1.0 + 2e-5) * omega)
+        size = curve.orbits[i].amplitude(0)
+        stable = min((o for o in beside if o.stable), key=lambda o: abs(o.amplitude(0) - size))
+        alone = ff.continue_orbit(stable, "omega", (0.97 * omega, 1.03 * omega))
+        close("fold", omega, nearest(alone.folds, omega), abs=1e-10)
+        t = np.linspace(0.0, curve.orbits[i].period, 20_001)
+        y = curve.orbits[i].displacement(1, t) - curve.orbits[i].displacement(0, t)
+        summits = np.concatenate([tops(y) - 1.776, tops(-y) - 2.471])
+        assert 0.0 < summits[summits > 0.0].min() < 1e-5 < summits.max()
+
+
+def tops(y: np.ndarray) -> np.ndarray:
+    """Summits of samples."""
+    return y[1:-1][(y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:])]
+
+
+def test_a_curve_that_meets_a_valley_within_a_contact_ends_there() -> None:
+    """Three masses: within the outer one's contact a valley comes back to the gap."""
+    K = np.array([[3.6, -1.37, 0.0], [-1.37, 3.6, -2.23], [0.0, -2.23, 2.23]])
+    stops = (
+        ff.ClearanceSpring([0.0, 1.0, 0.0], 9.55, 4.72, 0.719, math.inf),
+        ff.ClearanceSpring([1.0, 0.0, 0.0], 180.9, 0.0, 0.224, math.inf),
+        ff.ClearanceSpring([0.0, 0.0, 1.0], 27.16, 0.164, 0.969),
+    )
+    machine = ff.MechanicalSystem(
+        np.diag([3.2, 3.26, 0.304]), 0.362 * K, K, stops,
+        ff.HarmonicForce([-0.642 + 0.767j, 0.0, 0.0]),
+    )  # fmt: skip
+    folds = ff.frequency_response(machine, (0.55, 0.65)).folds
+    fold = min(folds, key=lambda one: abs(one.omega - 0.5957))
+    curve = ff.continue_fold(fold, "forcing", (0.7, 1.3))
+    assert curve.status is ff.BranchStatus.MEETS_GRAZING
+    orbit = curve.orbits[0]
+    valleys = tops(orbit.displacement(2, np.linspace(0.0, orbit.period, 20_001))) + 0.969
+    assert np.abs(valleys).min() < 1e-5

@@ -401,3 +401,19 @@ def test_one_at_a_time_is_the_tornado_of_the_samples(with_stop):
 def test_summary_is_what_the_section_says(capsys, with_stop):
     summary(with_stop, Console(width=80))
     assert "Nominal" in capsys.readouterr().out
+
+
+def test_a_motion_that_the_machine_leaves_has_no_value_of_its_own_either() -> None:
+    """Row 30's chain between its Neimark-Sacker points: its one motion of a period is unstable."""
+    K = np.array([[1.0, -1.0], [-1.0, 2.0]])
+    stop = ff.ClearanceSpring([1.0, 0.0], 100.0, 0.0, 1.0, np.inf)
+    chain = ff.MechanicalSystem(np.eye(2), 0.03 * K, K, (stop,), ff.HarmonicForce([0.0, 0.1]))
+    vary = {"springs[0].stiffness": (99.0, 101.0)}
+    assert all(not orbit.stable for orbit in ff.periodic_orbits(chain, 0.6))
+    for omega, kept in ((0.6, False), (0.85, True)):
+        found = ff.sensitivity(chain, vary, "amplitude[0]", omega=omega, n=8, rng=0)
+        worst = ff.worst_case(chain, vary, "amplitude[0]", omega=[omega])
+        assert np.isfinite(found.nominal) == kept
+        assert found.failed == (0.0 if kept else 1.0)
+        assert np.isfinite(worst.nominal[0]) == kept
+        assert np.isfinite(worst.least[0]) == kept

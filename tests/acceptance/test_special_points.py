@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import flipflow as ff
 
@@ -101,3 +102,21 @@ def test_two_folds_that_stand_close_are_both_kept(interval):
     shown = [fold.omega for fold in series.folds]
     assert shown == pytest.approx([fold.omega for fold in exact.folds], abs=5e-5)
     assert not [note for note in series.notes if note.startswith("fold of the series")]
+
+
+def test_a_fold_at_a_corner_stands_where_the_motion_without_contact_grazes():
+    """There Newton's method finds the motion on the other side of the corner again and again."""
+    K = np.array([[0.943, -0.566, 0.0], [-0.566, 2.996, -2.43], [0.0, -2.43, 2.43]])
+    d = np.array([-1.0, 0.0, 1.0])
+    stop = ff.ClearanceSpring(d, 277.0, 2.747, 2.9735, np.inf, law="undamped-rebound")
+    M, force = np.diag([2.434, 0.725, 1.562]), np.array([1.078, 0.1, 0.1])
+    machine = ff.MechanicalSystem(M, 0.1932 * K, K, (stop,), ff.Unbalance(force))
+
+    def room(omega):
+        x = np.linalg.solve(K - omega**2 * M + 0.1932j * omega * K, omega**2 * force)
+        return 2.9735 - abs(d @ x)
+
+    grazing = brentq(room, 0.74, 0.75, xtol=1e-14)
+    branch = ff.frequency_response(machine, (0.7, 0.9))
+    (end,), fold = branch.points_of("contact end"), branch.folds[-1]
+    assert [end.omega, fold.omega] == pytest.approx([grazing, grazing], abs=1e-10)

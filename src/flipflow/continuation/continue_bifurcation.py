@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -33,6 +34,7 @@ from flipflow.continuation.switching import follow_both_ways
 from flipflow.continuation.varied import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, members_of
+from flipflow.model.contact_law import switching
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import Parameter, parameter_of, with_values
 from flipflow.model.system import Machine, MechanicalSystem
@@ -56,6 +58,12 @@ SAMPLES = 4097  # of a turn, for its summits
 AT_CORNER = (
     "The fold lies where a contact begins and the branch has a corner: the curve is that of the "
     "grazing, and a fold as long as the branch turns back there."
+)
+
+AT_LOWER_CORNER = (
+    "The fold lies where the branch has a corner, because a stop that is touched already in the "
+    "turn begins to be touched once more: it is no fold of the return map, and its curve cannot be "
+    "followed."
 )
 
 
@@ -344,15 +352,29 @@ def _ended(
 
 
 def _grazes(orbit: Orbit, length: float) -> bool:
-    """Whether a summit of the motion hardly touches a stop, or nearly does."""
-    x = orbit.motion.derivative(np.linspace(0.0, orbit.period, SAMPLES)[:-1], 0)
+    """Whether what a stop watches stands still hardly off zero: a summit, a valley, a force."""
+    t = np.linspace(0.0, orbit.period, SAMPLES)[:-1]
+    x, v = (orbit.motion.derivative(t, order) for order in (0, 1))
     for spring in orbit.system.springs:
+        d = np.asarray(spring.direction)
         for side, gap in zip((1.0, -1.0), spring.gaps, strict=True):
-            y = side * (x @ np.asarray(spring.direction))
-            tops = y[(y > np.roll(y, 1)) & (y >= np.roll(y, -1))]
-            if np.any(np.abs(tops - gap) < BEFORE_GRAZING * length):
+            if not np.isfinite(gap):
+                continue
+            depth, rate = side * (x @ d) - gap, side * (v @ d)
+            nearest = _stands_still(depth)
+            for alpha, beta in switching(spring.law, spring.stiffness, spring.damping):
+                # A rate is as far as the rate over omega, as where the section is chosen.
+                h = (alpha * depth + beta * rate) / (alpha or beta * orbit.omega)
+                nearest = np.append(nearest, _stands_still(h, depth > 0.0))
+            if np.any(nearest < BEFORE_GRAZING * length):
                 return True
     return False
+
+
+def _stands_still(h: Real, where: NDArray[np.bool_] | bool = True) -> Real:
+    """|h| at the samples of a turn at which it is greatest or least."""
+    ahead, behind = np.roll(h, -1) - h, h - np.roll(h, 1)
+    return np.asarray(np.abs(h[(ahead * behind <= 0.0) & where]))
 
 
 def _values(point: Point) -> tuple[float, float]:
@@ -384,10 +406,10 @@ def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
     if test != SADDLE_NODE or _is_critical(orbit.point):
         return test, 0, start, []
     gap = _grazed(start, exact)
-    beside = None if gap is None else _fold_beside(start, exact)
-    if gap is None or beside is not None:
-        return test, 0, beside or start, []
-    return GRAZING, gap, start, [AT_CORNER]
+    if gap is None:
+        return test, 0, start, [AT_LOWER_CORNER]
+    beside = _fold_beside(start, exact)
+    return (GRAZING, gap, start, [AT_CORNER]) if beside is None else (test, 0, beside, [])
 
 
 def _is_critical(point: Point) -> bool:

@@ -38,6 +38,9 @@ FARTHEST = 3.0  # chords from the side's end to which it is sought
 JUMP = 1e-3  # cosine of the tangent with omega above which a fold found is a jump of it
 SHORT = 0.999  # share of a secant step that is taken, not to pass the grazing
 GRAZED = 1e-6  # share of the chord; a secant step that short is far closer to the grazing
+# Times that the grazing is passed until a height as small, as a share of that at the side's end, is
+# close enough: at a corner Newton's method finds the motion on the other side again and again.
+AGAIN = 3
 MOST_ROOT_STEPS = 100  # steps of the search for one zero
 
 
@@ -156,11 +159,17 @@ def grazing_between(
     chord = chord_behind(work)
     s_before, s = -0.5 * way * chord, 0.0
     code, f_before = height_beside(problem, scratch, work, s_before, test, course)
+    f_end, passed = f_before, 0
     for _ in range(MOST_SECANTS):
         if code != status.OK or not abs(s) <= FARTHEST * chord:
             return status.NO_CONVERGENCE, 0.0
         code, f = height_beside(problem, scratch, work, s, test, course)
-        if code == status.OK and abs(s - s_before) <= GRAZED * chord:
+        f_end = f if s == 0.0 else f_end
+        near = abs(s - s_before) <= GRAZED * chord
+        if f > 0.0:
+            passed += 1
+            near = near or (passed >= AGAIN and f <= GRAZED * abs(f_end))
+        if code == status.OK and near:
             share = min(abs(s) / chord, 1.0)
             return code, share if backwards else 1.0 - share
         if code != status.OK or f > 0.0:

@@ -25,9 +25,14 @@ from flipflow.periodic.stability import determinant_plus
 # Distances of a motion from the parent branch, relative to the motion.
 NEAR = 1e-2  # a branch that stalls within it has met its parent
 CLOSE = 1e-3  # points within it are left out at a meeting
+SHARE_CLOSE = 0.1  # the same, as a share of the farthest that the branch went
+HARDLY = 1e-5  # a branch that comes as near was followed to its parent; another leapt there
 SAME = 1e-7  # a motion within it is one of the parent's
 FINER = (1.0, 0.05, 0.01, 0.001)  # factors on the step, tried until no point lands on the parent
-SMALL = 1e-3  # distance of a child's first motion from its parent, relative to the motion
+# Distances of a child's first motion from its parent, relative to the motion, tried in this order:
+# beside a grazing the child's branch may bend away within a small part of the first.
+SMALL = (1e-3, 1e-4, 1e-5, 1e-6)
+TWICE = 10.0  # multiple of it up to which the motion's image may be away; about twice is expected
 SECANT = 1e-6  # relative distance in omega of the first two points of the secant method
 SECANT_MOST = 30  # its iterations
 
@@ -121,23 +126,33 @@ def follow_until_meeting(
         if traced.omega.size == 0:
             return traced, None
         apart = _distances(parent, traced)
-        landed = np.flatnonzero(apart < SAME)
-        if landed.size == 0 or landed[0] == 0:
+        landed = int(np.flatnonzero(apart < SAME)[0]) if np.any(apart < SAME) else None
+        if not landed or _came_back(apart[:landed]):
             break
     # The sign of det [J; tangent] changes where two branches cross, and at corners.
     crossed = np.flatnonzero(np.diff(np.sign(traced.record.side)))
     stalled = [apart.size - 1] if traced.code == status.STEP_TOO_SMALL else []
-    beyond = [int(p) - 1 for p in landed[:1] if p > 0]
+    beyond = [landed - 1] if landed else []
     for p in sorted({*map(int, crossed), *stalled, *beyond}):
         if apart[p] > NEAR and p not in beyond:
             continue
         state, at = traced.u[p], float(traced.omega[p])
         point = meeting(parent, (state + image(parent, state, at)) / 2.0, at)
         if point is not None:
-            # Close to the meeting rounding cannot tell the two branches apart: no point is kept.
-            clear = int(np.flatnonzero(apart[: p + 1] > CLOSE).max(initial=0))
-            return traced.first(clear + 1), point
-    return traced, None
+            return _clear_of_parent(traced, apart[: p + 1]), point
+    # At a corner the parent has no eigenvalue -1, because its multipliers jump there.
+    return (traced.first(landed) if landed else traced), None
+
+
+def _came_back(apart: Real) -> bool:
+    """Whether a branch went away from its parent and was followed until it is hardly apart."""
+    return bool(apart[-1] < min(HARDLY, SHARE_CLOSE * apart.max()))
+
+
+def _clear_of_parent(traced: Traced, apart: Real) -> Traced:
+    """The branch without its end close to a meeting: rounding cannot tell the two apart there."""
+    close = min(CLOSE, SHARE_CLOSE * float(apart.max()))
+    return traced.first(int(np.flatnonzero(apart > close).max(initial=0)) + 1)
 
 
 def follow_both_ways(
@@ -194,23 +209,36 @@ def beside(child: Solver, parent: Point, course: correction.Course) -> Point:
     IncompleteError
         When no such motion is found.
     """
-    own = parent_of(child)
     values, vectors = np.linalg.eig(parent.return_map)
     critical = vectors[:, np.abs(values + 1.0).argmin()].real
     n = critical.size // 2
     weight = np.concatenate([np.ones(n), np.full(n, 1.0 / parent.omega)])
-    away = SMALL * critical / np.abs(critical * weight).max()
+    away = critical / np.abs(critical * weight).max()
     away *= max(np.abs(parent.u * weight).max(), child.length)
+    for small in SMALL:
+        point = _in_plane(child, parent, small * away, course)
+        if point is not None and small < _from_image(child, parent, point) < TWICE * small:
+            return point
+    raise IncompleteError(
+        f"no motion was found beside the one at {parent.omega:.6g} rad/s that branches off"
+    )
+
+
+def _in_plane(child: Solver, parent: Point, away: Real, course: correction.Course) -> Point | None:
+    """The child's motion in the plane through a guess beside the parent and normal to it."""
     record = child.new_branch(2)
     record.u[:] = parent.u, parent.u + away
     record.omega[:] = parent.omega
     record.tangent[:] = np.append(away, 0.0)
     chord = Traced.recorded(record, 2, status.OK, course)
-    point = child.between(chord, 0, 1.0)
+    try:
+        return child.between(chord, 0, 1.0)
+    except IncompleteError:
+        return None
+
+
+def _from_image(child: Solver, parent: Point, point: Point) -> float:
+    """How far a motion is from its image, or from the parent where the child has no images."""
+    own = parent_of(child)
     mirrored = parent.u if own is None else image(own, point.u, point.omega)
-    moved = distance_to(point.u, mirrored, point.omega)
-    if not SMALL < moved < NEAR:
-        raise IncompleteError(
-            f"no motion was found beside the one at {parent.omega:.6g} rad/s that branches off"
-        )
-    return point
+    return distance_to(point.u, mirrored, point.omega)

@@ -29,6 +29,7 @@ from flipflow.dynamics.machine_series import (
     set_machine,
 )
 from flipflow.periodic import section
+from flipflow.periodic.near_grazing import near_grazing
 from flipflow.periodic.shooting import (
     Shooting,
     ShootingWork,
@@ -200,13 +201,10 @@ def varied_residual(
 def step_share(problem: Varied, work: VariedWork) -> float:
     """Step of a difference quotient of the last motion, as a share of the unknown's size.
 
-    Where a stop is hardly touched the map changes within the depth: the step is a share of that.
+    Where a stop is hardly touched, or hardly not, be it by the highest summit of a turn or by
+    another, the map changes within that depth: the step is a share of it.
     """
-    flow_depths(problem.shooting, work.shooting, float(work.at[2]), work.depth)
-    least = math.inf
-    for j in range(work.depth.shape[0]):
-        for side in range(2):
-            least = min(least, abs(work.depth[j, side]))
+    least = min(near_grazing(problem.shooting, work.shooting, float(work.at[2])))
     state_scale(problem.shooting, work.z, float(work.at[2]), work.move)
     return max(SMALLEST, min(DIFFERENCE, OF_DEPTH * least / float(work.move[0])))
 

@@ -68,7 +68,7 @@ class Sensitivity(Result):
         Share of samples without a value. The whole group of D + 2 samples around a failed one is
         left out, so that all pairs still differ in one field alone.
     nominal
-        The quantity of the machine itself, SI.
+        The quantity of the machine itself, SI; NaN where its motion is unstable, as of samples.
     at_low, at_high
         The quantity with one field at the low or the high end of its range, SI.
     own

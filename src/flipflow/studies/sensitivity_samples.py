@@ -221,16 +221,26 @@ def workings(
     below = question.branch == "from-below"
     narrow = below and not question.quantity.of_folds
     if response is None and narrow and len(set(omega)) == 1:
-        yield from [_reached(machine, omega[0])] * len(omega)
+        yield from [_if_kept(question, _reached(machine, omega[0]))] * len(omega)
         return
     if response is None:
         response = Response(machine, (min(omega), max(omega)) if narrow else question.span)
     branch = response.branch
     for one in omega:
         if below:
-            yield working_motion(machine, branch, one)
+            yield _if_kept(question, working_motion(machine, branch, one))
         else:
             yield _outermost(question, machine, branch, one)
+
+
+def _if_kept(question: Question, working: Working | None) -> Working | None:
+    """The motion where the machine keeps it: lanes, which settle, have no value of one it leaves.
+
+    How far a jump is away is asked of the branch, whatever the motion on it.
+    """
+    if working is None or question.quantity.of_folds:
+        return working
+    return None if working.orbit.stability == UNSTABLE else working
 
 
 def _reached(machine: Machine, omega: float) -> Working | None:

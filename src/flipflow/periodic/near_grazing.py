@@ -1,0 +1,137 @@
+"""How near a motion is to other contacts: where what a stop watches stands still hardly off zero.
+
+At a grazing a summit of a gap touches a stop, or a valley within a contact leaves it for a moment,
+or a force that a law watches hardly reaches zero. None of these need be the greatest depth of a
+turn.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_search import (
+    GapMotion,
+    exponential,
+    exponentials,
+    prepare_search,
+    switching_state,
+)
+from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.flow import segment_motion
+from flipflow.dynamics.law import exit_of, signed_gap
+from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
+from flipflow.periodic.shooting import Shooting, ShootingWork
+
+PER_RADIAN = 3.0  # samples of a motion in a radian of its fastest oscillation
+MOST_SAMPLES = 4000
+MOST_NEWTON = 60  # steps to one place where a function stands still
+STILL = 1e-8  # last of these steps, as a share of the time between two samples
+
+
+@kernel
+def near_grazing(problem: Shooting, work: ShootingWork, omega: float) -> tuple[float, float]:
+    """Room and depth in m of the recorded flow.
+
+    The room is what the motion that is nearest to one more contact has left before it, the depth
+    that of the shallowest contact; infinite where there is none.
+    """
+    machine, flow, motion = problem.machine, work.flow, work.flow.motion
+    room, depth = math.inf, math.inf
+    for e in range(flow.segments[0]):
+        count = segment_motion(machine, flow, e, omega, machine.direction, motion)
+        prepare_search(motion, count)
+        for j in range(machine.direction.shape[0]):
+            left, deep = _of_spring(
+                machine, motion, count, j, flow.regimes[e, j], omega, flow.length[e]
+            )
+            room, depth = min(room, left), min(depth, deep)
+    return room, depth
+
+
+@kernel
+def _of_spring(
+    machine: MachineArrays, motion: GapMotion, count: int, j: int, regime: int, omega: float,
+    duration: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Room and depth of spring j within one segment."""
+    stops, depth = machine.stops, math.inf
+    if regime == OPEN:
+        room = math.inf
+        for at in range(2):
+            sign, gap = 1.0 - 2.0 * at, stops.gap[j, at]
+            if gap < math.inf:
+                # A summit turns the room gap - sign y round at its least.
+                least, _ = _stands_still(motion, count, j, sign * gap, -sign, 0.0, duration)
+                room = min(room, least)
+        return room, depth
+    side, gap = (1.0 if regime > OPEN else -1.0), signed_gap(stops, j, regime)
+    room, depth = _stands_still(motion, count, j, gap, side, 0.0, duration)
+    for e in range(MOST_EXITS):
+        alpha, beta, target = exit_of(stops, j, regime, e)
+        if target == NO_EXIT or beta == 0.0:
+            continue
+        # A rate is as far as the rate over omega, as where the section is chosen.
+        size = alpha if alpha != 0.0 else beta * omega
+        least, _ = _stands_still(
+            motion, count, j, gap, side * alpha / size, side * beta / size, duration
+        )
+        room = min(room, least)
+    return room, depth
+
+
+@kernel
+def _stands_still(
+    motion: GapMotion, count: int, j: int, gap: float, alpha: float, beta: float, duration: float
+) -> tuple[float, float]:
+    """Least positive minimum and least positive maximum of h = alpha (y_j - gap) + beta y_j'.
+
+    They are sought within [0, duration] where the rate of h changes its sign between two samples;
+    infinite where there is none.
+    """
+    fastest = 0.0
+    for i in range(count):
+        fastest = max(fastest, abs(motion.rate[i].imag))
+    samples = min(4 + int(PER_RADIAN * fastest * duration), MOST_SAMPLES)
+    step = duration / samples
+    for i in range(count):
+        motion.turn[i] = motion.amplitude[j, i] * (alpha + beta * motion.rate[i]) * motion.rate[i]
+        motion.ratio[i] = exponential(motion.rate[i] * step)
+    least, shallowest, before = math.inf, math.inf, 0.0
+    for k in range(samples + 1):
+        slope = alpha * motion.drift[j]
+        for i in range(count):
+            slope += motion.turn[i].real
+            motion.turn[i] *= motion.ratio[i]
+        if k > 0 and slope * before < 0.0:
+            h = _still_value(motion, count, j, gap, alpha, beta, (k - 1) * step, step, before)
+            if h > 0.0 and before < 0.0:
+                least = min(least, h)
+            elif h > 0.0:
+                shallowest = min(shallowest, h)
+        before = slope
+    return least, shallowest
+
+
+@kernel
+def _still_value(
+    motion: GapMotion, count: int, j: int, gap: float, alpha: float, beta: float, begin: float,
+    step: float, before: float,
+) -> float:  # fmt: skip
+    """h where its rate is zero within a step, by Newton's method kept in between."""
+    a, b = begin, begin + step
+    t, h = begin + 0.5 * step, 0.0
+    for _ in range(MOST_NEWTON):
+        exponentials(motion, count, t)
+        h, slope, bend, _, _ = switching_state(motion, count, j, gap, alpha, beta)
+        if slope * before > 0.0:
+            a = t
+        else:
+            b = t
+        new = t - slope / bend if bend != 0.0 else 0.5 * (a + b)
+        if not a < new < b:
+            new = 0.5 * (a + b)
+        if abs(new - t) < STILL * step:
+            break
+        t = new
+    return h
