@@ -16,11 +16,11 @@ def work(screen):
 
 
 def remember(work, omega, motion, slope, count):
-    """Motions at the first frequencies, the last one's tangent."""
+    """Motions at the first frequencies, tangents of the last one and of the one before."""
     work.omega[:] = np.nan
     work.omega[:count] = omega[:count]
     work.path[:count] = [motion(w) for w in omega[:count]]
-    work.slope_here[:] = slope(omega[0])
+    work.slope_here[:], work.slope_behind[:] = slope(omega[0]), slope(omega[1])
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, KEPT])
@@ -28,7 +28,8 @@ def test_as_many_motions_as_are_known_determine_a_polynomial(work, count):
     rng = np.random.default_rng(count)
     omega = 100.0 - np.cumsum(rng.uniform(0.5, 1.5, KEPT))
     # Each power of (omega - 95) / 10 less than the one before, so that each motion changes less.
-    of = np.polynomial.Polynomial(0.3 ** np.arange(count + 1), domain=[85, 105], window=[-1, 1])
+    degree = 3 if count == 2 else count  # two of them are taken with both tangents
+    of = np.polynomial.Polynomial(0.3 ** np.arange(degree + 1), domain=[85, 105], window=[-1, 1])
     parts = np.arange(1.0, work.z.size + 1)
     remember(work, omega, lambda w: parts * of(w), lambda w: parts * of.deriv()(w), count)
     kernel_calls.lane_guess(work, 100.0)

@@ -61,6 +61,7 @@ class LaneWork(NamedTuple):
     guess: Real  # (2 N,)
     path: Real  # (KEPT, 2 N) the last motions of the path, the very last one first
     slope_here: Real  # (2 N,) tangent of the very last one
+    slope_behind: Real  # (2 N,) and of the one before
     omega: Real  # (KEPT,) of them, NaN: no such motion
     stride: Real  # (1,) next step in frequency, as a share of it
     share: Real  # (KEPT,) of them in a divided difference
@@ -81,7 +82,7 @@ def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
     """
     shooting = new_shooting_work(machine)
     n = 2 * machine.direction.shape[1]
-    vectors = ("z", "slope", "guess", "flown", "r", "slope_here")
+    vectors = ("z", "slope", "guess", "flown", "r", "slope_here", "slope_behind")
     return LaneWork(
         shooting=shooting._replace(flow=shooting.flow._replace(stop=stop)),
         schur=new_schur(n),
@@ -226,7 +227,8 @@ def accept(work: LaneWork, omega: float) -> None:
             work.path[p, k] = work.path[p - 1, k]
     work.omega[0] = omega
     for k in range(work.z.shape[0]):
-        work.path[0, k], work.slope_here[k] = work.z[k] - work.r[k], work.slope[k]
+        work.path[0, k] = work.z[k] - work.r[k]
+        work.slope_behind[k], work.slope_here[k] = work.slope_here[k], work.slope[k]
 
 
 @kernel
@@ -243,9 +245,9 @@ def predict(work: LaneWork, omega: float) -> None:
 
     Newton's form, with the first place counted twice: each motion more adds its divided difference
     times the distances of omega from all places before. It is taken as long as it adds less than
-    the one before did: behind a kink, as where contact begins, more of them lead astray. Tangents
-    of earlier motions are not taken: they lack what Newton's last step changes in them, and that
-    would grow from guess to guess.
+    the one before did: behind a kink, as where contact begins, more of them lead astray. With two
+    the guess is the cubic through their tangents, too. With more of them the earlier tangent is not
+    taken: it lacks what Newton's last step changes in it, and that would grow from guess to guess.
     """
     size = work.z.shape[0]
     n, added = size // 2, math.inf
@@ -253,10 +255,10 @@ def predict(work: LaneWork, omega: float) -> None:
     ahead = omega - place[0]
     for k in range(size):
         work.guess[k] = work.path[0, k] + ahead * work.slope_here[k]
-    distances, of_slope, sum_of_gaps = ahead * ahead, 1.0, 0.0
+    distances, of_slope, sum_of_gaps, taken = ahead * ahead, 1.0, 0.0, 0
     for last in range(1, KEPT):
         if math.isnan(place[last]):
-            return
+            break
         gap = 1.0 / (place[0] - place[last])
         of_slope *= gap
         sum_of_gaps += gap
@@ -273,11 +275,24 @@ def predict(work: LaneWork, omega: float) -> None:
             work.z[k] = distances * difference
             most = max(most, abs(work.z[k]) if k < n else abs(work.z[k]) / omega)
         if not most < added:
-            return
+            break
         for k in range(size):
             work.guess[k] += work.z[k]
         distances *= omega - place[last]
-        added = most
+        added, taken = most, last
+    if taken == 1:
+        add_cubic(work, omega)
+
+
+@kernel
+def add_cubic(work: LaneWork, omega: float) -> None:
+    """Make the parabola through two motions and one tangent the cubic through both tangents."""
+    back, ahead = work.omega[0] - work.omega[1], omega - work.omega[0]
+    scale = ahead * ahead * (ahead + back) / (back * back)
+    for k in range(work.z.shape[0]):
+        chord = (work.path[0, k] - work.path[1, k]) / back
+        bend = work.slope_here[k] + work.slope_behind[k] - 2.0 * chord
+        work.guess[k] += scale * bend
 
 
 @kernel
