@@ -70,7 +70,7 @@ class LaneWork(NamedTuple):
     J: Real  # (2 N, 2 N + 1)
     A: Real  # (2 N, 2 N)
     pivot: Int  # (2 N,)
-    step: Real  # (2,) last Newton step, as a share of the motion and in m
+    step: Real  # (3,) last Newton step, as a share of the motion and in m; the motion's size in m
     mu: Complex  # (2 N,) eigenvalues of the return map, with the problem's sign
     largest: Real  # (1,) their largest modulus, NaN: not looked for since Newton's last step
 
@@ -93,7 +93,7 @@ def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
         J=np.zeros((n, n + 1)),
         A=np.zeros((n, n)),
         pivot=np.zeros(n, np.int64),
-        step=np.zeros(2),
+        step=np.zeros(3),
         mu=np.zeros(n, np.complex128),
         largest=np.zeros(1),
         **{name: np.zeros(n) for name in vectors},
@@ -148,7 +148,9 @@ def newton(problem: Shooting, work: LaneWork, omega: float, far: float) -> int:
             return code
         if iteration == 0 and not work.step[0] < far:
             return status.NO_CONVERGENCE
-        if work.step[0] < CONVERGED:
+        # A guess that is taken as it is has to be right beside a small motion, too.
+        right = iteration > 0 or work.step[1] < CONVERGED * work.step[2]
+        if right and work.step[0] < CONVERGED:
             for k in range(size):
                 work.slope[k] = -work.J[k, size]
             lu_solve(work.A, work.pivot, work.slope)
@@ -174,11 +176,11 @@ def newton_step(problem: Shooting, work: LaneWork, omega: float) -> int:
     if not lu_factor(work.A, work.pivot):
         return status.SINGULAR
     lu_solve(work.A, work.pivot, work.r)
-    large, step = problem.length, 0.0
+    large, step = 0.0, 0.0
     for k in range(n):
         large = max(large, abs(work.z[k]), abs(work.z[n + k]) / omega)
         step = max(step, abs(work.r[k]), abs(work.r[n + k]) / omega)
-    work.step[0], work.step[1] = step / large, step
+    work.step[0], work.step[1], work.step[2] = step / max(large, problem.length), step, large
     work.largest[0] = math.nan
     return code
 
