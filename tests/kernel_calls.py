@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flipflow.batch.lane_path import predict as predict_lane
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.continuation.frequency_loop import predict
@@ -43,6 +44,12 @@ def range_of(motion, duration):
 def shoot(problem, work, z, omega, r, J):
     """``shooting_residual``."""
     return shooting_residual(problem, work, z, omega, r, J)
+
+
+@kernel(entry=True)
+def lane_guess(work, omega):
+    """``predict`` of a lane: its guess in work.guess."""
+    predict_lane(work, omega)
 
 
 @kernel(entry=True)

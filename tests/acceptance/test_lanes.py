@@ -101,6 +101,19 @@ def test_upper_and_lower_motions_are_kept_apart(screen):
     assert several > 5
 
 
+@pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
+def test_close_speeds_give_what_speeds_far_apart_do(screen, law):
+    machine = screen.replace(stop_law=law)
+    columns = drawn(machine, FIELDS, 8, 0.1, seed=4)
+    close, far = np.linspace(100.0, 180.0, 161), np.linspace(100.0, 180.0, 9)
+    for name in ("relative_amplitude", "stop_force"):
+        along, why = values(machine, columns, name, close)
+        apart, why_apart = values(machine, columns, name, far)
+        both = (why[:, ::20] == FOUND) & (why_apart == FOUND)
+        assert both.mean() > 0.9
+        np.testing.assert_allclose(along[:, ::20][both], apart[both], rtol=1e-7)
+
+
 def test_a_lane_that_fails_poisons_no_neighbour(screen):
     columns = drawn(screen, ("clearance", "shear_stiffness"), 30, 0.2, seed=2)
     clean, _ = values(screen, columns, "relative_amplitude")

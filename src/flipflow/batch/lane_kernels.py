@@ -154,12 +154,12 @@ def start_without_contact(problem: Shooting, work: LaneWork, omega: float, risin
 @kernel
 def begun(problem: Shooting, work: LaneWork, omega: float, far: float) -> bool:
     """Begin the path with what Newton reaches from work.guess, if it is stable and not far."""
-    if newton(problem, work, omega) != status.OK or not work.step[0] < far:
+    if newton(problem, work, omega, far) != status.OK:
         return False
-    largest, _ = largest_multiplier(work)
-    if largest < 1.0:
+    stable = largest_multiplier(work, omega) < 1.0
+    if stable:
         restart(work, omega)
-    return largest < 1.0
+    return stable
 
 
 @kernel
@@ -179,7 +179,7 @@ def settled(
 def set_out(work: LaneWork, push: float) -> None:
     """work.z is the last motion of the path, pushed by a share of itself; rest without a path."""
     for k in range(work.z.shape[0]):
-        work.z[k] = 0.0 if math.isnan(work.omega[0]) else work.here[k] * (1.0 + push)
+        work.z[k] = 0.0 if math.isnan(work.omega[0]) else work.path[0, k] * (1.0 + push)
 
 
 @kernel
@@ -192,19 +192,18 @@ def stability(
     """
     if even and not half:
         take_again(work)
-        half = newton(problem_of(machine, True, length), work, omega) == status.OK
-        half = half and work.step[0] < SAME
+        half = newton(problem_of(machine, True, length), work, omega, SAME) == status.OK
         if not half:
             take_again(work)
-            newton(problem_of(machine, False, length), work, omega)
-    largest, _ = largest_multiplier(work)
+            newton(problem_of(machine, False, length), work, omega, math.inf)
+    largest = largest_multiplier(work, omega)
     if half and largest > 1.0 - MARGIN:
         set_out(work, PUSH)
         if settle(problem_of(machine, False, length), work, omega):
             return False, True
         take_again(work)
-        newton(problem_of(machine, True, length), work, omega)
-        largest_multiplier(work)
+        newton(problem_of(machine, True, length), work, omega, math.inf)
+        largest_multiplier(work, omega)
     return half, largest < 1.0 - MARGIN
 
 
@@ -212,15 +211,15 @@ def stability(
 def take_again(work: LaneWork) -> None:
     """The last motion of the path as guess."""
     for k in range(work.guess.shape[0]):
-        work.guess[k] = work.here[k]
+        work.guess[k] = work.path[0, k]
 
 
 @kernel
 def note(work: LaneWork, lane: int, f: int, leaning: bool, half: bool, found: Found) -> None:
     """Write down the motion of the path, with the multipliers of a whole turn."""
     for k in range(work.z.shape[0]):
-        found.state[lane, f, k] = work.here[k]
+        found.state[lane, f, k] = work.path[0, k]
         mu = work.mu[k]
         found.multiplier[lane, f, k] = mu * mu if half else mu
-    found.error[lane, f] = work.step[2]
+    found.error[lane, f] = work.step[1]
     found.leaning[lane, f] = 1 if leaning else 0

@@ -1,10 +1,13 @@
 r"""One lane: the motion that a machine is brought to as its speed rises or falls slowly.
 
-Newton's method follows the motion from frequency to frequency, each guess the cubic through the
-last two motions and their tangents. A step is taken back and halved where Newton leads far away or
-where an eigenvalue of the return map has passed +1: the motion behind a fold is another one. Where
-no step is short enough the machine jumps: the exact flow runs turn after turn from the last motion,
-at the frequency ahead, until Newton finds the motion that it settles on.
+Newton's method follows the motion from frequency to frequency, each guess a polynomial through the
+last motions. Where speeds lie close, the guess is as good as the motion, and one flow with its
+tangent shows that it is.
+
+A step is taken back and halved where Newton leads far away or where an eigenvalue of the return map
+has passed +1: the motion behind a fold is another one. Where no step is short enough the machine
+jumps: the exact flow runs turn after turn from the last motion, at the frequency ahead, until
+Newton finds the motion that it settles on.
 
 A machine with equal gaps, odd multiples of the frequency and no constant force is flown over half a
 turn, with sign. Where that motion loses its symmetry, the lane is flown to one that leans.
@@ -20,7 +23,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_factor, lu_solve
+from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.compiled.eigen import Schur, new_schur, real_schur
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import prepare_drive
@@ -40,6 +43,7 @@ FAR = 0.1  # first Newton step along a path, as a share of the motion: farther l
 FAR_FROM_GUESS = 0.3  # the same from the motion of another machine
 LONGEST = 0.05  # step in frequency, as a share of it
 SHORTEST = 2e-5  # step in frequency, as a share of it, below which the motion has ended
+KEPT = 10  # last motions through which a guess goes; more change it by no more than rounding
 MARGIN = 1e-7  # distance of the largest multiplier from 1 within which stability is not told
 TURNS_BETWEEN = 64  # turns flown before Newton is tried again
 TURNS_MOST = 64 * 64
@@ -55,18 +59,20 @@ class LaneWork(NamedTuple):
     z: Real  # (2 N,) the state at phase 0
     slope: Real  # (2 N,) dz / d omega
     guess: Real  # (2 N,)
-    here: Real  # (2 N,) the last motion of the path
-    here_slope: Real  # (2 N,)
-    behind: Real  # (2 N,) the one before
-    behind_slope: Real  # (2 N,)
+    path: Real  # (KEPT, 2 N) the last motions of the path, the very last one first
+    slope_here: Real  # (2 N,) tangent of the very last one
+    slope_behind: Real  # (2 N,) and of the one before
+    omega: Real  # (KEPT,) of them, NaN: no such motion
+    stride: Real  # (1,) next step in frequency, as a share of it
+    share: Real  # (KEPT,) of them in a divided difference
     flown: Real  # (2 N,) state after some turns
-    omega: Real  # (3,) of the last motion, of the one before (NaN: none), next step
     r: Real  # (2 N,)
     J: Real  # (2 N, 2 N + 1)
     A: Real  # (2 N, 2 N)
     pivot: Int  # (2 N,)
-    step: Real  # (3,) first and last Newton step, as shares of the motion; the last in m
+    step: Real  # (3,) last Newton step, as a share of the motion and in m; the motion's size in m
     mu: Complex  # (2 N,) eigenvalues of the return map, with the problem's sign
+    largest: Real  # (1,) their largest modulus, NaN: not looked for since Newton's last step
 
 
 def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
@@ -76,16 +82,20 @@ def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
     """
     shooting = new_shooting_work(machine)
     n = 2 * machine.direction.shape[1]
-    vectors = ("z", "slope", "guess", "here", "here_slope", "behind", "behind_slope", "flown", "r")
+    vectors = ("z", "slope", "guess", "flown", "r", "slope_here", "slope_behind")
     return LaneWork(
         shooting=shooting._replace(flow=shooting.flow._replace(stop=stop)),
         schur=new_schur(n),
-        omega=np.zeros(3),
+        path=np.zeros((KEPT, n)),
+        omega=np.zeros(KEPT),
+        stride=np.zeros(1),
+        share=np.zeros(KEPT),
         J=np.zeros((n, n + 1)),
         A=np.zeros((n, n)),
         pivot=np.zeros(n, np.int64),
         step=np.zeros(3),
         mu=np.zeros(n, np.complex128),
+        largest=np.zeros(1),
         **{name: np.zeros(n) for name in vectors},
     )
 
@@ -97,7 +107,14 @@ def forget(work: LaneWork) -> None:
     for s in range(flow.driven_at.shape[0]):
         flow.modes.ready[s] = 0
         flow.driven_at[s] = math.nan
-    work.omega[0], work.omega[1] = math.nan, math.nan
+    forget_path(work, 0)
+
+
+@kernel
+def forget_path(work: LaneWork, kept: int) -> None:
+    """Keep some motions of the path alone."""
+    for p in range(kept, KEPT):
+        work.omega[p] = math.nan
 
 
 @kernel
@@ -117,8 +134,11 @@ def is_even(machine: MachineArrays) -> bool:
 
 
 @kernel
-def newton(problem: Shooting, work: LaneWork, omega: float) -> int:
-    """The motion at omega from work.guess: work.z, its flow recorded, J, slope, Newton steps."""
+def newton(problem: Shooting, work: LaneWork, omega: float, far: float) -> int:
+    """The motion at omega from work.guess: work.z, its flow recorded, J, slope, Newton steps.
+
+    None is looked for where the first step, as a share of the motion, is ``far`` or more.
+    """
     size = work.z.shape[0]
     for k in range(size):
         work.z[k] = work.guess[k]
@@ -126,14 +146,16 @@ def newton(problem: Shooting, work: LaneWork, omega: float) -> int:
         code = newton_step(problem, work, omega)
         if code != status.OK:
             return code
-        if iteration == 0:
-            work.step[0] = work.step[1]
-        if work.step[1] < CONVERGED:
+        if iteration == 0 and not work.step[0] < far:
+            return status.NO_CONVERGENCE
+        # A guess that is taken as it is has to be right beside a small motion, too.
+        right = iteration > 0 or work.step[1] < CONVERGED * work.step[2]
+        if right and work.step[0] < CONVERGED:
             for k in range(size):
                 work.slope[k] = -work.J[k, size]
             lu_solve(work.A, work.pivot, work.slope)
             return status.OK
-        if not work.step[1] < DIVERGED:
+        if not work.step[0] < DIVERGED:
             return status.NO_CONVERGENCE
         for k in range(size):
             work.z[k] -= work.r[k]
@@ -154,68 +176,125 @@ def newton_step(problem: Shooting, work: LaneWork, omega: float) -> int:
     if not lu_factor(work.A, work.pivot):
         return status.SINGULAR
     lu_solve(work.A, work.pivot, work.r)
-    large, step = problem.length, 0.0
+    large, step = 0.0, 0.0
     for k in range(n):
         large = max(large, abs(work.z[k]), abs(work.z[n + k]) / omega)
         step = max(step, abs(work.r[k]), abs(work.r[n + k]) / omega)
-    work.step[1], work.step[2] = step / large, step
+    work.step[0], work.step[1], work.step[2] = step / max(large, problem.length), step, large
+    work.largest[0] = math.nan
     return code
 
 
 @kernel
-def largest_multiplier(work: LaneWork) -> tuple[float, bool]:
-    """Eigenvalues of the return map into work.mu: their largest modulus, whether one is beyond +1.
+def largest_multiplier(work: LaneWork, omega: float) -> float:
+    """Eigenvalues of the return map into work.mu, and their largest modulus.
 
     Infinite where they were not found.
     """
+    if not math.isnan(work.largest[0]):
+        return float(work.largest[0])
+    work.largest[0] = math.inf
     size = work.z.shape[0]
+    n, T = size // 2, work.schur.T
+    # Rates are larger than displacements by omega: what balancing would find out.
+    large = 2.0 ** math.frexp(omega)[1]
     for i in range(size):
         for j in range(size):
-            work.schur.T[i, j] = work.J[i, j]
-        work.schur.T[i, i] += 1.0
+            T[i, j] = work.J[i, j]
+            if i < n <= j:
+                T[i, j] *= large
+            elif j < n <= i:
+                T[i, j] /= large
+        T[i, i] += 1.0
     if not real_schur(work.schur, False):
-        return math.inf, False
-    largest, beyond = 0.0, 0
+        return math.inf
+    largest = 0.0
     for k in range(size):
         mu = work.schur.value[k]
         work.mu[k] = mu
         largest = max(largest, math.hypot(mu.real, mu.imag))
-        if mu.imag == 0.0 and mu.real > 1.0:
-            beyond += 1
-    return largest, beyond % 2 == 1
+    work.largest[0] = largest
+    return largest
 
 
 @kernel
 def accept(work: LaneWork, omega: float) -> None:
-    """Take work.z as the next motion of the path."""
-    work.omega[1] = work.omega[0]
+    """Take the motion that Newton found as the next one of the path, its last step taken.
+
+    A guess would multiply what the motions behind it lack.
+    """
+    for p in range(KEPT - 1, 0, -1):
+        work.omega[p] = work.omega[p - 1]
+        for k in range(work.z.shape[0]):
+            work.path[p, k] = work.path[p - 1, k]
     work.omega[0] = omega
     for k in range(work.z.shape[0]):
-        work.behind[k], work.behind_slope[k] = work.here[k], work.here_slope[k]
-        work.here[k], work.here_slope[k] = work.z[k], work.slope[k]
+        work.path[0, k] = work.z[k] - work.r[k]
+        work.slope_behind[k], work.slope_here[k] = work.slope_here[k], work.slope[k]
 
 
 @kernel
 def restart(work: LaneWork, omega: float) -> None:
-    """Take work.z as the first motion of a path."""
-    work.omega[0] = math.nan
+    """Take the motion that Newton found as the first one of a path."""
+    forget_path(work, 0)
     accept(work, omega)
-    work.omega[2] = LONGEST
+    work.stride[0] = LONGEST
 
 
 @kernel
 def predict(work: LaneWork, omega: float) -> None:
-    """work.guess at omega by Hermite's cubic through the last two motions, or by the tangent."""
-    h = omega - work.omega[0]
-    back = work.omega[0] - work.omega[1]
+    """work.guess at omega by the polynomial through the last motions, and the last one's tangent.
+
+    Newton's form, with the first place counted twice: each motion more adds its divided difference
+    times the distances of omega from all places before. It is taken as long as it adds less than
+    the one before did: behind a kink, as where contact begins, more of them lead astray. With two
+    the guess is the cubic through their tangents, too. With more of them the earlier tangent is not
+    taken: it lacks what Newton's last step changes in it, and that would grow from guess to guess.
+    """
+    size = work.z.shape[0]
+    n, added = size // 2, math.inf
+    place, share = work.omega, work.share
+    ahead = omega - place[0]
+    for k in range(size):
+        work.guess[k] = work.path[0, k] + ahead * work.slope_here[k]
+    distances, of_slope, sum_of_gaps, taken = ahead * ahead, 1.0, 0.0, 0
+    for last in range(1, KEPT):
+        if math.isnan(place[last]):
+            break
+        gap = 1.0 / (place[0] - place[last])
+        of_slope *= gap
+        sum_of_gaps += gap
+        share[0], share[last] = -of_slope * sum_of_gaps, gap * gap
+        for q in range(1, last):
+            gap = 1.0 / (place[q] - place[last])
+            share[q] *= gap
+            share[last] *= -gap
+        most = 0.0
+        for k in range(size):
+            difference = of_slope * work.slope_here[k]
+            for q in range(last + 1):
+                difference += share[q] * work.path[q, k]
+            work.z[k] = distances * difference
+            most = max(most, abs(work.z[k]) if k < n else abs(work.z[k]) / omega)
+        if not most < added:
+            break
+        for k in range(size):
+            work.guess[k] += work.z[k]
+        distances *= omega - place[last]
+        added, taken = most, last
+    if taken == 1:
+        add_cubic(work, omega)
+
+
+@kernel
+def add_cubic(work: LaneWork, omega: float) -> None:
+    """Make the parabola through two motions and one tangent the cubic through both tangents."""
+    back, ahead = work.omega[0] - work.omega[1], omega - work.omega[0]
+    scale = ahead * ahead * (ahead + back) / (back * back)
     for k in range(work.z.shape[0]):
-        work.guess[k] = work.here[k] + h * work.here_slope[k]
-        if not math.isnan(back):
-            chord = (work.here[k] - work.behind[k]) / back
-            x = h / back
-            second = 2.0 * work.here_slope[k] - 3.0 * chord + work.behind_slope[k]
-            third = work.here_slope[k] - 2.0 * chord + work.behind_slope[k]
-            work.guess[k] += h * x * (second + x * third)
+        chord = (work.path[0, k] - work.path[1, k]) / back
+        bend = work.slope_here[k] + work.slope_behind[k] - 2.0 * chord
+        work.guess[k] += scale * bend
 
 
 @kernel
@@ -223,22 +302,21 @@ def follow(problem: Shooting, work: LaneWork, target: float) -> bool:
     """Follow the motion of the path to a frequency; False where it ends before, or turns back."""
     while work.omega[0] != target:
         omega = work.omega[0]
-        most = work.omega[2] * omega
+        most = work.stride[0] * omega
         ahead = target - omega
         whole = abs(ahead) <= most
         end = target if whole else omega + math.copysign(most, ahead)
         predict(work, end)
-        code = newton(problem, work, end)
-        if code == status.OK and work.step[0] < FAR:
-            _, beyond = largest_multiplier(work)
-            if not beyond:
-                accept(work, end)
-                work.omega[2] = min(LONGEST, 2.0 * work.omega[2])
-                continue
-        # Beyond a kink, as where contact begins, the cubic leads farther away than the tangent.
-        work.omega[1] = math.nan
-        work.omega[2] = 0.5 * min(work.omega[2], abs(ahead) / omega)
-        if work.omega[2] < SHORTEST:
+        code = newton(problem, work, end, FAR)
+        # The determinant of J is the product of all mu - 1: negative with an odd number beyond +1.
+        if code == status.OK and lu_sign(work.A, work.pivot) > 0.0:
+            accept(work, end)
+            work.stride[0] = min(LONGEST, 2.0 * work.stride[0])
+            continue
+        # Beyond a kink, as where contact begins, more motions lead farther away than the tangent.
+        forget_path(work, 1)
+        work.stride[0] = 0.5 * min(work.stride[0], abs(ahead) / omega)
+        if work.stride[0] < SHORTEST:
             return False
     return True
 
@@ -263,11 +341,10 @@ def settle(problem: Shooting, work: LaneWork, omega: float) -> bool:
             work.z[k] = flow.z[k]
             work.guess[k] = flow.z[k]
             work.flown[k] = flow.z[k]
-        if newton(problem, work, omega) == status.OK and work.step[0] < FAR:
-            largest, _ = largest_multiplier(work)
-            if largest < 1.0:
-                restart(work, omega)
-                return True
+        found = newton(problem, work, omega, FAR) == status.OK
+        if found and largest_multiplier(work, omega) < 1.0:
+            restart(work, omega)
+            return True
         for k in range(size):
             work.z[k] = work.flown[k]
     return False

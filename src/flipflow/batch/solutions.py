@@ -6,6 +6,7 @@ motion of a machine nearby that all lanes share, and neither on other lanes nor 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -96,12 +97,16 @@ def solve_lanes(
     # A read-only array is another type to the compiler, and would be compiled for anew.
     speeds_in_order, guess, even = np.array(omega), np.array(nearby.state), np.array(nearby.even)
 
+    own = threading.local()
+
     def chunk(part: slice, stop: Int) -> None:
-        work = new_lane_work(nominal, stop)
-        reading = new_reading_work(work.shooting.flow, nominal, asked)
+        # At one frequency a chunk's scratch would take a tenth of its time.
+        if not hasattr(own, "work"):
+            own.work = new_lane_work(nominal, stop)
+            own.reading = new_reading_work(own.work.shooting.flow, nominal, asked)
         run_lanes(
-            batch.arrays, part.start, part.stop, speeds_in_order, length, guess, even, work,
-            reading, asked, found, readings,
+            batch.arrays, part.start, part.stop, speeds_in_order, length, guess, even, own.work,
+            own.reading, asked, found, readings,
         )  # fmt: skip
 
     side_by_side(chunk, lanes, CHUNK, threads, tell)

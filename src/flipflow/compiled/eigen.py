@@ -70,6 +70,8 @@ def _rescale(work: Schur, i: int) -> bool:
             column += abs(T[j, i])
     if not (0.0 < row < math.inf and 0.0 < column < math.inf):
         return False
+    if row <= 2.0 * column and column <= 2.0 * row:
+        return False  # the nearest power of two is 1, as it mostly is: no logarithm is needed
     factor = 2.0 ** round(0.5 * math.log2(row / column))
     if column * factor + row / factor >= BALANCED * (column + row):
         return False
@@ -106,10 +108,11 @@ def hessenberg(work: Schur, whole: bool) -> None:
 def _reflection(T: Real, v: Real, k: int) -> float:
     """Householder's v that leaves column k one number below the diagonal; its square."""
     n = T.shape[0]
-    size = 0.0
+    square = 0.0
     for i in range(k + 1, n):
         v[i] = T[i, k]
-        size = math.hypot(size, v[i])
+        square += v[i] * v[i]
+    size = math.sqrt(square)
     v[k + 1] += size if v[k + 1] > 0.0 else -size
     square = 0.0
     for i in range(k + 1, n):
@@ -249,10 +252,10 @@ def _double_shift(work: Schur, low: int, high: int, outside: bool, whole: bool) 
     first, last = (0, n) if whole else (low, high + 1)
     for k in range(low, high):
         end = min(k + 3, high + 1)
-        size = math.hypot(x, y) if end - k == 2 else math.hypot(math.hypot(x, y), z)
+        z = z if end - k == 3 else 0.0
+        size = math.sqrt(x * x + y * y + z * z)
         if size > 0.0:
             x = x + size if x > 0.0 else x - size
-            z = z if end - k == 3 else 0.0
             _sweep_step(work, k, end - 1, (x, y, z), (max(first, k - 1), last, first), whole)
             if k > low:
                 # Below the subdiagonal only rounding is left of what was reflected.

@@ -32,6 +32,7 @@ NOTHING = -9  # no regime: nothing has changed yet
 MAX_SEARCH = 20_000  # steps of one search; thirty are usual
 AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
 SHORT = 1e-3  # exponent whose sixth power is nothing beside 1
+CLOSE = 3e-5  # share of the distance of two samples from which the parabola's summit is exact
 SMALLEST_STEP = 1e-11  # share of the horizon: least step, which bounds their number at grazing
 
 
@@ -107,7 +108,10 @@ def longest_step(motion: GapMotion, count: int, horizon: float) -> float:
 def exponentials(motion: GapMotion, count: int, t: float) -> None:
     """factor_i = exp(rate_i t) and its size, by powers where the rates are equally spaced."""
     motion.time[0] = t
-    if motion.spacing[0] > 0:
+    if t == 0.0:
+        for i in range(count):
+            motion.factor[i], motion.decay[i] = 1.0, 1.0
+    elif motion.spacing[0] > 0:
         motion.factor[0] = exponential(motion.rate[0] * t)
         motion.decay[0] = 1.0
         ratio = exponential(1j * (motion.spacing[0] * t))
@@ -245,10 +249,11 @@ def spring_change(
         up = stops.gap[j, 0] - y
         down = y + stops.gap[j, 1]
         piece = entered(stops, j)
-        return _sooner(
-            _approach(up, -v, -a, second, third, scale, piece),
-            _approach(down, v, a, second, third, scale, -piece),
-        )
+        if v > 0.0:
+            one = _approach(up, -v, -a, second, third, scale, piece)
+            return _unless_later(one, down, v, a, second, third, scale, -piece)
+        one = _approach(down, v, a, second, third, scale, -piece)
+        return _unless_later(one, up, -v, -a, second, third, scale, piece)
     side = 1 if regime > OPEN else -1
     gap = signed_gap(stops, j, regime)
     found = (math.inf, NOTHING)
@@ -273,6 +278,18 @@ def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]
     if one[1] != NOTHING or (two[1] == NOTHING and one[0] <= two[0]):
         return one
     return two
+
+
+@kernel(inline=True)
+def _unless_later(
+    one: tuple[float, int], h: float, slope: float, curvature: float, second: float, third: float,
+    scale: float, target: int,
+) -> tuple[float, int]:  # fmt: skip
+    """The sooner of a change and the zero of h; mostly that is seen to come later without roots."""
+    step, new = one
+    if new != NOTHING or (h > AT_GAP * scale and h + step * (slope - 0.5 * second * step) > 0.0):
+        return one
+    return _sooner(one, _approach(h, slope, curvature, second, third, scale, target))
 
 
 @kernel(inline=True)
@@ -341,7 +358,8 @@ def _stationary_value(
     motion: GapMotion, count: int, j: int, a: float, b: float, v_a: float, v_b: float
 ) -> float:
     """y where y' = 0 in [a, b]: Newton from the chord's zero, kept inside the bracket."""
-    t = a + (b - a) * v_a / (v_a - v_b)
+    width = b - a
+    t = a + width * v_a / (v_a - v_b)
     y = 0.0
     for _ in range(60):
         exponentials(motion, count, t)
@@ -352,10 +370,10 @@ def _stationary_value(
         else:
             b = t
         new = t - v / curvature if curvature != 0.0 else 0.5 * (a + b)
+        if abs(new - t) < CLOSE * width:
+            return y + 0.5 * v * (new - t)
         if not a < new < b:
             new = 0.5 * (a + b)
-        if abs(new - t) < 1e-8 * (abs(t) + b - a):
-            break
         t = new
     return y
 
@@ -406,28 +424,35 @@ def first_harmonic(
     motion: GapMotion, count: int, g: int, start: float, length: float, omega: float
 ) -> complex:
     """int y exp(-i omega t) dt over one piece, in closed form."""
-    turn = exponential(-1j * omega * start)
-    total = motion.offset[g] * integral_of_exponential(-1j * omega, length)
+    turning = -1j * omega
+    turned = exponential(turning * length)
+    still = integral_to(turning, length, turned)
+    total = motion.offset[g] * still
     if motion.drift[g] != 0.0:
         # By parts: int t exp(-i omega t) dt.
-        still = integral_of_exponential(-1j * omega, length)
-        moved = length * exponential(-1j * omega * length)
-        total += motion.drift[g] * (still - moved) / (1j * omega)
+        total += motion.drift[g] * (still - length * turned) / (1j * omega)
     for i in range(count):
-        amplitude = motion.amplitude[g, i]
-        total += 0.5 * amplitude * integral_of_exponential(motion.rate[i] - 1j * omega, length)
-        conjugate = motion.rate[i].conjugate() - 1j * omega
-        total += 0.5 * amplitude.conjugate() * integral_of_exponential(conjugate, length)
-    return total * turn
+        amplitude, rate = motion.amplitude[g, i], motion.rate[i]
+        grown = exponential(rate * length)
+        total += 0.5 * amplitude * integral_to(rate + turning, length, grown * turned)
+        amplitude, rate, grown = amplitude.conjugate(), rate.conjugate(), grown.conjugate()
+        total += 0.5 * amplitude * integral_to(rate + turning, length, grown * turned)
+    return total * exponential(turning * start)
 
 
 @kernel
 def integral_of_exponential(rate: complex, length: float) -> complex:
-    """int_0^length exp(rate t) dt; by its series where the closed form would lose digits."""
+    """int_0^length exp(rate t) dt."""
+    return integral_to(rate, length, exponential(rate * length))
+
+
+@kernel
+def integral_to(rate: complex, length: float, end: complex) -> complex:
+    """The same with exp(rate length) given; by its series where the closed form loses digits."""
     x = rate * length
     if modulus(x) < SHORT:
         return length * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x / 120.0))))
-    return (exponential(x) - 1.0) / rate
+    return (end - 1.0) * reciprocal(rate)
 
 
 def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:

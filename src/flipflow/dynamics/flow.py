@@ -54,6 +54,8 @@ class Flow(NamedTuple):
     start: Real  # (E,) its starting time
     length: Real  # (E,) its duration
     q: Complex  # (E, R) modal amplitudes at its start
+    factor: Complex  # (E + 1, R) exp(rate_i length) at its end; the last row is scratch
+    turn: Complex  # (E + 2, W) exp(i n_w omega t) at its start; the last row is scratch
     rest: Real  # (E, N) where it would stand still
     spring: Int  # (E,) the spring that changed at its end, -1 at the end of the flow
     kick: Real  # (E,) +1 or -1 times c M^-1 d d^T jumps into the tangent there
@@ -80,6 +82,8 @@ def new_flow(machine: MachineArrays) -> Flow:
         start=np.zeros(e),
         length=np.zeros(e),
         q=np.zeros((e, rates), np.complex128),
+        factor=np.zeros((e + 1, rates), np.complex128),
+        turn=np.zeros((e + 2, waves), np.complex128),
         rest=np.zeros((e, n)),
         spring=np.zeros(e, np.int64),
         kick=np.zeros(e),
@@ -157,7 +161,10 @@ def _add_drive(machine: MachineArrays, flow: Flow, slot: int, omega: float, e: i
 def begin_segment(
     machine: MachineArrays, flow: Flow, e: int, slot: int, omega: float, t: float
 ) -> None:
-    """Write the segment that starts at time t from flow.z: its modes and the motion at the gaps."""
+    """Write the segment that starts at time t from flow.z: its modes and the motion at the gaps.
+
+    flow.turn holds the turns of the drive at that time.
+    """
     modes = flow.modes
     size = flow.z.shape[0]
     n = size // 2
@@ -165,14 +172,12 @@ def begin_segment(
     flow.slot[e] = slot
     flow.start[e] = t
     set_rest(machine, flow, e, slot)
-    for w in range(waves):
-        flow.motion.factor[w] = exponential(1j * (machine.order[w] * omega * t))
     for i in range(count):
         flow.q[e, i] = 0.0
     for k in range(size):
         free = flow.z[k] - (flow.rest[e, k] if k < n else modes.drift[slot, k - n])
         for w in range(waves):
-            drive, turn = flow.drive[slot, w, k], flow.motion.factor[w]
+            drive, turn = flow.drive[slot, w, k], flow.turn[e, w]
             free -= drive.real * turn.real - drive.imag * turn.imag
         for i in range(count):
             flow.q[e, i] += modes.left[slot, i, k] * free
@@ -192,7 +197,7 @@ def begin_segment(
 def _set_steady(
     machine: MachineArrays, flow: Flow, e: int, coordinate: Real, g: int, motion: GapMotion
 ) -> None:
-    """Offset, drift and drive of segment e in coordinate g; motion.factor holds the turns."""
+    """Offset, drift and drive of segment e in coordinate g."""
     slot, n = flow.slot[e], coordinate.shape[1]
     count = flow.modes.mode_count[slot]
     motion.offset[g], motion.drift[g] = 0.0, 0.0
@@ -203,7 +208,7 @@ def _set_steady(
         driven = 0j
         for k in range(n):
             driven += coordinate[g, k] * flow.drive[slot, w, k]
-        motion.amplitude[g, count + w] = driven * motion.factor[w]
+        motion.amplitude[g, count + w] = driven * flow.turn[e, w]
 
 
 @kernel(inline=True)
@@ -223,6 +228,43 @@ def segment_state(
     machine: MachineArrays, flow: Flow, e: int, omega: float, elapsed: float, z: Real, rate: Real
 ) -> None:
     """State z and its time derivative, ``elapsed`` after the start of segment e."""
+    scratch = flow.start.shape[0]
+    set_turns(machine, flow, scratch + 1, omega, flow.start[e] + elapsed)
+    set_factors(flow, e, scratch, elapsed)
+    _state_of_terms(machine, flow, e, scratch, scratch + 1, omega, elapsed, z, rate)
+
+
+@kernel(inline=True)
+def end_segment(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, z: Real, rate: Real
+) -> None:
+    """State and rate at the end of segment e, whose exponentials there are recorded."""
+    set_turns(machine, flow, e + 1, omega, flow.start[e] + flow.length[e])
+    set_factors(flow, e, e, flow.length[e])
+    _state_of_terms(machine, flow, e, e, e + 1, omega, flow.length[e], z, rate)
+
+
+@kernel(inline=True)
+def set_turns(machine: MachineArrays, flow: Flow, row: int, omega: float, t: float) -> None:
+    """A row of flow.turn for time t."""
+    for w in range(machine.order.shape[0]):
+        flow.turn[row, w] = exponential(1j * (machine.order[w] * omega * t))
+
+
+@kernel(inline=True)
+def set_factors(flow: Flow, e: int, row: int, elapsed: float) -> None:
+    """A row of flow.factor for a time after the start of segment e."""
+    slot = flow.slot[e]
+    for i in range(flow.modes.mode_count[slot]):
+        flow.factor[row, i] = exponential(flow.modes.rate[slot, i] * elapsed)
+
+
+@kernel(inline=True)
+def _state_of_terms(
+    machine: MachineArrays, flow: Flow, e: int, row: int, turned: int, omega: float,
+    elapsed: float, z: Real, rate: Real,
+) -> None:  # fmt: skip
+    """State and rate in segment e from a row of flow.factor and one of flow.turn."""
     modes, slot = flow.modes, flow.slot[e]
     n = z.shape[0] // 2
     for k in range(n):
@@ -230,14 +272,13 @@ def segment_state(
         z[k], z[n + k] = flow.rest[e, k] + drift * elapsed, drift
         rate[k], rate[n + k] = drift, 0.0
     for w in range(machine.order.shape[0]):
-        turning = machine.order[w] * omega
-        turn = exponential(1j * (turning * (flow.start[e] + elapsed)))
+        turning, turn = machine.order[w] * omega, flow.turn[turned, w]
         for k in range(z.shape[0]):
             steady = flow.drive[slot, w, k] * turn
             z[k] += steady.real
             rate[k] -= turning * steady.imag
     for i in range(modes.mode_count[slot]):
-        term = modes.weight[slot, i] * flow.q[e, i] * exponential(modes.rate[slot, i] * elapsed)
+        term = modes.weight[slot, i] * flow.q[e, i] * flow.factor[row, i]
         slope = term * modes.rate[slot, i]
         for k in range(z.shape[0]):
             v = modes.right[slot, k, i]
@@ -257,9 +298,7 @@ def segment_motion(
     count, waves = modes.mode_count[slot], machine.order.shape[0]
     n = coordinate.shape[1]
     for w in range(waves):
-        turning = machine.order[w] * omega
-        motion.factor[w] = exponential(1j * (turning * flow.start[e]))
-        motion.rate[count + w] = 1j * turning
+        motion.rate[count + w] = 1j * (machine.order[w] * omega)
     for i in range(count):
         motion.rate[i] = modes.rate[slot, i]
     for g in range(coordinate.shape[0]):
@@ -279,6 +318,7 @@ def run_flow(
     """Carry flow.z over ``duration`` from time t, recording segments; ``rate`` is z' at the end."""
     capacity = flow.start.shape[0]
     set_regimes(machine, flow)
+    set_turns(machine, flow, 0, omega, t)
     end = t + duration
     fired = -1
     for e in range(capacity):
@@ -298,7 +338,7 @@ def run_flow(
         flow.length[e] = length
         flow.spring[e] = spring
         flow.kick[e] = 0.0
-        segment_state(machine, flow, e, omega, length, flow.z, rate)
+        end_segment(machine, flow, e, omega, flow.z, rate)
         if spring < 0:
             return status.OK
         flow.kick[e] = tangent_kick(machine.stops, spring, flow.regime[spring], new)
@@ -327,9 +367,7 @@ def contact_number(flow: Flow, sided: bool) -> int:
 
 
 @kernel(shared=True)
-def carry_tangent(
-    machine: MachineArrays, flow: Flow, omega: float, U: Real, slope: float, work: Complex
-) -> None:
+def carry_tangent(machine: MachineArrays, flow: Flow, U: Real, slope: float, work: Complex) -> None:
     """Carry columns of U, (2 N, columns), over the recorded flow, as tangents of the state.
 
     The last column moves with omega as well, d omega = ``slope``, at fixed time: it follows the
@@ -341,10 +379,10 @@ def carry_tangent(
         slot = flow.slot[e]
         length = flow.length[e]
         if slope != 0.0:
-            add_driven_slope(machine, flow, slot, omega, flow.start[e], -slope, U)
-        _carry_free(flow, slot, length, U, work)
+            _add_turned_slope(machine, flow, slot, e, flow.start[e], -slope, U)
+        _carry_free(flow, e, U, work)
         if slope != 0.0:
-            add_driven_slope(machine, flow, slot, omega, flow.start[e] + length, slope, U)
+            _add_turned_slope(machine, flow, slot, e + 1, flow.start[e] + length, slope, U)
         if flow.kick[e] != 0.0:
             saltation(machine, flow.spring[e], flow.kick[e], U, size)
 
@@ -354,24 +392,33 @@ def add_driven_slope(
     machine: MachineArrays, flow: Flow, slot: int, omega: float, t: float, share: float, U: Real
 ) -> None:
     """Add a share of the driven motion's derivative in omega at time t to the last column."""
+    scratch = flow.start.shape[0] + 1
+    set_turns(machine, flow, scratch, omega, t)
+    _add_turned_slope(machine, flow, slot, scratch, t, share, U)
+
+
+@kernel(inline=True)
+def _add_turned_slope(
+    machine: MachineArrays, flow: Flow, slot: int, row: int, t: float, share: float, U: Real
+) -> None:
+    """The same with the turns at time t in a row of flow.turn."""
     last = U.shape[1] - 1
     for w in range(machine.order.shape[0]):
-        order = machine.order[w]
-        turn = exponential(1j * (order * omega * t))
+        order, turn = machine.order[w], flow.turn[row, w]
         for k in range(U.shape[0]):
             slope = flow.drive_slope[slot, w, k] + 1j * order * t * flow.drive[slot, w, k]
             U[k, last] += share * (slope * turn).real
 
 
 @kernel(inline=True)
-def _carry_free(flow: Flow, slot: int, length: float, U: Real, work: Complex) -> None:
-    """U = exp(A length) U by the modes of the contact state."""
-    modes = flow.modes
+def _carry_free(flow: Flow, e: int, U: Real, work: Complex) -> None:
+    """U = exp(A length) U over segment e, by the modes of its contact state."""
+    modes, slot = flow.modes, flow.slot[e]
     size, columns = U.shape
     count = modes.mode_count[slot]
     # Columns are innermost: they lie side by side in memory.
     for i in range(count):
-        factor = modes.weight[slot, i] * exponential(modes.rate[slot, i] * length)
+        factor = modes.weight[slot, i] * flow.factor[e, i]
         for c in range(columns):
             work[i, c] = 0.0
         for k in range(size):

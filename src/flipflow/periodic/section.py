@@ -13,7 +13,15 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, carry_tangent, run_flow, segment_state
+from flipflow.dynamics.flow import (
+    Flow,
+    carry_tangent,
+    end_segment,
+    run_flow,
+    segment_state,
+    set_factors,
+    set_turns,
+)
 from flipflow.dynamics.law import exit_of, signed_gap
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 from flipflow.periodic.shooting import Shooting, ShootingWork
@@ -117,7 +125,7 @@ def carried(problem: Shooting, work: ShootingWork, w: Real, tangent: Real, end: 
     segment_state(problem.machine, flow, 0, omega, 0.0, work.start, work.first_rate)
     for k in range(size):
         column[k, 0] = tangent[k] + work.first_rate[k] * slope * begin / omega
-    carry_tangent(problem.machine, flow, omega, column, slope, work.columns)
+    carry_tangent(problem.machine, flow, column, slope, work.columns)
     end = begin + angle / omega
     for k in range(size):
         w[k] = sign * flow.z[k]
@@ -148,9 +156,11 @@ def carried_home(problem: Shooting, work: ShootingWork, w: Real, tangent: Real) 
         e += 1
     segments, length, kick = flow.segments[0], flow.length[e], flow.kick[e]
     flow.segments[0], flow.length[e], flow.kick[e] = e + 1, t - flow.start[e], 0.0
-    carry_tangent(problem.machine, flow, omega, U, 1.0, work.columns)
-    segment_state(problem.machine, flow, e, omega, float(flow.length[e]), work.start, work.rate)
+    end_segment(problem.machine, flow, e, omega, work.start, work.rate)
+    carry_tangent(problem.machine, flow, U, 1.0, work.columns)
     flow.segments[0], flow.length[e], flow.kick[e] = segments, length, kick
+    set_turns(problem.machine, flow, e + 1, omega, flow.start[e] + length)
+    set_factors(flow, e, e, length)
     for k in range(size):
         in_omega = U[k, 2] - work.rate[k] * t / omega
         w[k] = problem.sign * (work.start[k] + U[k, 0] + step * in_omega)

@@ -106,7 +106,7 @@ def shoot(problem: Shooting, work: ShootingWork, z: Real, omega: float, U: Real)
     code = run_flow(problem.machine, flow, omega, begin, duration, work.rate)
     if code == status.OK:
         slope = 1.0 if U.shape[1] > U.shape[0] else 0.0
-        carry_tangent(problem.machine, flow, omega, U, slope, work.columns)
+        carry_tangent(problem.machine, flow, U, slope, work.columns)
         for k in range(U.shape[0]):
             if not math.isfinite(flow.z[k]):
                 return status.NOT_FINITE

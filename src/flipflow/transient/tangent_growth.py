@@ -53,7 +53,7 @@ def grow(
             if code != status.OK:
                 return code
             add_touches(machine, flow, touched)
-            carry_tangent(machine, flow, omega, frame, 0.0, work.columns)
+            carry_tangent(machine, flow, frame, 0.0, work.columns)
             if not orthonormal(frame, omega, growth, p):
                 return status.SINGULAR
         for k in range(size):
