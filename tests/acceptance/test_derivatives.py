@@ -541,13 +541,26 @@ def test_the_phase_of_the_force_changes_no_derivative(clearance):
         assert found.sensitivity(("amplitude", 0), names) == pytest.approx(wanted, rel=1e-9)
 
 
+# States at t = 0 of motions of three periods, all unstable: a search finds them or not.
+OF_THREE_PERIODS = (
+    (0.0776933, -0.3737119, 0.1996758, 0.5213726, 1.4718805, -2.268271, 0.3937275, 0.6397192),
+    (0.0691937, -0.3831653, 0.1927975, 0.5325574, 1.4725124, -2.2561468, 0.3881319, 0.6463147),
+    (0.0741349, -0.3722761, 0.1792921, 0.5353566, 1.4819046, -2.2360786, 0.4045111, 0.6411217),
+    (0.0842347, -0.3577915, 0.180384, 0.5249294, 1.4843367, -2.2390509, 0.4209314, 0.6329924),
+)
+
+
 def test_a_summit_just_beyond_a_change_of_contact():
     """Rounding decides which of two samples of one moment, before and after it, is higher."""
     machine, omega = random_machine(50029), 1.0706425372248596
     names = ["forcing", "omega"]
-    found = ff.periodic_orbits(machine, omega, max_periods=3)
-    assert max(orbit.periods for orbit in found) == 3
-    for orbit in found:
+    solver = ExactSolver(machine, half_turn=False, turns=3)
+    points = [solver.solve(np.array(state), omega) for state in OF_THREE_PERIODS]
+    assert None not in points
+    for point in points:
+        orbit = Orbit(machine, point)
+        turns = orbit.displacement(0, 2.0 * np.pi / omega * np.arange(3))
+        assert np.abs(np.diff(turns)).min() > 1e-3
         (slope,) = differences(orbit, names, [lambda one: one.amplitude(0)], 1e-6)
         sizes = np.array([size_of(orbit, name) for name in names])
         got = orbit.sensitivity(("amplitude", 0), names) * sizes
