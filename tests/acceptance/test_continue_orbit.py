@@ -311,6 +311,22 @@ def test_a_bridge_of_doubled_motions_is_found_from_either_end() -> None:
         close("amplitude by a search", apart, 0.0, abs=1e-8)
 
 
+def test_bridges_of_motions_that_are_small_beside_their_gaps_are_found_from_either_end() -> None:
+    """The way beside the parent is a share of the gap, thirty times the motion."""
+    stops = (
+        ff.ClearanceSpring([1.0], 46.23, 0.0, 0.0, 0.8216),
+        ff.ClearanceSpring([1.0], 1.539, 0.3213, 0.0),
+    )
+    force = ff.HarmonicForce([0.4304])
+    machine = ff.MechanicalSystem([[1.812]], [[0.08658]], [[1.325]], stops, force)
+    ends = ff.frequency_response(machine, (0.4, 1.6)).points_of("period doubling")
+    assert len(ends) == 4
+    for one, other in (ends[:2], ends[1::-1], ends[2:], ends[:1:-1]):
+        branch = ff.switch_branch(one, (0.4, 1.6))
+        assert branch.complete
+        close("the other end", branch.special_points[-1].omega, other.omega, abs=1e-8)
+
+
 def test_doubled_motions_that_end_at_a_corner_are_cut_there() -> None:
     """Under a law that pushes at once they end where the motion of one period begins to touch."""
     stop = ff.ClearanceSpring([1.0], 262.0, 9.1, 7.05, law="undamped-rebound")

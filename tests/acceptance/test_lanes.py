@@ -140,6 +140,20 @@ def test_a_stop_without_gap_among_others_changes_no_bit_of_theirs(screen):
         assert found[5, k] == pytest.approx(own.amplitude("relative"), rel=1e-8)
 
 
+def test_a_stop_without_gap_has_its_force(screen):
+    """Lanes hold it in their matrices, and one kind of machine stands beside another."""
+    columns = {
+        "clearance": np.array([0.0, 1e-3, 0.0, 6e-3]),
+        "stop_damping": np.array([2e3, 2e3, 8e3, 2e3]),
+    }
+    found, why = values(screen, columns, "stop_force", np.array([120.0]))
+    assert (why == FOUND).all()
+    for row in range(4):
+        alone = variant(screen, columns, row)
+        orbit = ff.frequency_response(alone, (100.0, 120.0)).orbit_from_below(120.0)
+        assert found[row, 0] == pytest.approx(Working(alone, orbit).value("stop_force"), rel=1e-8)
+
+
 def test_a_field_that_is_zero_varies_too(screen):
     machine = screen.replace(stop_damping=0.0)
     columns = {"stop_damping": np.array([0.0, 1e3, 2e3])}

@@ -140,3 +140,12 @@ def test_a_small_pair_just_above_contact_is_real(screen, response) -> None:
     for orbit in orbits:
         end = integrate.flow(machine, orbit.state, omega, 0.0, 10.0 * orbit.period).final
         close("state after ten turns", end, orbit.state, abs=1e-9)
+
+
+def test_the_fold_of_a_series_is_no_corner(screen):
+    """The exact motion that stands for it has no multiplier at 1, and grazes nothing."""
+    branch = ff.frequency_response(screen, (150.0, 215.0), ff.HarmonicBalance(3))
+    fold = max(branch.folds, key=lambda one: one.omega)
+    found = ff.continue_fold(fold, "clearance", (5.9e-3, 6.1e-3))
+    assert found.complete
+    assert found.notes == ()

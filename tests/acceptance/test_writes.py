@@ -12,14 +12,18 @@ import stat
 import subprocess
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
+import flipflow as ff
 from flipflow.cli.destination import Destination
+from flipflow.cli.report_files import DOCUMENTS, KEY, REPORT, ReportKey, replaced_files
 from flipflow.errors import Cancelled, StoreError
 from flipflow.results import stage
 from flipflow.results.stage import Stage
+from flipflow.results.store import json_text
 
 # Linear, of one load case and one limit: for what is written, not for what is found.
 SMALL = str(Path(__file__).parents[1] / "machines" / "small.toml")
@@ -307,6 +311,23 @@ def test_a_full_disk_leaves_the_old_set(command, small_disk, name):
     assert ".part" not in err
     assert content(small_disk / "out") == old
     assert [path.name for path in small_disk.iterdir()] == ["out"]
+
+
+def test_of_an_analysis_and_a_design_one_stays(tmp_path):
+    """Files of both would tell of two machines, and each would let the other's page go."""
+    keys = {name: ReportKey(name, {}, (REPORT, name, f"{name}.more")) for name in DOCUMENTS}
+    for mine, others in (DOCUMENTS, DOCUMENTS[::-1]):
+        folder = tmp_path / mine
+        folder.mkdir()
+        for name in (REPORT, f"{others}.more"):
+            (folder / name).touch()
+        text = json_text({"schema": "", KEY: asdict(keys[others])})
+        (folder / others).write_text(text, encoding="utf-8")
+        with pytest.raises(ff.InputError, match="the report of another input"):
+            replaced_files(folder, mine, keys[mine], overwrite=False)
+        gone = replaced_files(folder, mine, keys[mine], overwrite=True)
+        assert gone == (REPORT, others, f"{others}.more")
+        assert replaced_files(folder, others, keys[others], overwrite=False) == ()
 
 
 def test_another_report_is_not_overwritten(command, tmp_path):

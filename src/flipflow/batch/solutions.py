@@ -17,7 +17,7 @@ from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
 from flipflow.batch.side_by_side import side_by_side
-from flipflow.batch.variants import Batch, stacked
+from flipflow.batch.variants import Batch, bonded_terms, stacked
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.equation_of_motion import MachineArrays
@@ -43,7 +43,8 @@ def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Rea
     nothing = Nearby(np.full((omega.size, 2 * like.size), np.nan), np.zeros(omega.size, np.int64))
     if (nominal.size, len(nominal.springs)) != (like.size, len(like.springs)):
         return nothing
-    alone = Batch(np.zeros(1, np.int64), nominal, stacked([machine_arrays(nominal)]))
+    arrays = stacked([machine_arrays(nominal)])
+    alone = Batch(np.zeros(1, np.int64), nominal, arrays, bonded_terms(nominal)[None])
     found, _ = solve_lanes(alone, omega, nothing_asked(nominal.size, omega.size), nothing)
     good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
     even = np.where(nominal.symmetric & (found.leaning[0] == 0), 1, 0)

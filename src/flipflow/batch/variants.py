@@ -50,11 +50,15 @@ class Batch:
         One of them.
     arrays
         All of them, each array with a leading axis but for the kinds of laws and excitations.
+    bonded
+        Springs that always act, which stand in stiffness and damping: k d and c d of each,
+        (L, B, 2, N).
     """
 
     rows: Int
     system: MechanicalSystem
     arrays: MachineArrays
+    bonded: Real
 
 
 def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
@@ -102,24 +106,39 @@ def stacked(machines: list[MachineArrays]) -> MachineArrays:
 
 def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[Batch], list[int]]:
     """Each variant assembled by its ``system()``, and the rows of those that it refuses."""
-    found: dict[tuple[Any, ...], tuple[list[int], list[MachineArrays], MechanicalSystem]] = {}
+    found: dict[tuple[Any, ...], list[tuple[int, MechanicalSystem, MachineArrays, Real]]] = {}
     refused = []
     for row in np.flatnonzero(asked).tolist():
         try:
-            system = _row(machine, columns, row).system().with_bonded()
+            whole = _row(machine, columns, row).system()
+            system = whole.with_bonded()
             arrays = machine_arrays(system)
         except InputError:
             refused.append(row)
             continue
+        bonded = bonded_terms(whole)
         shared = arrays.stops.law, arrays.power, arrays.wave, arrays.order
-        key = (arrays.push.shape, *(tuple(one.tolist()) for one in shared))
-        rows, machines, _ = found.setdefault(key, ([], [], system))
-        rows.append(row)
-        machines.append(arrays)
+        key = (arrays.push.shape, bonded.shape, *(tuple(one.tolist()) for one in shared))
+        found.setdefault(key, []).append((row, system, arrays, bonded))
     return [
-        Batch(np.array(rows, np.int64), system, stacked(machines))
-        for rows, machines, system in found.values()
+        Batch(
+            rows=np.array([row for row, *_ in alike], np.int64),
+            system=alike[0][1],
+            arrays=stacked([arrays for _, _, arrays, _ in alike]),
+            bonded=np.array([bonded for *_, bonded in alike]),
+        )
+        for alike in found.values()
     ], refused
+
+
+def bonded_terms(system: MechanicalSystem) -> Real:
+    """k d and c d of the springs that always act, (B, 2, N)."""
+    terms = [
+        np.outer((spring.stiffness, spring.damping), spring.direction)
+        for spring in system.springs
+        if spring.bonded and spring.acts
+    ]
+    return np.array(terms).reshape(-1, 2, system.size)
 
 
 def _sums(machine: Own, columns: Columns, rows: Int) -> Batch | None:
@@ -143,7 +162,8 @@ def _sums(machine: Own, columns: Columns, rows: Int) -> Batch | None:
     if not sound.any():
         return None
     kept = {name: part[sound] for name, part in parts.items()}
-    return Batch(rows[sound], linear.system, _assembled(linear.system, kept))
+    none = np.zeros((np.count_nonzero(sound), 0, 2, linear.system.size))
+    return Batch(rows[sound], linear.system, _assembled(linear.system, kept), none)
 
 
 @dataclass(frozen=True, eq=False)

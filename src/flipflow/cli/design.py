@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
     from flipflow.studies.design import Proposal
 
-REPORT, PDF, DATA, MACHINE, FIGURE = (
-    "report.html", "report.pdf", "proposal.json", "machine.toml", "candidates.html",
-)  # fmt: skip
+MACHINE, FIGURE = "machine.toml", "candidates.html"
 MOST_GENERATIONS = 9999
 STAGE = "design"  # the stages of a design that keep what is found
 
@@ -53,7 +51,7 @@ def design(
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
-    from flipflow.cli.report_files import duty_key, replaced_files  # noqa: PLC0415
+    from flipflow.cli.report_files import PROPOSAL, duty_key, replaced_files  # noqa: PLC0415
     from flipflow.io.duty import load_duty  # noqa: PLC0415
     from flipflow.report.html import require_templates  # noqa: PLC0415
 
@@ -66,7 +64,7 @@ def design(
     for warning in duty.project.warnings:
         typer.echo(f"Warning: {warning}", err=True)
     folder = output or Path(f"{duty.name}-flipflow")
-    old = replaced_files(folder, DATA, duty_key(duty), overwrite=overwrite)
+    old = replaced_files(folder, PROPOSAL, duty_key(duty), overwrite=overwrite)
     with Destination(folder, json, [file]) as target:
         target.replaces(old)
         from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
@@ -92,7 +90,7 @@ def design(
 def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     """Report, machine file, numbers; the summary in the terminal."""
     from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.report_files import KEY, duty_key  # noqa: PLC0415
+    from flipflow.cli.report_files import KEY, PDF, PROPOSAL, REPORT, duty_key  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.plotting.dispatch import figure  # noqa: PLC0415
     from flipflow.report import summary  # noqa: PLC0415
@@ -109,9 +107,9 @@ def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     else:
         target.replaces([PDF])  # one of another duty would stay beside this report
     document = document_of(found)
-    files = (REPORT, MACHINE, DATA, FIGURE, *((PDF,) if pdf else ()))
+    files = (REPORT, MACHINE, PROPOSAL, FIGURE, *((PDF,) if pdf else ()))
     key = asdict(replace(duty_key(found.duty), files=files))
-    target.data(DATA, {"schema": document["schema"], KEY: key, **document})
+    target.data(PROPOSAL, {"schema": document["schema"], KEY: key, **document})
     target.picture(FIGURE, figure(found), found.duty.name)
     target.document(document)
     target.keep()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     Format = Callable[[Assessment], Mapping[str, bytes | str]]
 
 RESULTS, REPORT, PDF, KEY = "results.json", "report.html", "report.pdf", "report"
+PROPOSAL = "proposal.json"
+DOCUMENTS = (RESULTS, PROPOSAL)  # in which a report of an analysis, and of a design, keep their key
 PAPER = "a4"
 HEAD_LINES = 4  # within which a document of ours names what it is
 REMEDY = "give --overwrite to replace it, or name another folder"
@@ -28,7 +30,7 @@ REMEDY = "give --overwrite to replace it, or name another folder"
 
 @dataclass(frozen=True)
 class ReportKey:
-    """What makes a report what it is, as its folder keeps it in ``results.json``.
+    """What makes a report what it is, as its folder keeps it in one of ``DOCUMENTS``.
 
     Parameters
     ----------
@@ -162,15 +164,16 @@ def replaced_files(
     InputError
         Where the folder holds another report, unless it is to be overwritten.
     """
-    there = [name for name in (document, REPORT) if (folder / name).exists()]
+    there = [name for name in (*DOCUMENTS, REPORT) if (folder / name).exists()]
     if not there:
         return ()
-    old = _read(folder / document)
-    if old is not None and _same(old, new):
+    old = {name: _read(folder / name) for name in DOCUMENTS if name in there}
+    known = [key for key in old.values() if key is not None]
+    if set(old) == {document} and known and _same(known[0], new):
         return ()
     if not overwrite:
-        raise InputError(OUTPUT, str(folder), f"{_differs(old, new)}, {REMEDY}")
-    return () if old is None else tuple(old.files)
+        raise InputError(OUTPUT, str(folder), f"{_differs(known, new)}, {REMEDY}")
+    return _once(*(name for key in known for name in key.files))
 
 
 def _same(old: ReportKey, new: ReportKey) -> bool:
@@ -181,12 +184,12 @@ def _once(*names: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _differs(old: ReportKey | None, new: ReportKey) -> str:
-    if old is None:
+def _differs(known: Sequence[ReportKey], new: ReportKey) -> str:
+    if not known:
         return "it holds a report or results whose input is not known"
-    if old.input != new.input:
+    if any(old.input != new.input for old in known):
         return "it holds the report of another input"
-    written = " ".join(f"{name} {value}" for name, value in old.options.items())
+    written = " ".join(f"{name} {value}" for name, value in known[0].options.items())
     return f"it holds the report of this input by other options ({written or 'none'})"
 
 

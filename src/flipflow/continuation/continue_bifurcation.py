@@ -407,7 +407,8 @@ def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
         return test, 0, start, []
     gap = _grazed(start, exact)
     if gap is None:
-        return test, 0, start, [AT_LOWER_CORNER]
+        # The fold of a truncated series is none of the exact motion that stands for it.
+        return test, 0, start, [AT_LOWER_CORNER] if own.kind is ExactSolver else []
     beside = _fold_beside(start, exact)
     return (GRAZING, gap, start, [AT_CORNER]) if beside is None else (test, 0, beside, [])
 

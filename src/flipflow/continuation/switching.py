@@ -213,11 +213,16 @@ def beside(child: Solver, parent: Point, course: correction.Course) -> Point:
     critical = vectors[:, np.abs(values + 1.0).argmin()].real
     n = critical.size // 2
     weight = np.concatenate([np.ones(n), np.full(n, 1.0 / parent.omega)])
-    away = critical / np.abs(critical * weight).max()
-    away *= max(np.abs(parent.u * weight).max(), child.length)
+    motion = float(np.abs(parent.u * weight).max())
+    reach = max(motion, child.length)
+    away = reach * critical / np.abs(critical * weight).max()
     for small in SMALL:
         point = _in_plane(child, parent, small * away, course)
-        if point is not None and small < _from_image(child, parent, point) < TWICE * small:
+        if point is None:
+            continue
+        # As a share of the same length as the way that was gone.
+        apart = _from_image(child, parent, point) * motion / reach
+        if small < apart < TWICE * small:
             return point
     raise IncompleteError(
         f"no motion was found beside the one at {parent.omega:.6g} rad/s that branches off"

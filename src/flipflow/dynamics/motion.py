@@ -140,7 +140,8 @@ class Motion:
         known = (given >= 0) & (given < self.start.size) & (given == np.floor(given))
         if times.ndim != 1 or given.shape != times.shape or not known.all():
             raise InputError("piece", piece, remedy)
-        return times, given.astype(np.intp)
+        # A read-only or a strided array is another type to the compiler.
+        return np.array(times), given.astype(np.intp)
 
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop within the turn, in the order of their starts."""

@@ -14,12 +14,13 @@ from flipflow.dynamics.contact_search import (
     GapMotion,
     exponential,
     exponentials,
+    gap_state,
     prepare_search,
     switching_state,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import segment_motion
-from flipflow.dynamics.law import exit_of, signed_gap
+from flipflow.dynamics.flow import Flow, segment_motion
+from flipflow.dynamics.law import exit_between, exit_of, signed_gap
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
@@ -46,7 +47,26 @@ def near_grazing(problem: Shooting, work: ShootingWork, omega: float) -> tuple[f
                 machine, motion, count, j, flow.regimes[e, j], omega, flow.length[e]
             )
             room, depth = min(room, left), min(depth, deep)
+            left, deep = _turned_back(machine, flow, e, j, count)
+            room, depth = min(room, left), min(depth, deep)
     return room, depth
+
+
+@kernel
+def _turned_back(
+    machine: MachineArrays, flow: Flow, e: int, j: int, count: int
+) -> tuple[float, float]:
+    """Room and depth of spring j where segment e ends because p' is zero: a valley or a summit."""
+    if flow.spring[e] != j or e + 1 == flow.segments[0]:
+        return math.inf, math.inf
+    before, after = flow.regimes[e, j], flow.regimes[e + 1, j]
+    alpha, beta, _, _ = exit_between(machine.stops, j, before, after)
+    if before * after == 0 or alpha != 0.0:
+        return math.inf, math.inf
+    exponentials(flow.motion, count, flow.length[e])
+    y, _ = gap_state(flow.motion, count, j)
+    depth = abs(y - signed_gap(machine.stops, j, before))
+    return (math.inf, depth) if beta > 0.0 else (depth, math.inf)
 
 
 @kernel

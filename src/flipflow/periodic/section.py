@@ -158,6 +158,7 @@ def carried_home(problem: Shooting, work: ShootingWork, w: Real, tangent: Real) 
     flow.segments[0], flow.length[e], flow.kick[e] = e + 1, t - flow.start[e], 0.0
     end_segment(problem.machine, flow, e, omega, work.start, work.rate)
     carry_tangent(problem.machine, flow, U, 1.0, work.columns)
+    # Readings and other tangents find the flow as it was recorded.
     flow.segments[0], flow.length[e], flow.kick[e] = segments, length, kick
     set_turns(problem.machine, flow, e + 1, omega, flow.start[e] + length)
     set_factors(flow, e, e, length)

@@ -35,6 +35,7 @@ VECTORS: Mapping[str, tuple[str, ...]] = {
     "bearing": ("bearing_load", "bearing_life"),
 }
 ABOVE = 1.001  # least factor on the highest frequency at which one that falls begins
+OF_STOPS = ("stop_force", "stop_piece_force")
 SQUARED = ("shear_piece_power", "shear_temperature_rise")
 
 
@@ -195,7 +196,7 @@ class _Question:
         own = {name: column[rows] for name, column in self.columns.items()}
         of_screen = isinstance(self.machine, FlipFlowScreen)
         fields = fields_of_rows(self.machine, own) if of_screen else {}
-        plan = _Plan(self.machine, self.batch.system, fields, omega, self.quantities, rows.size)
+        plan = _Plan(self.machine, self.batch, fields, omega, self.quantities)
         found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
         told = _LaneMotions(plan, read)
         values = {one.name: told.value(one) for one in self.quantities}
@@ -229,11 +230,21 @@ class _Plan:
     """What lanes are to read at K frequencies."""
 
     machine: Machine
-    system: MechanicalSystem
+    batch: Batch
     fields: Mapping[str, Real]
     omega: Real
     quantities: tuple[Quantity, ...]
-    lanes: int
+
+    @property
+    def system(self) -> MechanicalSystem:
+        """One of the machines."""
+        return self.batch.system
+
+    @cached_property
+    def bonded(self) -> Real:
+        """k d and c d of springs without gap whose forces are read, (L, B, 2, N)."""
+        asked = {one.name for one in self.quantities} & set(OF_STOPS)
+        return self.batch.bonded if asked else self.batch.bonded[:, :0]
 
     @property
     def leading(self) -> Any:
@@ -265,13 +276,15 @@ class _Plan:
             coordinate=np.array(self.coordinates),
             squared=np.array([[1.0, -1.0]] if squared else []).reshape(-1, self.system.size),
         )
-        if not self.vectors:
+        lanes, bonded = self.bonded.shape[:2]
+        peaks = len(self.vectors) + bonded
+        if peaks == 0:
             return asked
-        lanes, speeds = self.lanes, self.omega.size
-        linear = np.zeros((lanes, len(self.vectors), 3, self.system.size))
-        along, across = np.zeros((2, lanes, speeds, len(self.vectors)), np.complex128)
+        linear = np.zeros((lanes, peaks, 3, self.system.size))
+        along, across = np.zeros((2, lanes, self.omega.size, peaks), np.complex128)
         for q, name in enumerate(self.vectors):
             self._set_vector(name, linear[:, q], along[:, :, q], across[:, :, q])
+        linear[:, len(self.vectors) :, :2] = self.bonded
         return asked._replace(linear=linear, along=along, across=across)
 
     def _set_vector(self, name: str, linear: Real, along: Complex, across: Complex) -> None:
@@ -347,7 +360,9 @@ class _LaneMotions:
         return self._peak("foundation")
 
     def stop_force(self) -> Real:
-        return np.asarray(self.read.force.max(axis=2, initial=0.0))
+        always = self.read.peak[..., len(self.plan.vectors) :]
+        forces = np.concatenate([self.read.force, always], axis=2)
+        return np.asarray(forces.max(axis=2, initial=0.0))
 
     def shear_force(self) -> Real:
         return self._peak("shear")

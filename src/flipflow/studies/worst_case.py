@@ -59,7 +59,7 @@ class WorstCase(Result):
     branch
         Which motion is meant where several exist.
     nominal
-        The quantity of the machine itself, SI, (K,).
+        The quantity of the machine itself, SI, (K,); NaN where its motion is unstable.
     least, greatest
         Its least and greatest value in the box, SI, (K,); NaN where no machine has one.
     least_at, greatest_at
