@@ -55,7 +55,7 @@ class Flow(NamedTuple):
     length: Real  # (E,) its duration
     q: Complex  # (E, R) modal amplitudes at its start
     factor: Complex  # (E + 1, R) exp(rate_i length) at its end; the last row is scratch
-    turn: Complex  # (E + 2, W) exp(i n_w omega t) at its start, the next row at its end; last: scratch
+    turn: Complex  # (E + 2, W) exp(i n_w omega t) at its start, next row: at its end; last: scratch
     rest: Real  # (E, N) where it would stand still
     spring: Int  # (E,) the spring that changed at its end, -1 at the end of the flow
     kick: Real  # (E,) +1 or -1 times c M^-1 d d^T jumps into the tangent there
