@@ -324,8 +324,9 @@ def test_a_curve_that_meets_a_grazing_ends_there_and_says_so():
         gap, orbit = curve.values[k], curve.orbits[k]
         x = orbit.displacement(0, np.linspace(0.0, orbit.period, 20_001))
         tops = x[1:-1][(x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])]
-        assert len(orbit.contact_intervals) == 2
-        # The third summit touches, but for what is left of the last step.
+        lasting = (c for c in orbit.contact_intervals if c.end - c.start > 1e-4 * orbit.period)
+        assert len(list(lasting)) == 2
+        # The third summit hardly touches, or hardly not: rounding chooses the last step's end.
         assert np.sort(np.abs(tops - gap))[0] < 1e-4 * gap
         assert tops.max() > gap
 
