@@ -12,6 +12,7 @@ from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers, whole
 
 if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
+    from flipflow.model.duty import Duty
     from flipflow.studies.design import Proposal
 
 MACHINE, FIGURE = "machine.toml", "candidates.html"
@@ -48,8 +49,7 @@ def design(
     Stopped, it keeps the best so far; with --store the same command goes on. Ends with code 6 where
     the duty cannot be done; the nearest machine is then shown.
     """
-    from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
+    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
     from flipflow.cli.report_files import PROPOSAL, duty_key, replaced_files  # noqa: PLC0415
     from flipflow.io.duty import load_duty  # noqa: PLC0415
@@ -67,24 +67,31 @@ def design(
     old = replaced_files(folder, PROPOSAL, duty_key(duty), overwrite=overwrite)
     with Destination(folder, json, [file]) as target:
         target.replaces(old)
-        from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
-        from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
-        from flipflow.studies.design import design as analysis  # noqa: PLC0415
-
-        with (
-            progress("starting") as tell,
-            executor_of(workers, scheduler) as executor,
-            stoppable(tell, STAGE) as told,
-        ):
-            compile_ahead(lambda s: tell(f"compiling, once per version: {s:.0f} s", 0.0))
-            found = analysis(
-                duty, generations=generations, store=store, executor=executor, monitor=told
-            )
+        found = _searched(duty, generations, store, workers, scheduler)
         _write(found, target, pdf=pdf)
         if found.cancelled:
             raise target.stopped(kept=True)
     if not found.possible:
         raise typer.Exit(IMPOSSIBLE)
+
+
+def _searched(
+    duty: Duty, generations: int | None, store: Path | None, workers: int | None,
+    scheduler: str | None,
+) -> Proposal:  # fmt: skip
+    """The machine for a duty, with a bar; Ctrl-C keeps the best so far."""
+    from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
+    from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
+    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
+    from flipflow.studies.design import design as analysis  # noqa: PLC0415
+
+    with (
+        progress("starting") as tell,
+        executor_of(workers, scheduler) as executor,
+        stoppable(tell, STAGE) as told,
+    ):
+        compile_ahead(lambda s: tell(f"compiling, once per version: {s:.0f} s", 0.0))
+        return analysis(duty, generations=generations, store=store, executor=executor, monitor=told)
 
 
 def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
