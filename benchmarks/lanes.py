@@ -3,8 +3,9 @@
     python benchmarks/lanes.py [--machines 2000] [--speeds 100] [--threads 2] [--seed N]
 
 Counted are lanes with contact only; each has its multipliers and its last Newton step, amplitude,
-stop force and share of contact. Beside them in the same run: a loop of the package's own single
-solutions, and scipy's event-located integration with Newton around it.
+stop force and share of contact. Beside them in the same run: derivatives of states and readings,
+and of multipliers, with respect to ten parameters; a loop of the package's own single solutions;
+and scipy's event-located integration with Newton around it.
 """
 
 import argparse
@@ -15,8 +16,10 @@ import numpy as np
 from scipy_flow import carried
 
 import flipflow as ff
+from flipflow.batch.lane_columns import lane_columns
 from flipflow.batch.reasons import FOUND
-from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
+from flipflow.batch.slope_readings import SlopesAsked
+from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes, solve_slopes
 from flipflow.batch.variants import batches
 
 FIELDS = (
@@ -48,6 +51,30 @@ def rate(batch, machine, omega, threads):
     return touching / statistics.median(processors), touching / statistics.median(walls), failed
 
 
+def derivative_ratios(batch, machine, columns, omega):
+    """Time of solutions with derivatives over that of solutions alone; then multipliers, too."""
+    asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
+    nearby = nearby_motions(machine.system(), machine.system(), omega)
+    none = np.zeros((1, omega.size, 0, len(FIELDS)), complex)
+    wanted = SlopesAsked(
+        linear=np.zeros((1, 0, 3, 2, len(FIELDS))), along=none, across=none, means=False,
+        multipliers=False, even=True, corner=np.zeros(1, np.int64),
+    )  # fmt: skip
+    spent = [[], [], []]
+    for _ in range(ROUNDS + 1):
+        clock = time.process_time()
+        found, _ = solve_lanes(batch, omega, asked, nearby)
+        spent[0].append(time.process_time() - clock)
+        for k, multipliers in ((1, False), (2, True)):
+            clock = time.process_time()
+            changes = lane_columns(machine, columns, batch, FIELDS)
+            one = wanted._replace(multipliers=multipliers)
+            solve_slopes(batch, changes.solved, omega, asked, one, found)
+            spent[k].append(time.process_time() - clock)
+    alone, slopes, maps = (statistics.median(one[1:]) for one in spent)
+    return 1.0 + slopes / alone, 1.0 + maps / alone
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--machines", type=int, default=2000)
@@ -70,6 +97,10 @@ def main():
             of_processor, of_wall, failed = rate(batch, machine, omega, threads)
             label = f"{name}, {threads} thread{'s' if threads > 1 else ''}"
             print(f"{label:34s}{of_processor:14,.0f}{of_wall:14,.0f}{failed:12d}")
+    for name, omega in (("along speed", along), ("unrelated, one speed", single)):
+        slopes, maps = derivative_ratios(batch, machine, columns, omega)
+        label = f"with derivatives, {name}"
+        print(f"{label:42s} {slopes:.2f} times as long, of multipliers too {maps:.2f}")
     few = 20
     ff.periodic_orbits(machine, omega=120.0)  # compiled beforehand
     ff.frequency_response(machine, omega=(5.0, 250.0))

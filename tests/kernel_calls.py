@@ -13,7 +13,6 @@ from flipflow.dynamics.contact_search import extremes, next_change, prepare_sear
 from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.dynamics.machine_series import set_machine
 from flipflow.periodic.balance import balance_residual
-from flipflow.periodic.near_grazing import near_grazing
 from flipflow.periodic.sampled import sampled_residual
 from flipflow.periodic.shooting import shooting_residual
 from flipflow.periodic.two_event import force_excess
@@ -124,9 +123,3 @@ def varied(problem, work, u, value, r, J):
 def series_machine(series, work, value, beside, machine):
     """``set_machine``."""
     return set_machine(series, work, value, beside, machine)
-
-
-@kernel(entry=True)
-def room_and_depth(problem, work, omega):
-    """``near_grazing`` of the recorded flow."""
-    return near_grazing(problem, work, omega)

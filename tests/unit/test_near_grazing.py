@@ -10,7 +10,7 @@ import pytest
 import flipflow as ff
 from flipflow.model.contact_law import ContactLaw
 from flipflow.periodic.exact_solver import ExactSolver
-from kernel_calls import room_and_depth
+from flipflow.periodic.near_grazing import near_grazing
 
 pytestmark = pytest.mark.numerical
 SAMPLES = 20_000
@@ -32,7 +32,7 @@ def test_the_shallowest_contact_and_the_highest_summit_outside(law):
     for k in touching:
         orbit = branch.orbit(k)
         assert solver.residual(orbit.state, orbit.omega) is not None
-        _, depth = room_and_depth(solver.problem, solver.scratch, orbit.omega)
+        _, depth = near_grazing(solver.problem, solver.scratch, orbit.omega)
         y = orbit.displacement(1, orbit.period * np.arange(SAMPLES) / SAMPLES)
         summits = np.array([])
         for side, gap in zip((1.0, -1.0), stop.gaps, strict=True):

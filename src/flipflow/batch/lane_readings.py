@@ -104,7 +104,8 @@ def read_lane(
             along, across = asked.along[which, f, q], asked.across[which, f, q]
             linear = asked.linear[which, q]
             count = set_vector(machine, flow, work.vector, e, omega, linear, along, across)
-            largest = max(largest, longest(work.vector, count, flow.length[e]))
+            here, _ = longest(work.vector, count, flow.length[e])
+            largest = max(largest, here)
         out.peak[lane, f, q] = largest
 
 
@@ -130,15 +131,15 @@ def read_stops(
                 if count == 0:
                     count = segment_motion(machine, flow, e, omega, machine.direction, motion)
                 out.share[lane, f, j] += flow.length[e] / turn
-                peak = force_peak(machine, flow, motion, count, e, j)
+                peak, _ = force_peak(machine, flow, motion, count, e, j)
                 out.force[lane, f, j] = max(out.force[lane, f, j], peak)
 
 
 @kernel
 def force_peak(
     machine: MachineArrays, flow: Flow, motion: GapMotion, count: int, e: int, j: int
-) -> float:
-    """Greatest force of stop j during segment e; its row becomes the force."""
+) -> tuple[float, float]:
+    """Greatest force of stop j during segment e, and when; its row becomes the force."""
     stops, regime = machine.stops, flow.regimes[e, j]
     k = stiffness_share(stops, j, regime) * stops.stiffness[j]
     c = damping_share(stops, j, regime) * stops.damping[j]
@@ -148,8 +149,8 @@ def force_peak(
     for i in range(count):
         motion.amplitude[j, i] *= k + c * motion.rate[i]
     prepare_search(motion, count)
-    low, high = extremes(motion, count, j, flow.length[e])
-    return max(-low, high)
+    low, high, at_low, at_high = extremes(motion, count, j, flow.length[e])
+    return (high, at_high) if high > -low else (-low, at_low)
 
 
 @kernel

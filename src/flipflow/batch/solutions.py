@@ -15,12 +15,15 @@ import numpy as np
 from flipflow.batch.lane_kernels import Found, new_found, run_lanes
 from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
+from flipflow.batch.lane_slopes import slope_lanes
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
 from flipflow.batch.side_by_side import side_by_side
+from flipflow.batch.slope_readings import Slopes, SlopesAsked, new_slope_work, new_slopes
 from flipflow.batch.variants import Batch, bonded_terms, stacked
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.parameter_tangent import Columns
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.solver import characteristic_length
 
@@ -44,7 +47,8 @@ def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Rea
     if (nominal.size, len(nominal.springs)) != (like.size, len(like.springs)):
         return nothing
     arrays = stacked([machine_arrays(nominal)])
-    alone = Batch(np.zeros(1, np.int64), nominal, arrays, bonded_terms(nominal)[None])
+    bonded = bonded_terms(nominal)[None]
+    alone = Batch(np.zeros(1, np.int64), nominal, arrays, bonded, nominal.M[None])
     found, _ = solve_lanes(alone, omega, nothing_asked(nominal.size, omega.size), nothing)
     good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
     even = np.where(nominal.symmetric & (found.leaning[0] == 0), 1, 0)
@@ -123,3 +127,42 @@ def _machine(arrays: MachineArrays, lane: int) -> MachineArrays:
     stops = arrays.stops
     gaps = {name: getattr(stops, name)[lane].copy() for name in ("stiffness", "damping", "gap")}
     return arrays._replace(**own, stops=stops._replace(**gaps))
+
+
+def solve_slopes(
+    batch: Batch,
+    columns: Columns,
+    omega: Real,
+    asked: Asked,
+    wanted: SlopesAsked,
+    found: Found,
+    threads: int = 1,
+) -> Slopes:
+    """Derivatives of the stable motions that :func:`solve_lanes` found, and of their readings.
+
+    Parameters
+    ----------
+    batch, omega, asked, threads
+        As of :func:`solve_lanes`.
+    columns
+        How the machines change with P parameters.
+    wanted
+        What is differentiated.
+    found
+        The motions.
+    """
+    nominal, parameters = _machine(batch.arrays, 0), columns.touches.shape[0]
+    slopes = new_slopes(found, nominal, asked, parameters)
+    length = characteristic_length(batch.system, nominal)
+    speeds_in_order, own = np.array(omega), threading.local()
+
+    def chunk(part: slice, stop: Int) -> None:
+        if not hasattr(own, "work"):
+            own.work = new_slope_work(nominal, asked, parameters, stop, maps=wanted.multipliers)
+        slope_lanes(
+            batch.arrays, columns, part.start, part.stop, speeds_in_order, length, asked, wanted,
+            own.work, found, slopes,
+        )  # fmt: skip
+
+    side_by_side(chunk, batch.rows.size, CHUNK, threads, None)
+    return slopes

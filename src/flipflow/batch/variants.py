@@ -32,6 +32,7 @@ Columns = Mapping[str, NDArray[Any]]
 Bool = NDArray[np.bool_]
 Shapes = dict[str, tuple[int, ...]]
 Own = FlipFlowScreen | MechanicalSystem
+_Alone = tuple[int, MechanicalSystem, MachineArrays, Real, Real]  # row, system, inertia, bonded
 EXACT = 1e-12  # deviation of a sum, as a share of the largest number of its array
 # Changes of a parameter, as shares of its value, over which its share in the sums is read: what is
 # linear is so over any, and a wide one loses no digits.
@@ -53,12 +54,19 @@ class Batch:
     bonded
         Springs that always act, which stand in stiffness and damping: k d and c d of each,
         (L, B, 2, N).
+    inertia
+        Their mass matrices, (L, N, N).
+    slopes
+        What each parameter adds to the parts of
+        :func:`~flipflow.dynamics.assembly.machine_parts`, where all of them are sums; else None.
     """
 
     rows: Int
     system: MechanicalSystem
     arrays: MachineArrays
     bonded: Real
+    inertia: Real
+    slopes: Mapping[str, Mapping[str, Real]] | None = None
 
 
 def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
@@ -106,11 +114,11 @@ def stacked(machines: list[MachineArrays]) -> MachineArrays:
 
 def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[Batch], list[int]]:
     """Each variant assembled by its ``system()``, and the rows of those that it refuses."""
-    found: dict[tuple[Any, ...], list[tuple[int, MechanicalSystem, MachineArrays, Real]]] = {}
+    found: dict[tuple[Any, ...], list[_Alone]] = {}
     refused = []
     for row in np.flatnonzero(asked).tolist():
         try:
-            whole = _row(machine, columns, row).system()
+            whole = variant(machine, columns, row).system()
             system = whole.with_bonded()
             arrays = machine_arrays(system)
         except InputError:
@@ -119,13 +127,14 @@ def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[B
         bonded = bonded_terms(whole)
         shared = arrays.stops.law, arrays.power, arrays.wave, arrays.order
         key = (arrays.push.shape, bonded.shape, *(tuple(one.tolist()) for one in shared))
-        found.setdefault(key, []).append((row, system, arrays, bonded))
+        found.setdefault(key, []).append((row, system, arrays, whole.M, bonded))
     return [
         Batch(
             rows=np.array([row for row, *_ in alike], np.int64),
             system=alike[0][1],
-            arrays=stacked([arrays for _, _, arrays, _ in alike]),
+            arrays=stacked([arrays for _, _, arrays, *_ in alike]),
             bonded=np.array([bonded for *_, bonded in alike]),
+            inertia=np.array([inertia for *_, inertia, _ in alike]),
         )
         for alike in found.values()
     ], refused
@@ -163,7 +172,12 @@ def _sums(machine: Own, columns: Columns, rows: Int) -> Batch | None:
         return None
     kept = {name: part[sound] for name, part in parts.items()}
     none = np.zeros((np.count_nonzero(sound), 0, 2, linear.system.size))
-    return Batch(rows[sound], linear.system, _assembled(linear.system, kept), none)
+    slopes = {
+        name: dict(zip(linear.shapes, _split(slope, linear.shapes), strict=True))
+        for name, slope in linear.slopes.items()
+    }
+    arrays = _assembled(linear.system, kept)
+    return Batch(rows[sound], linear.system, arrays, none, kept["inertia"], slopes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +232,7 @@ def _with_own(machine: Own, columns: Columns) -> Own:
     return with_values(machine, none) if none else machine
 
 
-def _row(machine: Machine, columns: Columns, row: int) -> Machine:
+def variant(machine: Machine, columns: Columns, row: int) -> Machine:
     """The variant of one row."""
     given = {name: column[row] for name, column in columns.items()}
     plain = {

@@ -103,8 +103,8 @@ class _Asked:
         one = self.file
         return analysis(
             one.project.screen, one.vary, one.quantities, one.omega, load_cases=one.load_cases,
-            sampling=one.sampling, branch=one.branch, store=self.store, executor=executor,
-            monitor=tell,
+            sampling=one.sampling, branch=one.branch, derivatives=one.derivatives,
+            store=self.store, executor=executor, monitor=tell,
         )  # fmt: skip
 
     def judged(self, found: Study) -> Tolerance | None:

@@ -30,6 +30,7 @@ RETURNED = {
     "int": types.int64,
     "float": types.float64,
     "tuple[float, float]": types.UniTuple(types.float64, 2),
+    "tuple[float, float, float, float]": types.UniTuple(types.float64, 4),
 }
 
 # The shared kernel and the types of its arguments that each symbol stands for.

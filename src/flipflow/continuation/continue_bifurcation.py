@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -34,11 +33,11 @@ from flipflow.continuation.switching import follow_both_ways
 from flipflow.continuation.varied import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, members_of
-from flipflow.model.contact_law import switching
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import Parameter, parameter_of, with_values
 from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.near_grazing import near_grazing
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import UNDETERMINED
@@ -54,7 +53,6 @@ BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one 
 FINE = 20.0  # steps in each of these intervals
 GRAZED = 1e-6  # depth beyond a gap that a motion grazes, as a share of the motion
 BEFORE_GRAZING = 1e-4  # the same, from which a curve that stalls is held to end at it
-SAMPLES = 4097  # of a turn, for its summits
 AT_CORNER = (
     "The fold lies where a contact begins and the branch has a corner: the curve is that of the "
     "grazing, and a fold as long as the branch turns back there."
@@ -353,28 +351,12 @@ def _ended(
 
 def _grazes(orbit: Orbit, length: float) -> bool:
     """Whether what a stop watches stands still hardly off zero: a summit, a valley, a force."""
-    t = np.linspace(0.0, orbit.period, SAMPLES)[:-1]
-    x, v = (orbit.motion.derivative(t, order) for order in (0, 1))
-    for spring in orbit.system.springs:
-        d = np.asarray(spring.direction)
-        for side, gap in zip((1.0, -1.0), spring.gaps, strict=True):
-            if not np.isfinite(gap):
-                continue
-            depth, rate = side * (x @ d) - gap, side * (v @ d)
-            nearest = _stands_still(depth)
-            for alpha, beta in switching(spring.law, spring.stiffness, spring.damping):
-                # A rate is as far as the rate over omega, as where the section is chosen.
-                h = (alpha * depth + beta * rate) / (alpha or beta * orbit.omega)
-                nearest = np.append(nearest, _stands_still(h, depth > 0.0))
-            if np.any(nearest < BEFORE_GRAZING * length):
-                return True
-    return False
-
-
-def _stands_still(h: Real, where: NDArray[np.bool_] | bool = True) -> Real:
-    """|h| at the samples of a turn at which it is greatest or least."""
-    ahead, behind = np.roll(h, -1) - h, h - np.roll(h, 1)
-    return np.asarray(np.abs(h[(ahead * behind <= 0.0) & where]))
+    own = orbit.point.formulation
+    solver = ExactSolver(own.system, half_turn=own.half_turn, turns=own.turns)
+    if solver.residual(orbit.state, orbit.omega) is None:
+        return False
+    nearest = min(near_grazing(solver.problem, solver.scratch, orbit.omega))
+    return nearest < BEFORE_GRAZING * length
 
 
 def _values(point: Point) -> tuple[float, float]:

@@ -305,8 +305,12 @@ def _approach(
 
 
 @kernel(shared=True)
-def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[float, float]:
+def extremes(
+    motion: GapMotion, count: int, j: int, duration: float
+) -> tuple[float, float, float, float]:
     """Smallest and largest y_j over [0, duration], of both ends and of every zero of y' found.
+
+    The times at which they stand come after them.
 
     A zero of y' is sought where y' changes sign between two samples, which stand a third of a
     radian apart at the mean frequency of the motion. A pair of zeros between two samples could hide
@@ -324,7 +328,7 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
         motion.turn[i] = motion.amplitude[j, i]
         motion.ratio[i] = exponential(motion.rate[i] * step)
     low, high = math.inf, -math.inf
-    v_before = 0.0
+    at_low, at_high, v_before = 0.0, 0.0, 0.0
     for k in range(samples + 1):
         v = motion.drift[j]
         y = motion.offset[j] + v * k * step
@@ -333,12 +337,15 @@ def extremes(motion: GapMotion, count: int, j: int, duration: float) -> tuple[fl
             y += term.real
             v += term.real * motion.rate[i].real - term.imag * motion.rate[i].imag
             motion.turn[i] = term * motion.ratio[i]
-        low, high = min(low, y), max(high, y)
+        t = k * step
+        low, at_low = (y, t) if y < low else (low, at_low)
+        high, at_high = (y, t) if y > high else (high, at_high)
         if k > 0 and v * v_before < 0.0:
-            y = _stationary_value(motion, count, j, (k - 1) * step, k * step, v_before, v)
-            low, high = min(low, y), max(high, y)
+            y, t = _stationary_value(motion, count, j, t - step, t, v_before, v)
+            low, at_low = (y, t) if y < low else (low, at_low)
+            high, at_high = (y, t) if y > high else (high, at_high)
         v_before = v
-    return low, high
+    return low, high, at_low, at_high
 
 
 @kernel(inline=True)
@@ -356,8 +363,8 @@ def _mean_frequency(motion: GapMotion, count: int, j: int, t: float) -> float:
 @kernel(inline=True)
 def _stationary_value(
     motion: GapMotion, count: int, j: int, a: float, b: float, v_a: float, v_b: float
-) -> float:
-    """y where y' = 0 in [a, b]: Newton from the chord's zero, kept inside the bracket."""
+) -> tuple[float, float]:
+    """y where y' = 0 in [a, b], and when: Newton from the chord's zero, kept inside the bracket."""
     width = b - a
     t = a + width * v_a / (v_a - v_b)
     y = 0.0
@@ -371,11 +378,11 @@ def _stationary_value(
             b = t
         new = t - v / curvature if curvature != 0.0 else 0.5 * (a + b)
         if abs(new - t) < CLOSE * width:
-            return y + 0.5 * v * (new - t)
+            return y + 0.5 * v * (new - t), new
         if not a < new < b:
             new = 0.5 * (a + b)
         t = new
-    return y
+    return y, t
 
 
 @kernel(entry=True)
@@ -414,7 +421,7 @@ def observe_motion(
                 motion.amplitude[g, modes + h] = harmonic[g, e, h] * turn
         prepare_search(motion, count)
         for g in range(low.shape[0]):
-            least, most = extremes(motion, count, g, length[e])
+            least, most, _, _ = extremes(motion, count, g, length[e])
             low[g], high[g] = min(low[g], least), max(high[g], most)
             first[g] += first_harmonic(motion, count, g, start[e], length[e], omega)
 

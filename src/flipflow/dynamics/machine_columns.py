@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -47,9 +48,14 @@ class MachineColumns:
     @property
     def keeps_mirror(self) -> bool:
         """Whether a machine that is its own mirror image stays so with every parameter."""
-        gap = self.parts["gap"]
-        even = np.allclose(gap[..., 0], gap[..., 1], rtol=1e-9, atol=0.0)
-        return even and not self.parts["static"].any()
+        return keeps_mirror(self.parts)
+
+
+def keeps_mirror(parts: Mapping[str, Real]) -> bool:
+    """Whether changes of a machine's parts leave it its own mirror image."""
+    gap = parts["gap"]
+    even = np.allclose(gap[..., 0], gap[..., 1], rtol=1e-9, atol=0.0)
+    return even and not parts["static"].any()
 
 
 def machine_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> MachineColumns:
@@ -74,33 +80,45 @@ def machine_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> Ma
         name: np.array([row[name] for row in rows]).reshape(len(rows), *array.shape)
         for name, array in own.items()
     }
-    return MachineColumns(parts, _solved(own["inertia"], parts))
+    return MachineColumns(parts, solved_columns(own["inertia"], parts))
 
 
-def _solved(M: Real, parts: Mapping[str, Real]) -> Columns:
-    """Solve with M what carries an index of its degrees of freedom."""
+def solved_columns(M: Real, parts: Mapping[str, Real]) -> Columns:
+    """Solve with M what carries an index of its degrees of freedom.
+
+    M is (N, N), or (L, N, N) of L machines; then all but "touches" have a leading axis, too.
+    """
     forces = parts["force"].shape[1] // 2
-    n = M.shape[0]
+    n = M.shape[-1]
     carried = {name: parts[name] for name in ("direction", "force", "static")}
     carried |= {name: parts[name].swapaxes(1, 2) for name in ("inertia", "damping", "stiffness")}
     right = np.concatenate([one.reshape(-1, n) for one in carried.values()])
-    left = np.linalg.solve(M, right.T).T
-    solved = {}
+    left = np.linalg.solve(M, right.T).swapaxes(-1, -2)
+    leading = M.shape[:-2]
+    solved, begin = {}, 0
     for name, one in carried.items():
-        solved[name], left = left[: one.size // n].reshape(one.shape), left[one.size // n :]
-    push = solved["force"][:, :forces] + 1j * solved["force"][:, forces:]
-    kernel_ready = np.ascontiguousarray
+        rows = one.size // n
+        solved[name] = left[..., begin : begin + rows, :].reshape(*leading, *one.shape)
+        begin += rows
+
+    def kernel_ready(array: Any) -> Any:
+        return np.ascontiguousarray(array)
+
+    def every(array: Real) -> Real:
+        return np.array(np.broadcast_to(array, (*leading, *array.shape)))
+
+    push = solved["force"][..., :forces, :] + 1j * solved["force"][..., forces:, :]
     return Columns(
-        inertia=kernel_ready(solved["inertia"].swapaxes(1, 2)),
-        damping=kernel_ready(solved["damping"].swapaxes(1, 2)),
-        stiffness=kernel_ready(solved["stiffness"].swapaxes(1, 2)),
-        direction=parts["direction"],
+        inertia=kernel_ready(solved["inertia"].swapaxes(-1, -2)),
+        damping=kernel_ready(solved["damping"].swapaxes(-1, -2)),
+        stiffness=kernel_ready(solved["stiffness"].swapaxes(-1, -2)),
+        direction=every(parts["direction"]),
         reach=kernel_ready(solved["direction"]),
-        static=kernel_ready(solved["static"][:, 0]),
+        static=kernel_ready(solved["static"][..., 0, :]),
         push=kernel_ready(push),
-        stop_stiffness=kernel_ready(parts["stop"][:, 0]),
-        stop_damping=kernel_ready(parts["stop"][:, 1]),
-        gap=parts["gap"],
+        stop_stiffness=every(parts["stop"][:, 0]),
+        stop_damping=every(parts["stop"][:, 1]),
+        gap=every(parts["gap"]),
         touches=_touches(parts),
     )
 

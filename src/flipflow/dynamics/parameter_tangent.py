@@ -27,6 +27,7 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
     add_driven_slope,
+    saltation,
     segment_state,
 )
 from flipflow.dynamics.law import damping_share, signed_gap, stiffness_share
@@ -398,11 +399,12 @@ def side_of_change(flow: Flow, e: int) -> int:
 
 @kernel(inline=True)
 def kick_columns(
-    machine: MachineArrays, flow: Flow, e: int, columns: Columns, U: Real, work: ColumnWork
-) -> None:
-    """Saltation of the columns at the end of segment e, at the state in work.z."""
+    machine: MachineArrays, flow: Flow, e: int, columns: Columns, sign: float, U: Real,
+    work: ColumnWork,
+) -> None:  # fmt: skip
+    """Saltation of the columns at the end of segment e, at the state in work.z; undone by -1."""
     j, side, n = flow.spring[e], side_of_change(flow, e), U.shape[0] // 2
-    kick = flow.kick[e] * machine.stops.damping[j]
+    kick = sign * flow.kick[e] * machine.stops.damping[j]
     for p in range(U.shape[1]):
         moved, _ = moved_against_gap(machine, columns, j, side, U, p, work)
         for k in range(n):
@@ -435,13 +437,51 @@ def carry_columns(
     machine: MachineArrays, flow: Flow, omega: float, columns: Columns, U: Real, work: ColumnWork
 ) -> None:
     """Carry columns of U, (2 N, P) or (2 N, P + 1), over the recorded flow, at fixed times."""
-    turns = 0
-    for p in range(columns.touches.shape[0]):
-        turns += columns.touches[p, 6]
     for e in range(flow.segments[0]):
         length = flow.length[e]
         advance_columns(machine, flow, e, omega, columns, length, U, work)
         if flow.kick[e] != 0.0:
-            if turns != 0:
+            if _turned(columns):
                 segment_state(machine, flow, e, omega, length, work.z, work.rate)
-            kick_columns(machine, flow, e, columns, U, work)
+            kick_columns(machine, flow, e, columns, 1.0, U, work)
+
+
+@kernel(inline=True)
+def _turned(columns: Columns) -> bool:
+    """Whether a parameter turns the direction of a stop."""
+    turns = 0
+    for p in range(columns.touches.shape[0]):
+        turns += columns.touches[p, 6]
+    return turns != 0
+
+
+@kernel
+def carry_starts(
+    machine: MachineArrays, flow: Flow, omega: float, columns: Columns, starts: Real,
+    tangents: Real, work: ColumnWork,
+) -> None:  # fmt: skip
+    """Columns and tangent map at the start of each segment of the recorded flow and at its end.
+
+    ``starts`` (E + 1, 2 N, P + 1) begin with 0, omega last and all at fixed times, and ``tangents``
+    (E + 1, 2 N, 2 N) with I.
+    """
+    size, count = starts.shape[1], starts.shape[2]
+    for k in range(size):
+        for p in range(count):
+            starts[0, k, p] = 0.0
+        for s in range(size):
+            tangents[0, k, s] = 1.0 if k == s else 0.0
+    for e in range(flow.segments[0]):
+        U, T = starts[e + 1], tangents[e + 1]
+        for k in range(size):
+            for p in range(count):
+                U[k, p] = starts[e, k, p]
+            for s in range(size):
+                T[k, s] = tangents[e, k, s]
+        advance_columns(machine, flow, e, omega, columns, flow.length[e], U, work)
+        carry_freely(T, work)
+        if flow.kick[e] != 0.0:
+            if _turned(columns):
+                segment_state(machine, flow, e, omega, flow.length[e], work.z, work.rate)
+            kick_columns(machine, flow, e, columns, 1.0, U, work)
+            saltation(machine, flow.spring[e], flow.kick[e], T, size)

@@ -26,7 +26,7 @@ from flipflow.dynamics.parameter_tangent import (
 
 
 @kernel
-def _set_shifts(
+def set_shifts(
     machine: MachineArrays,
     flow: Flow,
     e: int,
@@ -183,11 +183,11 @@ def carry_variation(
                 starts[e, k, p] = U[k, p]
         advance_columns(machine, flow, e, omega, columns, length, U, work)
         segment_state(machine, flow, e, omega, length, work.z, work.rate)
-        _set_shifts(machine, flow, e, omega, columns, U, shift[e + 1], work)
+        set_shifts(machine, flow, e, omega, columns, U, shift[e + 1], work)
         if slopes.shape[0] > 0:
             _vary_map(machine, flow, e, omega, columns, shift[e + 1], shift[e], T, slopes, work)
         if flow.kick[e] != 0.0:
-            kick_columns(machine, flow, e, columns, U, work)
+            kick_columns(machine, flow, e, columns, 1.0, U, work)
             if slopes.shape[0] > 0:
                 _kick_map(machine, flow, e, columns, T, slopes)
 

@@ -62,8 +62,11 @@ def add_term(states: Real, k: int, n: int, term: complex, rate: complex) -> None
 
 
 @kernel
-def longest(motion: GapMotion, count: int, duration: float) -> float:
-    """Greatest length of the vector over [0, duration], of all samples and the summit beside."""
+def longest(motion: GapMotion, count: int, duration: float) -> tuple[float, float]:
+    """Greatest length of the vector over [0, duration], and when.
+
+    All samples count, and the summits beside the highest.
+    """
     weight, second = 0.0, 0.0
     for i in range(count):
         size = modulus(motion.amplitude[0, i]) + modulus(motion.amplitude[1, i])
@@ -72,16 +75,16 @@ def longest(motion: GapMotion, count: int, duration: float) -> float:
     samples = 4
     if weight > 0.0:
         samples += int(PER_RADIAN * math.sqrt(second / weight) * duration)
-    best, before, rate_before = 0.0, 0.0, 0.0
+    best, at, before, rate_before = 0.0, 0.0, 0.0, 0.0
     for k in range(samples + 1):
         t = duration * k / samples
         value, rate = length_at(motion, count, t)
         if rate_before > 0.0 and rate < 0.0 and max(value, before) > NEAR * best:
-            top = summit(motion, count, t - duration / samples, t, rate_before, rate)
-            best = max(best, top)
-        best = max(best, value)
+            top, when = summit(motion, count, t - duration / samples, t, rate_before, rate)
+            best, at = (top, when) if top > best else (best, at)
+        best, at = (value, t) if value > best else (best, at)
         before, rate_before = value, rate
-    return math.sqrt(2.0 * best)
+    return math.sqrt(2.0 * best), at
 
 
 @kernel
@@ -97,9 +100,12 @@ def length_at(motion: GapMotion, count: int, t: float) -> tuple[float, float]:
 @kernel
 def summit(
     motion: GapMotion, count: int, a: float, b: float, rate_a: float, rate_b: float
-) -> float:
-    """The half square where its rate is zero between two times, by false position (Illinois)."""
-    value, width = 0.0, b - a
+) -> tuple[float, float]:
+    """The half square where its rate is zero between two times, by false position (Illinois).
+
+    The time comes after it, by a last step of the same.
+    """
+    value, begin, end, width = 0.0, a, b, b - a
     for _ in range(REFINEMENTS):
         t = (a * rate_b - b * rate_a) / (rate_b - rate_a)
         value, rate = length_at(motion, count, t)
@@ -112,7 +118,8 @@ def summit(
         if abs(t - b) < CLOSE * width:
             break
         b, rate_b = t, rate
-    return value
+    closer = (t * rate_b - b * rate) / (rate_b - rate) if rate != rate_b else t
+    return value, min(max(closer, begin), end)
 
 
 @kernel(entry=True)
@@ -139,7 +146,8 @@ def longest_in_pieces(
             set_term(motion, modes + h, turning, total * exponential(turning * start[e]), 0j)
         turn = exponential(1j * (omega * start[e]))
         set_term(motion, modes + harmonics, 1j * omega, along * turn, across * turn)
-        largest = max(largest, longest(motion, modes + harmonics + 1, length[e]))
+        length_here, _ = longest(motion, modes + harmonics + 1, length[e])
+        largest = max(largest, length_here)
     return largest
 
 

@@ -8,6 +8,7 @@ from flipflow.io.labelled import Arrays, Variable, attributes, column
 from flipflow.model.quantities import quantity_named
 from flipflow.studies.candidates import quantity_of
 from flipflow.studies.design import Proposal
+from flipflow.studies.lane_values import slope_key
 from flipflow.studies.study import Study
 from flipflow.studies.study_plan import unit_of
 from flipflow.studies.tolerance import Tolerance, limits_in_words
@@ -28,6 +29,11 @@ def study_arrays(found: Study) -> Arrays:
             "case": column("case", np.array(found.cases, str)),
             "omega": column("omega", found.omega, "rad/s"),
             "field": column("field", np.array(found.names, str)),
+            **(
+                {"parameter": column("parameter", np.array(found.parameters, str))}
+                if found.parameters
+                else {}
+            ),
         },
         {
             **{
@@ -35,6 +41,10 @@ def study_arrays(found: Study) -> Arrays:
                 for name, values in found.columns.items()
             },
             **{name: Variable(own[name], found.values[name], asked[name].unit) for name in asked},
+            **{
+                slope_key(name): Variable((*dims, "parameter"), slopes)
+                for name, slopes in found.derivatives.items()
+            },
             "reason": Variable(dims, found.reason),
             **{
                 f"nominal_{name}": Variable(own[name][1:], found.nominal[name], asked[name].unit)

@@ -30,7 +30,7 @@ Real = NDArray[np.float64]
 SECTIONS = ("format", "machine", "vary", "study")
 STUDY = (
     "quantities", "speed", "speeds", "load_cases", "sampling", "samples", "seed", "branch",
-    "correlation",
+    "correlation", "derivatives",
 )  # fmt: skip
 RANGE = ("from", "to", "values")
 IN_FILE = (
@@ -61,6 +61,8 @@ class StudyFile:
         ``"grid"``, ``"list"`` or a :class:`~flipflow.Sample`.
     branch
         Which motion is meant.
+    derivatives
+        Fields with respect to which quantities are differentiated.
     name
         The file's stem.
     """
@@ -72,6 +74,7 @@ class StudyFile:
     load_cases: tuple[Load, ...]
     sampling: str | Sample | None
     branch: BranchWord
+    derivatives: tuple[str, ...]
     name: str
 
 
@@ -106,6 +109,7 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
         load_cases=chosen_cases(table, project),
         sampling=_sampling(table, vary),
         branch=_word(table, "branch", get_args(BranchWord), "from-below"),
+        derivatives=_derivatives(table),
         name=source.name,
     )
 
@@ -199,6 +203,23 @@ def _quantities(table: Table, project: Project) -> tuple[str, ...]:
         if QUANTITIES[name].of == "motion" and not QUANTITIES[name].missing(screen)
     )
     return (limited or USUAL) + (FOLDS if screen.has_stop else ())
+
+
+def _derivatives(table: Table) -> tuple[str, ...]:
+    """Fields with respect to which quantities are differentiated."""
+    written = table.get("derivatives", [])
+    if not isinstance(written, list) or not all(isinstance(one, str) for one in written):
+        remedy = 'give a list of fields, ["clearance", "shear_stiffness"]'
+        raise InputError("study.derivatives", written, remedy)
+    return tuple(_field_of(one, "study.derivatives") for one in written)
+
+
+def _field_of(written: str, label: str) -> str:
+    """Name of a field by one of its words."""
+    try:
+        return field_named(written, written).name
+    except InputError as error:
+        raise InputError(label, written, error.remedy) from None
 
 
 def _speeds(table: Table, project: Project) -> Real:

@@ -135,14 +135,6 @@ def engaged_side(law: ContactLaw, regime: Int | int) -> Int:
     return np.where(carries_force(law, regime), np.sign(regime), 0)
 
 
-def switching(law: ContactLaw, k: float, c: float) -> tuple[tuple[float, float], ...]:
-    """(alpha, beta) of the functions h = alpha p + beta p' within contact that a law watches."""
-    if c == 0.0:
-        return ()
-    ways = (way for piece in LAWS[law] for way in piece.exits if way is not AT_THE_GAP)
-    return tuple((way.a + way.a_k * k, way.b + way.b_c * c) for way in ways)
-
-
 def pushes_whole(law: ContactLaw) -> bool:
     """Whether each piece of a law carries all of k p + c p', or nothing."""
     return {(p.stiffness, p.damping) for p in LAWS[law]} <= {(0.0, 0.0), (1.0, 1.0)}

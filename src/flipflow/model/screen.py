@@ -335,9 +335,9 @@ def loaded_columns(
     if not moving or not (drawn or load.floating_mass):
         return found
 
-    def column(name: str) -> NDArray[np.float64]:
+    def column(name: str) -> NDArray[Any]:
         own = columns.get(name, getattr(screen, name))
-        values = np.asarray(own, float)
+        values = np.asarray(own, complex if np.iscomplexobj(own) else float)
         return np.where(np.isnan(values), 0.0, values)  # a deck whose angle is not known is flat
 
     fall, stiffness = GRAVITY * np.sin(column("deck_angle")), column("shear_stiffness")

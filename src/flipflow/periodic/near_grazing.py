@@ -30,7 +30,7 @@ MOST_NEWTON = 60  # steps to one place where a function stands still
 STILL = 1e-8  # last of these steps, as a share of the time between two samples
 
 
-@kernel
+@kernel(entry=True)
 def near_grazing(problem: Shooting, work: ShootingWork, omega: float) -> tuple[float, float]:
     """Room and depth in m of the recorded flow.
 

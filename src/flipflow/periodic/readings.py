@@ -85,7 +85,7 @@ def observe_record(
         count = segment_motion(machine, flow, e, omega, coordinate, motion)
         prepare_search(motion, count)
         for g in range(coordinate.shape[0]):
-            smallest, largest = extremes(motion, count, g, flow.length[e])
+            smallest, largest, _, _ = extremes(motion, count, g, flow.length[e])
             low[g], high[g] = min(low[g], smallest), max(high[g], largest)
             share = first_harmonic(motion, count, g, flow.start[e], flow.length[e], omega)
             first[g] += 2.0 * share / turn
@@ -120,7 +120,7 @@ def observe_series(
             for i in range(count):
                 motion.amplitude[0, i] = amplitude[p, g, i]
             prepare_search(motion, count)
-            low[p, g], high[p, g] = extremes(motion, count, 0, 2.0 * math.pi)
+            low[p, g], high[p, g], _, _ = extremes(motion, count, 0, 2.0 * math.pi)
 
 
 @kernel(entry=True)

@@ -277,6 +277,6 @@ def series_depths(problem: Balance, work: BalanceWork, omega: float, depth: Real
     count = motion.rate.shape[0]
     prepare_search(motion, count)
     for j in range(depth.shape[0]):
-        low, high = extremes(motion, count, j, 2.0 * math.pi)
+        low, high, _, _ = extremes(motion, count, j, 2.0 * math.pi)
         depth[j, 0] = high - problem.machine.stops.gap[j, 0]
         depth[j, 1] = -low - problem.machine.stops.gap[j, 1]

@@ -174,7 +174,7 @@ def flow_depths(problem: Shooting, work: ShootingWork, omega: float, depth: Real
         count = segment_motion(machine, flow, e, omega, machine.direction, motion)
         prepare_search(motion, count)
         for j in range(depth.shape[0]):
-            low, high = extremes(motion, count, j, flow.length[e])
+            low, high, _, _ = extremes(motion, count, j, flow.length[e])
             depth[j, 0], depth[j, 1] = max(depth[j, 0], high), max(depth[j, 1], -low)
     for j in range(depth.shape[0]):
         if problem.sign < 0.0:

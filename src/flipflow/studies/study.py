@@ -34,6 +34,7 @@ from flipflow.model.screen import Load
 from flipflow.model.system import Machine
 from flipflow.model.vary import Distribution, Vary
 from flipflow.results.result import Result
+from flipflow.studies.lane_values import slope_key
 from flipflow.studies.study_plan import (
     HIGH,
     LOW,
@@ -88,6 +89,11 @@ class Study(Result):
         Each quantity of the machine itself, (C, F) or (C,).
     at_low, at_high
         With one field at the low or the high end of its range, (D, C, F) or (D, C).
+    parameters
+        With respect to which the quantities were differentiated, (P,).
+    derivatives
+        Derivatives of each quantity, SI, (S, C, F, P); NaN where there is none, and where it has
+        another one to each side.
     notes
         A sentence for each thing to keep in mind.
     version
@@ -109,6 +115,8 @@ class Study(Result):
     nominal: Mapping[str, Real]
     at_low: Mapping[str, Real]
     at_high: Mapping[str, Real]
+    parameters: tuple[str, ...]
+    derivatives: Mapping[str, Real]
     notes: tuple[str, ...]
     version: str
 
@@ -163,6 +171,7 @@ def study(
     load_cases: tuple[Load, ...] | list[Load] = (),
     sampling: str | Sample | None = None,
     branch: BranchWord = "from-below",
+    derivatives: tuple[str, ...] | list[str] = (),
     store: str | os.PathLike[str] | None = None,
     executor: Executor | None = None,
     threads: int | None = None,
@@ -197,6 +206,9 @@ def study(
         every field has values of its own, else ``ff.Sample()``.
     branch
         The motion that is meant where several exist, as for :func:`~flipflow.sensitivity`.
+    derivatives
+        Parameters with respect to which the quantities, all of a motion, are differentiated too,
+        exactly, as :meth:`flipflow.Orbit.sensitivity` does.
     store
         A folder, made where it is not there: a zarr store that grows as the study runs.
     executor
@@ -217,7 +229,7 @@ def study(
     ------
     InputError
         For an unknown field or quantity, a range that physics forbids, loads of a machine that
-        takes none, and a grid of an interval.
+        takes none, a grid of an interval, and derivatives of a quantity that is not of a motion.
     IncompleteError
         When the workers are gone; finished chunks stay in the store.
     StoreError
@@ -225,7 +237,7 @@ def study(
     MissingExtra
         For a store where zarr is not installed.
     """
-    plan = plan_of(machine, vary, quantities, omega, load_cases, sampling, branch)
+    plan = plan_of(machine, vary, quantities, omega, load_cases, sampling, branch, derivatives)
     count = checked_count("threads", processors() if threads is None else threads, 256)
     tell = checked_monitor(monitor)
     with executor_or_threads(executor, count) as pool:
@@ -316,7 +328,7 @@ def _in_memory(plan: Plan, pool: Executor, tell: Monitor) -> Study:
     for index, arrays in run_chunks(pool, chunk_values, tasks):
         parts[index] = arrays
         progress.done()
-    names = (*plan.quantities, REASON)
+    names = (*plan.quantities, *_slope_keys(plan), REASON)
     values = {name: np.concatenate([parts[k][name] for k in range(count)]) for name in names}
     return _study(plan, values, reference, ())
 
@@ -368,13 +380,18 @@ def _named(damaged: list[ChunkState]) -> str:
 
 
 def _opened(kept: ChunkStore, plan: Plan, missing: list[int], notes: tuple[str, ...]) -> Study:
-    values = {name: kept.read(name) for name in (*plan.quantities, REASON)}
+    values = {name: kept.read(name) for name in (*plan.quantities, *_slope_keys(plan), REASON)}
     for index in missing:  # some of its files may be there already
         rows = slice(index * kept.rows, (index + 1) * kept.rows)
         for name, table in values.items():
             table[rows] = NOT_COMPUTED if name == REASON else np.nan
     kinds = [f"{what}_{name}" for what in (NOMINAL, LOW, HIGH) for name in plan.quantities]
     return _study(plan, values, {name: kept.read(name) for name in kinds}, notes)
+
+
+def _slope_keys(plan: Plan) -> tuple[str, ...]:
+    """Names of the arrays of derivatives."""
+    return tuple(map(slope_key, plan.quantities)) if plan.derivatives else ()
 
 
 def _study(plan: Plan, values: Arrays, reference: Arrays, notes: tuple[str, ...]) -> Study:
@@ -398,6 +415,8 @@ def _study(plan: Plan, values: Arrays, reference: Arrays, notes: tuple[str, ...]
         nominal=ends(NOMINAL),
         at_low=ends(LOW),
         at_high=ends(HIGH),
+        parameters=plan.derivatives,
+        derivatives={name: values[slope_key(name)] for name in plan.quantities if plan.derivatives},
         notes=(*notes, *_notes(plan, reason)),
         version=__version__,
     )

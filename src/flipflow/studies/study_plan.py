@@ -14,15 +14,22 @@ from flipflow import __version__
 from flipflow.batch.chunk_store import ChunkStore, Layout, Variable
 from flipflow.batch.reasons import NOT_COMPUTED
 from flipflow.errors import InputError, StoreError
-from flipflow.model.arguments import checked_all, checked_speeds, checked_word, members_of
+from flipflow.model.arguments import (
+    checked_all,
+    checked_speeds,
+    checked_text,
+    checked_word,
+    members_of,
+)
 from flipflow.model.fields import FIELD
-from flipflow.model.parameters import value_of
+from flipflow.model.parameters import differentiable, value_of
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.sampling import Columns, Design, Sample, design_of, digest_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Machine, system_of
 from flipflow.model.vary import Choice, Distribution, Variation, Vary
 from flipflow.studies.documents import CODEC
+from flipflow.studies.lane_values import on_lanes, slope_key
 from flipflow.studies.study_values import evaluate_loaded
 
 Real = NDArray[np.float64]
@@ -32,6 +39,7 @@ REASON = "reason"
 UNLOADED = "empty"
 NOMINAL, LOW, HIGH = "nominal", "low", "high"
 ROWS = "sample", "case", "omega"
+PARAMETER = "parameter"
 # Machines, each under each load, of a chunk: seconds of work, so that little is lost with it.
 CHUNK_MACHINES = 64
 MOST_CHUNKS = 2048  # of a study: each is a file of every quantity
@@ -55,6 +63,8 @@ class Plan:
         Frequencies in rad/s, (F,); one that is NaN where only whole responses are asked for.
     branch
         Which motion is meant.
+    derivatives
+        Parameters with respect to which the quantities are differentiated.
     """
 
     machine: Machine
@@ -63,6 +73,7 @@ class Plan:
     quantities: tuple[str, ...]
     omega: Real
     branch: BranchWord
+    derivatives: tuple[str, ...] = ()
 
     @property
     def cases(self) -> tuple[str, ...]:
@@ -85,7 +96,8 @@ class Plan:
         """The inputs as JSON types: equal manifests give equal stores, bit for bit."""
         design = self.design
         listed = design.sampling == "list"
-        return {
+        differentiated = {"derivatives": list(self.derivatives)} if self.derivatives else {}
+        return differentiated | {
             "schema": SCHEMA,
             "flipflow": __version__,
             "machine": CODEC.form(Machine).write(self.machine),
@@ -109,6 +121,7 @@ class Plan:
         """The store of this study; ``reference`` is what :meth:`references` found."""
         size, cases = self.design.size, len(self.cases)
         shape = dict(zip(ROWS, (size, cases, self.omega.size), strict=True))
+        shape[PARAMETER] = len(self.derivatives)
         fixed = {
             name: Variable(("sample",), _plain(column), unit_of(self.machine, name))
             for name, column in self.design.columns.items()
@@ -127,6 +140,10 @@ class Plan:
             name: Variable(self.dims(name), np.array(np.nan), one.unit)
             for name, one in self.asked.items()
         }
+        if self.derivatives:
+            fixed[PARAMETER] = Variable((PARAMETER,), np.array(self.derivatives))
+            for name in self.asked:
+                growing[slope_key(name)] = Variable((*ROWS, PARAMETER), np.array(np.nan))
         growing[REASON] = Variable(ROWS, np.array(NOT_COMPUTED, np.int8))
         return Layout(self.manifest, fixed, growing, shape, self.rows)
 
@@ -137,7 +154,8 @@ class Plan:
     def chunk(self, index: int) -> tuple[Any, ...]:
         """What :func:`chunk_values` takes to compute a chunk."""
         part = slice(index * self.rows, (index + 1) * self.rows)
-        return self._task({name: column[part] for name, column in self.design.columns.items()})
+        columns = {name: column[part] for name, column in self.design.columns.items()}
+        return *self._task(columns), self.derivatives
 
     def references(self) -> tuple[Any, ...]:
         """The same for the machine itself and, one field at a time, both ends of its range."""
@@ -174,10 +192,14 @@ def chunk_values(
     quantities: tuple[str, ...],
     omega: Real,
     branch: BranchWord,
+    derivatives: tuple[str, ...] = (),
 ) -> Arrays:
-    """Quantities and reasons of some machines under every load, (rows, C, F) or (rows, C) each."""
+    """Quantities and reasons of some machines under every load, (rows, C, F) or (rows, C) each.
+
+    Derivatives are (rows, C, F, P).
+    """
     found = [
-        evaluate_loaded(machine, columns, load, quantities, omega, branch)
+        evaluate_loaded(machine, columns, load, quantities, omega, branch, names=derivatives)
         for load in loads or (None,)
     ]
     arrays: Arrays = {}
@@ -185,6 +207,9 @@ def chunk_values(
         table = np.stack([values[name] for values, _ in found], axis=1)
         whole = quantity_named(name, machine).of == "response"
         arrays[name] = table[:, :, 0] if whole else table
+        if derivatives:
+            key = slope_key(name)
+            arrays[key] = np.stack([values[key] for values, _ in found], axis=1)
     arrays[REASON] = np.stack([reasons for _, reasons in found], axis=1)
     return arrays
 
@@ -197,6 +222,7 @@ def plan_of(
     load_cases: object,
     sampling: object,
     branch: object,
+    derivatives: object,
 ) -> Plan:
     """The plan of a study, its arguments checked.
 
@@ -217,6 +243,7 @@ def plan_of(
     return Plan(
         machine, design, loads, tuple(one.name for one in asked), frequencies,
         branch,  # type: ignore[arg-type]
+        _differentiated(derivatives, machine, asked),
     )  # fmt: skip
 
 
@@ -250,7 +277,10 @@ def plan_from(store: ChunkStore) -> Plan:
     loads = CODEC.form(tuple[Load, ...]).read(known["load_cases"])
     omega = CODEC.form(Real).read(known["omega"])
     design = Design(varied, known["sampling"], sample, columns)
-    return Plan(machine, design, loads, tuple(known["quantities"]), omega, known["branch"])
+    return Plan(
+        machine, design, loads, tuple(known["quantities"]), omega, known["branch"],
+        tuple(known.get("derivatives", ())),
+    )  # fmt: skip
 
 
 def refuse_other(
@@ -298,6 +328,25 @@ def _asked(quantities: object, machine: Machine) -> Sequence[Quantity]:
         if absent:
             raise InputError("quantities", one.name, missing_words(absent))
     return asked
+
+
+def _differentiated(
+    derivatives: object, machine: Machine, asked: Sequence[Quantity]
+) -> tuple[str, ...]:
+    """Names of parameters with respect to which quantities are differentiated."""
+    names = members_of(derivatives)
+    if names is None or isinstance(derivatives, str):
+        remedy = 'give names of parameters in a list, such as ["clearance"]'
+        raise InputError("derivatives", derivatives, remedy)
+    for k, name in enumerate(names):
+        if checked_text("derivatives", name) in names[:k]:
+            raise InputError("derivatives", name, "it is named twice, name each once")
+        differentiable(machine, name)
+    for one in asked if names else ():
+        if not on_lanes(machine, one):
+            remedy = "derivatives are of quantities of a motion; of jumps, SpecialPoint.sensitivity"
+            raise InputError("derivatives", one.name, remedy)
+    return tuple(names)
 
 
 def _loads(load_cases: object, machine: Machine) -> tuple[Load, ...]:

@@ -16,13 +16,19 @@ from flipflow.batch.reasons import (
 )
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
-from flipflow.model.parameters import with_values
+from flipflow.model.parameters import value_of, with_values
 from flipflow.model.quantities import BranchWord, Quantity, quantity_named
 from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen, Load, loaded_columns
 from flipflow.model.system import Machine
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
-from flipflow.studies.lane_values import jump_distance, lane_values, on_lanes, one_motion
+from flipflow.studies.lane_values import (
+    jump_distance,
+    lane_values,
+    on_lanes,
+    one_motion,
+    slope_key,
+)
 from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.sensitivity_samples import (
     STOP_FIELDS,
@@ -30,6 +36,7 @@ from flipflow.studies.sensitivity_samples import (
     closed_form_values,
     workings,
 )
+from flipflow.studies.tilted_motion import TILT
 
 Real = NDArray[np.float64]
 Reasons = NDArray[np.int8]
@@ -43,6 +50,7 @@ def evaluate(
     omega: Real,
     branch: BranchWord,
     threads: int = 1,
+    names: Sequence[str] = (),
 ) -> Values:
     """Quantities of L machines at F frequencies.
 
@@ -63,11 +71,15 @@ def evaluate(
         Which motion is meant where several exist.
     threads
         Threads that motions at single frequencies are solved on.
+    names
+        P parameters with respect to which the quantities are differentiated, which must then be
+        such that lanes tell them.
 
     Returns
     -------
     tuple
-        Values (L, F) by quantity, those of a response the same at every frequency; and the reason
+        Values (L, F) by quantity, those of a response the same at every frequency; derivatives
+        (L, F, P) under :func:`~flipflow.studies.lane_values.slope_key` of it; and the reason
         of each motion, (L, F), a key of :data:`flipflow.batch.reasons.REASONS`.
     """
     asked = [quantity_named(name, machine) for name in quantities]
@@ -76,14 +88,16 @@ def evaluate(
     reasons = np.full((rows, omega.size), FOUND, np.int8)
     span = _span(machine, omega)
     question = Question(machine, asked[0], omega, span, branch)
-    if all(replace(question, quantity=one).in_closed_form(tuple(columns)) for one in asked):
+    if not names and all(
+        replace(question, quantity=one).in_closed_form(tuple(columns)) for one in asked
+    ):
         for one in asked:
             values[one.name] = closed_form_values(replace(question, quantity=one), columns, omega)
         reasons[~np.all(_fine(columns), axis=0)] = REFUSED
         return values, reasons
     told = [one for one in asked if on_lanes(machine, one)]
     if told:
-        found, why = lane_values(machine, columns, told, omega, span, branch, threads)
+        found, why = lane_values(machine, columns, told, omega, span, branch, threads, names=names)
         values |= found
         reasons[:] = why
     asked = [one for one in asked if one not in told]
@@ -105,12 +119,28 @@ def evaluate_loaded(
     omega: Real,
     branch: BranchWord,
     threads: int = 1,
+    names: Sequence[str] = (),
 ) -> Values:
     """As :func:`evaluate`, of the machines under a load; the columns hold what they are without."""
     if load is None or not isinstance(machine, FlipFlowScreen):
-        return evaluate(machine, columns, quantities, omega, branch, threads)
+        return evaluate(machine, columns, quantities, omega, branch, threads, names)
+    rows = len(next(iter(columns.values())))
+    own = {name: np.full(rows, value_of(machine, name)) for name in names if name not in columns}
+    columns = dict(columns) | own
     loaded = _loaded(machine, load, columns)
-    values, reasons = evaluate(machine.loaded(load), loaded, quantities, omega, branch, threads)
+    moved = _moved_by(machine, load, columns, names)
+    values, reasons = evaluate(
+        machine.loaded(load), loaded, quantities, omega, branch, threads, tuple(moved)
+    )
+    if names:
+        changes = np.stack(list(moved.values()))  # (loaded fields, rows, P)
+        for name in quantities:
+            slopes = values[slope_key(name)]
+            # What a field does not move is not asked for its derivative, which may be none.
+            terms = np.where(changes[:, :, None] != 0.0, changes[:, :, None], np.nan)
+            terms = terms * np.moveaxis(slopes, 2, 0)[..., None]
+            counted = np.where(changes[:, :, None] != 0.0, terms, 0.0)
+            values[slope_key(name)] = counted.sum(axis=0)
     # A mass below zero stays impossible with material on it.
     fine = _fine({name: column for name, column in columns.items() if name in FIELD})
     refused = ~np.all(fine, axis=0) if fine else np.zeros(len(reasons), bool)
@@ -150,6 +180,23 @@ def _loaded(screen: FlipFlowScreen, load: Load, columns: Columns) -> Columns:
     if not screen.has_stop and not STOP_FIELDS & set(columns):
         loaded.pop("measured_shift", None)
     return loaded
+
+
+def _moved_by(
+    screen: FlipFlowScreen, load: Load, columns: Columns, names: Sequence[str]
+) -> dict[str, Real]:
+    """Derivatives of fields under a load with respect to fields without it, (rows, P) each.
+
+    By complex steps through the formulas of loads.
+    """
+    moved: dict[str, Real] = {}
+    for p, name in enumerate(names):
+        tilted = dict(columns) | {name: columns[name] + 1j * TILT}
+        for own, column in _loaded(screen, load, tilted).items():
+            if np.iscomplexobj(column):
+                moved.setdefault(own, np.zeros((column.size, len(names))))
+                moved[own][:, p] = column.imag / TILT
+    return moved
 
 
 def _fine(columns: Columns) -> list[NDArray[np.bool_]]:
