@@ -116,3 +116,16 @@ def test_a_scheduler_that_is_gone_ends_the_study(tmp_path, how):
         cluster.communicate()
         client.close()
     assert (ff.open_study(tmp_path / "s").reason != -1).sum() >= 3 * 64
+
+
+def test_a_cluster_without_workers_ends_the_study(tmp_path, monkeypatch):
+    """A nanny of dask gives up whose worker ends while it begins, and nobody computes any more."""
+    monkeypatch.setattr("flipflow.batch.run_chunks.LOOK", 0.02)
+    with (
+        distributed.LocalCluster(
+            n_workers=0, processes=False, dashboard_address=":0", silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+        pytest.raises(ff.IncompleteError, match="no worker"),
+    ):
+        list(run_chunks(client.get_executor(), deadly, [(0, (str(tmp_path), 0, 0))]))

@@ -24,6 +24,8 @@ from flipflow.errors import IncompleteError, InputError
 
 WINDOW = 256  # chunks handed out at once: enough for a cluster, few to hold
 MOST_LOST = 10  # times that the worker of one chunk may be lost
+LOOK = 5.0  # s without a finished chunk, after which workers are counted
+MOST_LOOKS = 12  # in a row at which a cluster may have none: one that is started anew takes seconds
 
 
 @contextmanager
@@ -72,7 +74,8 @@ def run_chunks(
     Raises
     ------
     IncompleteError
-        When a chunk loses its worker again and again, or the executor is gone.
+        When a chunk loses its worker again and again, when the executor is gone, and when a
+        cluster has had no worker for a minute.
     """
     waiting: dict[Future[Any], tuple[int, tuple[Any, ...]]] = {}
     lost: dict[int, int] = {}
@@ -83,8 +86,7 @@ def run_chunks(
                 waiting[_submitted(executor, work, task, 0)] = task
             if not waiting:
                 return
-            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in done:
+            for future in _ended(executor, waiting):
                 index, arguments = waiting.pop(future)
                 if _is_lost(future, index, lost):
                     again = index, arguments
@@ -94,6 +96,29 @@ def run_chunks(
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _ended(executor: Executor, waiting: Mapping[Future[Any], Any]) -> set[Future[Any]]:
+    """The chunks that have ended, at least one."""
+    looks = 0
+    while True:
+        done, _ = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED)
+        if done:
+            return done
+        looks = looks + 1 if _without_workers(executor) else 0
+        if looks == MOST_LOOKS:
+            told = f"The cluster has had no worker for {LOOK * MOST_LOOKS:.0f} s"
+            raise IncompleteError(f"{told}; start one, and go on.")
+
+
+def _without_workers(executor: Executor) -> bool:
+    """Whether an executor of dask has nobody who computes."""
+    if not isinstance(executor, _loaded("distributed.cfexecutor", "ClientExecutor")):
+        return False
+    try:
+        return not sys.modules["distributed"].default_client().nthreads()
+    except (OSError, ValueError):  # the scheduler is gone, and its futures are about to tell
+        return False
 
 
 def _some(todo: Iterator[tuple[int, tuple[Any, ...]]], count: int) -> Iterator[Any]:
@@ -145,6 +170,6 @@ def _closed() -> tuple[type[BaseException], ...]:
     return (RuntimeError, *_loaded("distributed.client", "ClosedClientError"))
 
 
-def _loaded(module: str, name: str) -> tuple[type[BaseException], ...]:
+def _loaded(module: str, name: str) -> tuple[type[Any], ...]:
     known: Mapping[str, Any] = vars(sys.modules[module]) if module in sys.modules else {}
     return (known[name],) if name in known else ()
