@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import itertools
 import re
+import xml.etree.ElementTree as ET
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +21,7 @@ from test_results_travel import MADE, made
 
 import flipflow as ff
 from flipflow.plotting.print import STYLE, drawn_sheet
+from flipflow.plotting.svg import searchable_svg
 from judge import close
 
 GALLERY = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
@@ -68,6 +71,19 @@ def test_the_gallery_shows_what_a_paper_needs() -> None:
 @pytest.mark.parametrize("name", MADE)
 def test_every_result_is_ready_for_print(name: str) -> None:
     _ready_for_print(ff.figure(made(name), width=WIDTH))
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_figure_within_a_page_says_the_words_of_that_on_its_own(name: str) -> None:
+    """Two renderers draw them: ticks, titles, labels and legends are the same."""
+    for width in (None, WIDTH):
+        figure = ff.figure(made(name), width=width)
+        page = ET.fromstring(searchable_svg(figure))  # noqa: S314  ours
+        said = [one.text for one in page.iter("{http://www.w3.org/2000/svg}text")]
+        with mpl.rc_context({**STYLE, "font.family": "DejaVu Sans"}):
+            sheet = drawn_sheet(figure)
+            alone = [line for one in _words(sheet) for line in one.get_text().split("\n")]
+        assert Counter(said) == Counter(alone)
 
 
 def test_a_notebook_shows_a_figure_as_it_is_written(tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Where panels, legend and labels go, in pixels: one geometry for both renderers."""
+"""Where panels, legend and labels go, in pixels: one geometry for all renderers."""
 
 from __future__ import annotations
 

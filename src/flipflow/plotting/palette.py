@@ -1,4 +1,4 @@
-"""What the names of colours, dashes and symbols mean, for both renderers.
+"""What the names of colours, dashes and symbols mean, for all renderers.
 
 Colours differ in lightness as well as in hue, and every line also differs by symbol or dash, so
 that a figure can be read in black and white.

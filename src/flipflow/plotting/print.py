@@ -1,10 +1,9 @@
-"""Figures for print: vector or bitmap files by matplotlib, on the same geometry as the page."""
+"""Figures on their own for print: vector or bitmap files by matplotlib, laid out as on the page."""
 
 from __future__ import annotations
 
 import io
 import textwrap
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,18 +76,6 @@ def printed(figure: PanelGrid, form: str) -> bytes:
     return _saved(figure, form, {"font.family": _families()})
 
 
-def searchable_svg(figure: PanelGrid) -> str:
-    """The figure as SVG whose words stay text, to be set in the fonts of the page around it.
-
-    Raises
-    ------
-    MissingExtra
-        When matplotlib is not installed.
-    """
-    require_matplotlib()
-    return _saved(figure, "svg", {"font.family": FAMILIES[-1], "svg.fonttype": "none"}).decode()
-
-
 def require_matplotlib() -> None:
     """See that figures can be printed.
 
@@ -103,13 +90,6 @@ def require_matplotlib() -> None:
         raise MissingExtra(
             "Figures for print need matplotlib: pip install 'flipflow[report]'."
         ) from error
-
-
-def font_folder() -> str:
-    """Where matplotlib keeps the font of :func:`searchable_svg`."""
-    import matplotlib as mpl  # noqa: PLC0415  slow to import
-
-    return str(Path(mpl.get_data_path()) / "fonts" / "ttf")
 
 
 def drawn_sheet(figure: PanelGrid) -> Sheet:
@@ -237,20 +217,37 @@ def _draw_trace(axes: Axes, trace: Trace, handles: dict[str, Any]) -> None:
     style: dict[str, Any] = {"color": colour}
     hollow = (trace.symbol or "").endswith("-open")
     if trace.role == "point":
-        size = mark_size(trace.x.size) * (OVERLAID if trace.bold else 1.0)
+        size = point_size(trace)
         style |= {"ls": "none", "ms": size, "mew": min(1.0, size / 4.0), "zorder": 3.0,
                   "mfc": "none" if hollow else colour}  # fmt: skip
     else:
-        beneath = trace.role == "beneath"
-        style |= {"lw": 4.2 if beneath else 1.6 if trace.bold else 1.0, "ms": 4.0, "mfc": "white",
-                  "ls": STYLES[trace.dash or DASHES.get(trace.role, "solid")],
-                  "markevery": _marks(trace), "alpha": trace.opacity}  # fmt: skip
+        style |= {"lw": line_width(trace), "ms": 4.0, "mfc": "white",
+                  "ls": STYLES[line_dash(trace)], "markevery": mark_places(trace),
+                  "alpha": trace.opacity}  # fmt: skip
     (handle,) = axes.plot(trace.x, trace.y, marker=MARKERS.get(trace.symbol or "", ""), **style)
     handles.setdefault(trace.name, handle)
 
 
-def _marks(trace: Trace) -> tuple[float, float] | None:
-    """Where marks begin on a line, and how far apart: those of lines that coincide alternate."""
+def point_size(trace: Trace) -> float:
+    """Size in points of each mark of a cloud."""
+    return mark_size(trace.x.size) * (OVERLAID if trace.bold else 1.0)
+
+
+def line_width(trace: Trace) -> float:
+    """Width of a line in points."""
+    return 4.2 if trace.role == "beneath" else 1.6 if trace.bold else 1.0
+
+
+def line_dash(trace: Trace) -> str:
+    """Name of a line's dash in ``STYLES``."""
+    return trace.dash or DASHES.get(trace.role, "solid")
+
+
+def mark_places(trace: Trace) -> tuple[float, float] | None:
+    """Where marks begin on a line, and how far apart, as shares of the panel's diagonal.
+
+    Those of lines that coincide alternate; None where there are none.
+    """
     drawn = np.isfinite(np.asarray(trace.x, float)) & np.isfinite(np.asarray(trace.y, float))
     if not trace.symbol or not drawn.any():
         return None

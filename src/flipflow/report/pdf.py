@@ -10,8 +10,10 @@ from types import MappingProxyType
 from typing import Any
 
 from flipflow.errors import InputError, MissingExtra
+from flipflow.plotting.font import font_folder
 from flipflow.plotting.panels import PAGE_WIDTH
-from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
+from flipflow.plotting.print import POINT, require_matplotlib
+from flipflow.plotting.svg import searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
 from flipflow.report.html import (
     KIND,
@@ -90,7 +92,7 @@ def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper
         source,
         format="pdf",
         # Fonts of the machine are asked for letters that these have not, as Chinese ones.
-        font_paths=[font_folder()],
+        font_paths=[str(font_folder())],
         sys_inputs={"report": json.dumps(report)},
     )
     return bytes(content)
