@@ -1,4 +1,4 @@
-"""How wide words are in the font of figures within a page for print: matplotlib carries it."""
+"""How wide words are in the widest font of figures for print, which matplotlib carries."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flipflow.errors import MissingExtra
 from flipflow.plotting.layout import FONT
-from flipflow.plotting.print import require_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.ft2font import FT2Font
@@ -17,6 +17,22 @@ FAMILY = "DejaVu Sans"
 FILE = "DejaVuSans.ttf"
 # In pixels: capitals above the base line, half of that, letters below it, from line to line.
 ASCENT, MIDDLE, DESCENT, LINE_HEIGHT = 0.76 * FONT, 0.365 * FONT, 0.24 * FONT, 1.2 * FONT
+
+
+def require_matplotlib() -> None:
+    """See that figures can be printed.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    try:
+        import matplotlib  # noqa: F401, ICN001, PLC0415  slow to import
+    except ImportError as error:
+        raise MissingExtra(
+            "Figures for print need matplotlib: pip install 'flipflow[report]'."
+        ) from error
 
 
 def font_folder() -> Path:

@@ -49,10 +49,6 @@ TINTS: Mapping[str, str] = {
     "case 4": "#d9bfe2",
     "case 5": "#b4bac0",
 }
-MARKERS: Mapping[str, str] = {  # of matplotlib
-    "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
-    "triangle-open": "v", "diamond": "D", "diamond-open": "D", "cross": "x", "star": "*",
-}  # fmt: skip
 DASHES: Mapping[str, str] = {"unstable": "dash", "undetermined": "dot"}
 SYMBOLS = ("", "circle", "square", "triangle", "diamond", "cross")
 HATCHES = ("", "/", "\\", "x", "-", ".")

@@ -1,7 +1,7 @@
 """The parts of a neutral figure: what is drawn, in the units of its axes, without a word on how.
 
-Builders make them from results; :mod:`flipflow.plotting.plotly`, :mod:`flipflow.plotting.print` and
-:mod:`flipflow.plotting.svg` draw them. Colours are named by what they mean;
+Builders make them from results; :mod:`flipflow.plotting.plotly` and :mod:`flipflow.plotting.svg`
+draw them. Colours are named by what they mean;
 :mod:`flipflow.plotting.palette` says what they are.
 """
 

@@ -1,8 +1,4 @@
-"""Figures within a page for print: SVG whose words stay text, on the same geometry as the others.
-
-It is written here because matplotlib takes a tenth of a second for each figure of a report. What is
-drawn looks as :mod:`flipflow.plotting.print` has it.
-"""
+"""Figures for print: SVG whose words stay text, on the same geometry as on a screen."""
 
 from __future__ import annotations
 
@@ -19,6 +15,8 @@ from flipflow.plotting.layout import (
     FONT,
     LABEL_ROW,
     LEGEND_ROW,
+    PIXELS_A_MM,
+    POINT,
     SIDES,
     Geometry,
     Label,
@@ -26,25 +24,22 @@ from flipflow.plotting.layout import (
     fitted,
     legend_columns,
     legend_names,
+    mark_size,
 )
-from flipflow.plotting.palette import COLOURS, FAINT, FILLS, INK, TINTS
+from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, SYMBOLS, TINTS
 from flipflow.plotting.panels import Arrow, Band, Bar, Cells, Line, Note, Panel, PanelGrid, Trace
-from flipflow.plotting.print import (
-    EDGE,
-    LEAST_IN_LEGEND,
-    POINT,
-    STYLES,
-    line_dash,
-    line_width,
-    mark_places,
-    point_size,
-)
 from flipflow.plotting.view import TICK, TICK_PAD, TITLE_PAD, View, view_of, widest
 
 Real = NDArray[np.float64]
 
 PT = 1.0 / POINT  # pixels
+EDGE = 1.0  # pixels between a figure's edge and what is written
 MARK = 4.0  # points; of those along a line
+MARKS_APART = 0.15  # along a line, as a share of the panel's diagonal
+LEAST_IN_LEGEND = 3.0  # points; a mark of a cloud would not be seen there
+OVERLAID = 1.8  # how much larger a bold mark is, which others are laid over
+# Drawn and left out, as multiples of the width of a line; what is not here is solid.
+STYLES = {"dash": (5.0, 2.5), "dot": (1.0, 2.0), "dashdot": (5.0, 2.0, 1.0, 2.0)}
 RULE = 0.9  # points; width of a reference line
 FRAME, GRID, TICKS, BAR_EDGE = 0.7 * PT, 0.6 * PT, 0.8 * PT, 0.5 * PT  # widths of strokes
 # Of the legend: its edge, the length of a sample, from there to its word, from that to the next.
@@ -71,12 +66,33 @@ CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
 
 
 def searchable_svg(figure: PanelGrid) -> str:
-    """The figure as SVG whose words stay text, to be set in the fonts of the page around it.
+    """The figure as SVG whose words stay text, for a page in whose fonts it is set.
 
     Raises
     ------
     MissingExtra
         When matplotlib, whose font it is, is not installed.
+    """
+    return sheet(figure_elements(figure), figure.width, figure.height, FAMILY)
+
+
+def sheet(elements: str, wide: float, high: float, families: str) -> str:
+    """SVG of a size in pixels, its words in the first of the families of fonts that is there."""
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:g} {high:g}" '
+        f'width="{wide / PIXELS_A_MM:g}mm" height="{high / PIXELS_A_MM:g}mm" '
+        f'font-family="{families}" font-size="{FONT:.4g}" fill="none" stroke-linejoin="round">'
+        f"{elements}</svg>"
+    )
+
+
+def figure_elements(figure: PanelGrid) -> str:
+    """What stands on the sheet of a figure: its legend and its panels.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
     """
     geometry = arrange(figure, even=False)
     pieces = list(_legend(figure))
@@ -87,11 +103,7 @@ def searchable_svg(figure: PanelGrid) -> str:
         pieces += _drawn(shown, view, f"p{k}")
         pieces += _axes(shown, view)
         pieces += _labels(shown, view, geometry, k)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {figure.width:g} {figure.height}" '
-        f'width="{figure.width:g}" height="{figure.height}" font-family="{FAMILY}" '
-        f'font-size="{FONT:.4g}" fill="none" stroke-linejoin="round">{"".join(pieces)}</svg>'
-    )
+    return "".join(pieces)
 
 
 def _wall(figure: PanelGrid, geometry: Geometry, index: int) -> float:
@@ -119,7 +131,7 @@ def _drawn(panel: Panel, view: View, name: str) -> Iterator[str]:
     yield f'<g clip-path="url(#{name})">'
     for trace in panel.traces:
         if trace.role == "point":
-            yield _marks(trace, view.across(trace.x), view.down(trace.y), point_size(trace))
+            yield _marks(trace, view.across(trace.x), view.down(trace.y), _point_size(trace))
     yield "</g>"
     yield from (_arrow(one, view) for one in panel.arrows if view.holds(one.x1, one.y1))
 
@@ -148,26 +160,26 @@ def _axes(panel: Panel, view: View) -> Iterator[str]:
     yield f'<path d="{"".join(ticks)}" stroke="{INK}" stroke-width="{TICKS:.3g}"/>'
     under, left = foot + TICK + TICK_PAD, rect.left - TICK - TICK_PAD
     for x, (_, word) in zip(across, view.x_ticks, strict=True):
-        yield _words(x, under + ASCENT, word, "center")
+        yield written(x, under + ASCENT, word, "center")
     for y, (_, word) in zip(down, view.y_ticks, strict=True):
-        yield _words(left, _centred(y, word), word, "right")
+        yield written(left, _centred(y, word), word, "right")
     rows = max((word.count("\n") + 1 for _, word in view.x_ticks), default=0)
     base = under + rows * LINE_HEIGHT + TITLE_PAD + ASCENT - (LINE_HEIGHT - FONT)
-    yield _words(rect.left + rect.width / 2.0, base, panel.x.title, "center")
+    yield written(rect.left + rect.width / 2.0, base, panel.x.title, "center")
     beside = left - widest(view.y_ticks) - TITLE_PAD - DESCENT
-    yield _words(beside, rect.top + rect.height / 2.0, panel.y.title, "center", turned=True)
+    yield written(beside, rect.top + rect.height / 2.0, panel.y.title, "center", turned=True)
 
 
 def _labels(panel: Panel, view: View, geometry: Geometry, index: int) -> Iterator[str]:
     """The panel's title, the words of its lines and bars, and its notes."""
     above = view.rect.top - geometry.titles[index] - 4.0
-    yield _words(view.rect.left, above, panel.title, "left", bold=True)
+    yield written(view.rect.left, above, panel.title, "left", bold=True)
     for k, line in enumerate(panel.lines):
         yield _line_label(line, view, geometry.labels[index].get(k))
     for bar in panel.bars:
         if view.holds(bar.high, bar.y):
             x, y = view.at(bar.high, bar.y)
-            yield _words(x + 4.0 * PT, _centred(y, bar.text), bar.text, "left")
+            yield written(x + 4.0 * PT, _centred(y, bar.text), bar.text, "left")
     yield from (_note(note, view) for note in panel.notes)
 
 
@@ -176,22 +188,22 @@ def _line_label(line: Line, view: View, place: Label | None) -> str:
     x, y = view.at(line.at, line.at)
     if place is not None:
         up = LABEL_ROW * place.level + PT + DESCENT
-        return _words(x + place.shift, rect.top - up, line.text, "center", colour)
+        return written(x + place.shift, rect.top - up, line.text, "center", colour)
     side = SIDES.get(line.text_at, "center")
     inwards = {"left": 3.0 * PT, "right": -3.0 * PT}.get(side, 0.0)
     below = 2.0 * PT + ASCENT if line.under else -2.0 * PT - DESCENT
     along = rect.left + line.text_at * rect.width + inwards
-    return _words(along, y + below, line.text, side, colour)
+    return written(along, y + below, line.text, side, colour)
 
 
 def _note(note: Note, view: View) -> str:
     """Words on a white veil, as lines may cross them."""
     text = note.text.replace("<br>", "\n")
     x, y = view.at(note.x, note.y)
-    wide, high = width_of(text), (text.count("\n") + 1) * LINE_HEIGHT
-    left = x - {"left": 0.0, "center": wide / 2.0, "right": wide}[note.anchor]
-    veil = _box(left - PT, y - high / 2.0 - PT, wide + 2.0 * PT, high + 2.0 * PT)
-    said = _words(x, _centred(y, text), text, note.anchor, COLOURS[note.colour])
+    wide, high = width_of(text), ASCENT + text.count("\n") * LINE_HEIGHT + DESCENT
+    left, top = x - {"left": 0.0, "center": wide / 2.0, "right": wide}[note.anchor], y - high / 2.0
+    veil = _box(left - PT, top - PT, wide + 2.0 * PT, high + 2.0 * PT)
+    said = written(x, top + ASCENT, text, note.anchor, COLOURS[note.colour])
     return f'<path d="{veil}" fill="white" fill-opacity="0.85"/>{said}'
 
 
@@ -199,26 +211,24 @@ def _line(trace: Trace, view: View) -> str:
     """A line and its marks."""
     x, y = view.across(trace.x), view.down(trace.y)
     drawn = f'<path d="{_path(x, y)}"{_stroke(trace)}/>'
-    places = mark_places(trace)
-    if places is not None:
-        diagonal = math.hypot(view.rect.width, view.rect.height)
-        first, apart = (diagonal * share for share in places)
+    if trace.symbol and (np.isfinite(x) & np.isfinite(y)).any():
+        apart = MARKS_APART * math.hypot(view.rect.width, view.rect.height)
+        first = apart * SYMBOLS.index(trace.symbol) / len(SYMBOLS)  # where lines coincide
         drawn += _marks(trace, *_along(x, y, first, apart), MARK)
     return drawn if trace.opacity == 1.0 else f'<g opacity="{trace.opacity:g}">{drawn}</g>'
 
 
 def _stroke(trace: Trace) -> str:
-    width = line_width(trace)
+    width = 4.2 if trace.role == "beneath" else 1.6 if trace.bold else 1.0  # points
     stroke = f' stroke="{COLOURS[trace.colour]}" stroke-width="{width * PT:.3g}"'
-    return stroke + _dashed(line_dash(trace), width)
+    return stroke + _dashed(trace.dash or DASHES.get(trace.role, "solid"), width)
 
 
 def _dashed(name: str, width: float) -> str:
     """The dash of a line of a width in points, with which it grows."""
-    style = STYLES[name]
-    if not isinstance(style, tuple):
+    if name not in STYLES:
         return ' stroke-linecap="square"'
-    return f' stroke-dasharray="{" ".join(f"{one * width * PT:.3g}" for one in style[1])}"'
+    return f' stroke-dasharray="{" ".join(f"{one * width * PT:.3g}" for one in STYLES[name])}"'
 
 
 def _along(x: Real, y: Real, first: float, apart: float) -> tuple[Real, Real]:
@@ -229,6 +239,11 @@ def _along(x: Real, y: Real, first: float, apart: float) -> tuple[Real, Real]:
     places = np.arange(first, length[-1], apart)
     chosen = np.unique(np.abs(length[:, None] - places).argmin(axis=0))
     return x[chosen], y[chosen]
+
+
+def _point_size(trace: Trace) -> float:
+    """Size in points of each mark of a cloud."""
+    return mark_size(trace.x.size) * (OVERLAID if trace.bold else 1.0)
 
 
 def _marks(trace: Trace, x: Real, y: Real, size: float) -> str:
@@ -368,7 +383,7 @@ def _legend(figure: PanelGrid) -> Iterator[str]:
         for row, k in enumerate(column.tolist()):
             middle = LEGEND_ROW * (row + 0.5) + EDGE
             yield _sample(drawn[names[k]], left, middle, f"l{k}")
-            yield _words(left + KEY + KEY_PAD, middle + MIDDLE, names[k], "left")
+            yield written(left + KEY + KEY_PAD, middle + MIDDLE, names[k], "left")
         left += KEY + KEY_PAD + max(width_of(names[k]) for k in column) + KEY_GAP
 
 
@@ -381,7 +396,7 @@ def _sample(one: Trace | Bar, left: float, middle: float, name: str) -> str:
         return f'<path d="{box}" fill="{FILLS[one.colour]}"/>'
     x, y = np.array([left + KEY / 2.0]), np.array([middle])
     if one.role == "point":
-        return _marks(one, x, y, max(point_size(one), LEAST_IN_LEGEND))
+        return _marks(one, x, y, max(_point_size(one), LEAST_IN_LEGEND))
     line = f'<path d="M{left:.2f} {middle:.2f}h{KEY:.2f}"{_stroke(one)}/>'
     return line + _marks(one, x, y, MARK)
 
@@ -391,7 +406,7 @@ def _centred(middle: float, text: str) -> float:
     return middle + MIDDLE - text.count("\n") * LINE_HEIGHT / 2.0
 
 
-def _words(
+def written(
     x: float, y: float, text: str, side: str, colour: str = INK, *, bold: bool = False,
     turned: bool = False,
 ) -> str:  # fmt: skip

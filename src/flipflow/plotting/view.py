@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.plotting.font import ASCENT, DESCENT, width_of
-from flipflow.plotting.layout import FONT, Rect
+from flipflow.plotting.layout import FONT, POINT, Rect
 from flipflow.plotting.panels import Axis, Panel
-from flipflow.plotting.print import POINT
 from flipflow.plotting.scales import MINUS
 
 Real = NDArray[np.float64]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
-from flipflow.errors import InputError, MissingExtra
+from flipflow.errors import InputError
 from flipflow.plotting.font import font_folder
+from flipflow.plotting.layout import POINT
 from flipflow.plotting.panels import PAGE_WIDTH
-from flipflow.plotting.print import POINT, require_matplotlib
+from flipflow.plotting.print import require_typst
 from flipflow.plotting.svg import searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
 from flipflow.report.html import (
@@ -109,23 +110,6 @@ def checked_paper(paper: str, field: str = "paper") -> str:
     if paper not in PAPERS:
         raise InputError(field, paper, f"choose one of {', '.join(PAPERS)}")
     return paper
-
-
-def require_typst() -> Callable[..., Any]:
-    """What sets the pages; called before long work, so that it is not lost for want of it.
-
-    Raises
-    ------
-    MissingExtra
-        When typst or matplotlib is not installed.
-    """
-    try:
-        import typst  # noqa: PLC0415  an extra
-    except ImportError as error:
-        raise MissingExtra("A PDF needs typst: pip install 'flipflow[report]'.") from error
-    require_matplotlib()
-    compiled: Callable[..., Any] = typst.compile
-    return compiled
 
 
 def _shown(block: Block, highest: float) -> dict[str, Any]:
