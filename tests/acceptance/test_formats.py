@@ -20,7 +20,7 @@ from rich.console import Console
 import flipflow as ff
 from flipflow.errors import InputError, MissingExtra
 from flipflow.io.results import document_of
-from flipflow.plotting.print import searchable_svg
+from flipflow.plotting.svg import searchable_svg
 from flipflow.report import summary
 from flipflow.report.blocks import FigureBlock, Table
 from flipflow.report.pdf import pdf

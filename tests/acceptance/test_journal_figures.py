@@ -5,27 +5,33 @@ from __future__ import annotations
 import ast
 import itertools
 import re
-from collections.abc import Iterator
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
-import matplotlib as mpl
 import pytest
-from matplotlib.axis import Axis
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure as Sheet
-from matplotlib.text import Text
+from PIL import Image
 from test_how_to import CELL, MOST_COLUMNS, MOST_STATEMENTS, QUESTION, statements
 from test_results_travel import MADE, made
 
 import flipflow as ff
-from flipflow.plotting.print import STYLE, drawn_sheet
+from flipflow.plotting.layout import legend_names
+from flipflow.plotting.print import printed, svg_alone
 from judge import close
+from svg_words import boxes_of
+
+poppler = pytest.mark.skipif(
+    shutil.which("pdftotext") is None, reason="poppler-utils is not installed"
+)
 
 GALLERY = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
 MACHINES, *PARTS = QUESTION.split(GALLERY)
 CODE = dict(zip(PARTS[::2], (CELL.findall(part)[0] for part in PARTS[1::2]), strict=True))
 WIDTH, POINTS = 84.0, 8.0
-SLACK = 0.5  # pixels of 1/96 inch: boxes of text are rounded to whole ones
+SLACK = 0.5  # pixels of 1/96 inch: letters reach a little beyond where they begin
 
 
 @pytest.fixture(scope="module")
@@ -76,42 +82,75 @@ def test_a_notebook_shows_a_figure_as_it_is_written(tmp_path) -> None:
     assert drawn._repr_svg_() == written
 
 
+def test_what_figures_of_one_page_refer_to_is_their_own() -> None:
+    """A page of a notebook holds several, of which each clips and hatches by name."""
+    shown = [ff.figure(made(name), width=WIDTH)._repr_svg_() for name in ("Sensitivity", "Orbit")]
+    named = [set(re.findall(r'id="(\w+)"', one)) for one in shown]
+    assert all(named)
+    assert named[0].isdisjoint(named[1])
+    for one, names in zip(shown, named, strict=True):
+        assert set(re.findall(r'="url\(#(\w+)\)"', one)) == names
+
+
+def test_words_of_an_svg_are_text_and_symbols_have_subscripts() -> None:
+    figure = replace(ff.figure(made("OperatingRegion"), width=WIDTH), symbols=True)
+    words = ET.fromstring(svg_alone(figure)).iter("{http://www.w3.org/2000/svg}text")  # noqa: S314
+    said = {"".join(one.itertext()): [part.text for part in one] for one in words}
+    assert said["ωea"] == ["ea"]
+    assert said["shaft speed, rpm"] == []
+
+
+@poppler
+def test_a_pdf_has_its_size_its_words_and_its_fonts(tmp_path) -> None:
+    figure = replace(ff.figure(made("Branch"), width=WIDTH), subject="FFS0827, *b* $c$ #d <i>")
+    sheet = figure.write(tmp_path / "it.pdf")
+    assert printed(figure, "pdf") == sheet.read_bytes()
+    told = _told("pdfinfo", sheet)
+    wide, _ = re.findall(r"Page size: +([\d.]+) x ([\d.]+)", told)[0]
+    close("width, mm", float(wide) * 25.4 / 72.0, WIDTH, abs=0.01)
+    assert re.search(rf"Title: +{figure.title}\n", told)
+    assert "CreationDate" not in told
+    assert all(
+        row.split()[-5:-2] == ["yes"] * 3 for row in _told("pdffonts", sheet).splitlines()[2:]
+    )
+    assert len(_told("pdfimages", "-list", sheet).splitlines()) == 2
+    words = " ".join(_told("pdftotext", sheet, "-").split())
+    for said in ("jump (rising) 1971 rpm", "main frame (x1)", figure.subject):
+        assert said in words
+
+
+def test_a_png_has_its_dots() -> None:
+    figure = ff.figure(made("Branch"), width=WIDTH)
+    content = printed(figure, "png")
+    assert printed(figure, "png") == content
+    with Image.open(BytesIO(content)) as picture:
+        assert picture.size[0] == round(WIDTH / 25.4 * 300.0)
+        close("dots per inch", picture.info["dpi"][0], 300.0, abs=0.01)
+        assert picture.convert("RGBA").getpixel((0, 0)) == (255, 255, 255, 255)
+
+
+def _told(*command: str | Path) -> str:
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
 def _ready_for_print(figure: ff.Figure) -> None:
-    with mpl.rc_context({**STYLE, "font.family": "DejaVu Sans"}):  # the widest of the families
-        sheet = drawn_sheet(figure)
-        canvas = FigureCanvasAgg(sheet)
-        canvas.draw()
-        renderer = canvas.get_renderer()
-        close("width, mm", sheet.get_figwidth() * 25.4, WIDTH, rel=1e-9)
-        words = list(_words(sheet))
-        assert words
-        for one in words:
-            close(f"size of {one.get_text()!r}", one.get_fontsize(), POINTS, rel=1e-12)
-        boxes = [(one.get_text(), one.get_window_extent(renderer)) for one in words]
-        wide, high = canvas.get_width_height()
-        for text, box in boxes:
-            inside = min(box.x0, box.y0, wide - box.x1, high - box.y1) >= -SLACK
-            assert inside, f"{text!r} is cut off: {box} of {wide} x {high}"
-        for (one, first), (two, second) in itertools.combinations(boxes, 2):
-            covered = min(first.x1, second.x1) - max(first.x0, second.x0) > SLACK and (
-                min(first.y1, second.y1) - max(first.y0, second.y0) > SLACK
-            )
-            assert not covered, f"{one!r} and {two!r} cover each other: {first}, {second}"
-        for legend in sheet.legends:
-            box = legend.get_window_extent(renderer)
-            assert not any(axes.get_window_extent(renderer).overlaps(box) for axes in sheet.axes)
-
-
-def _words(sheet: Sheet) -> Iterator[Text]:
-    """Every text that is seen: of legends, ticks, axes and labels."""
-    for legend in sheet.legends:
-        yield from legend.get_texts()
-    for axes in sheet.axes:
-        yield from (one for one in axes.texts if one.get_text())
-        for axis in (axes.xaxis, axes.yaxis):
-            yield from _along(axis)
-
-
-def _along(axis: Axis) -> Iterator[Text]:
-    shown = [tick.label1 for tick in axis._update_ticks()]
-    yield from (one for one in (*shown, axis.label, axis.get_offset_text()) if one.get_text())
+    svg = svg_alone(figure)
+    sheet = ET.fromstring(svg)  # noqa: S314  ours
+    wide, high = (float(one) for one in sheet.attrib["viewBox"].split()[2:])
+    scale = float(sheet.attrib["width"].removesuffix("mm")) / wide
+    close("width, mm", scale * wide, WIDTH, rel=1e-5)
+    close("height", float(sheet.attrib["height"].removesuffix("mm")), scale * high, rel=1e-5)
+    close("size of words", float(sheet.attrib["font-size"]) * scale * 72.0 / 25.4, POINTS, rel=1e-3)
+    assert not any(one.get("font-size") for one in sheet.iter() if one is not sheet)
+    boxes = boxes_of(svg)
+    assert boxes
+    for one in boxes:
+        inside = min(one.left, one.top, wide - one.right, high - one.foot) >= -SLACK
+        assert inside, f"{one} is cut off: {wide} x {high}"
+    for one, two in itertools.combinations(boxes, 2):
+        assert one.overlap(two) <= SLACK, f"{one} and {two} cover each other"
+    names = legend_names(figure)
+    foot = max((one.foot for one in boxes if one.text in names), default=0.0)
+    panels = [one[0].attrib["d"] for one in sheet.iter("{http://www.w3.org/2000/svg}clipPath")]
+    assert len(panels) == len(figure.panels)
+    assert all(float(way.split("h")[0].split()[1]) >= foot for way in panels)

@@ -243,8 +243,8 @@ def test_figures_of_a_journal_column(tmp_path) -> None:
         close("width", drawn.width, WIDTH * 96.0 / 25.4, rel=1e-12)
         drawn.write(tmp_path / f"{name}.svg")
         head = (tmp_path / f"{name}.svg").read_text(encoding="utf-8")[:1200]
-        width = float(head.split('width="')[1].split("pt")[0])
-        close("points", width, WIDTH * 72.0 / 25.4, abs=0.1)
+        width = float(head.split('width="')[1].split("mm")[0])
+        close("width, mm", width, WIDTH, rel=1e-5)
     assert ff.figure(made("Orbit"), width=WIDTH).columns == 1
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import html as markup
 import itertools
 import json
 import math
@@ -14,11 +13,10 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure as Sheet
 
 import flipflow as ff
 from flipflow.errors import InputError, MissingExtra, StoreError
+from flipflow.plotting import font
 from flipflow.plotting.bars import energy_figure, region_figure
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
@@ -26,12 +24,13 @@ from flipflow.plotting.layout import arrange, place_labels
 from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figures, portrait_figure
 from flipflow.plotting.panels import PAGE_WIDTH, Axis, Line, Panel
 from flipflow.plotting.plotly import described
-from flipflow.plotting.print import _draw
+from flipflow.plotting.print import svg_alone
 from flipflow.plotting.response import cases_figure
 from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.schematic import schematic
 from flipflow.plotting.transient import run_ups_figure
 from flipflow.studies.assessment import assess
+from svg_words import Box, boxes_of
 
 
 @pytest.fixture(scope="module")
@@ -313,25 +312,21 @@ def test_labels_of_lines_do_not_cover_each_other(places):
 
 @pytest.mark.parametrize("middle", [2.0, 500.0, 998.0])
 def test_many_labels_at_one_place_are_printed_apart(middle):
-    """Six labels as matplotlib sets them: none touches another, the panel or the title."""
+    """Six labels in the widest font: none touches another, the panel or the title."""
     places = [middle + 0.2 * k for k in range(6)]
     lines = tuple(Line("x", at, f"jump (rising) {at:.4g} rpm") for at in places)
     axes = (Axis("speed", "rpm", (0.0, 1000.0)), Axis("y", "mm", (0.0, 1.0)))
     figure = Figure("a", "b.", (Panel(*axes, lines=lines, title="Title"),) * 2, 2, 300)
-    sheet = Sheet(figsize=(PAGE_WIDTH / 96, 3.0), dpi=96)
-    _draw(sheet, figure, arrange(figure), figure.height)
-    renderer = FigureCanvasAgg(sheet).get_renderer()
-    boxes = [
-        text.get_window_extent(renderer)
-        for panel in sheet.axes
-        for text in panel.texts
-    ]  # fmt: skip
-    assert len(boxes) == 14
-    for one, two in itertools.combinations(boxes, 2):
-        assert not one.overlaps(two)
-    for rect in (panel.get_window_extent(renderer) for panel in sheet.axes):
-        assert rect.height > 100.0
-        assert not any(rect.overlaps(box) for box in boxes)
+    svg = svg_alone(figure)
+    labels = [one for one in boxes_of(svg) if one.text.startswith(("jump", "Title"))]
+    assert len(labels) == 14
+    for one, two in itertools.combinations(labels, 2):
+        assert one.overlap(two) <= 0.0
+    for way in re.findall(r'<clipPath[^>]*><path d="M(.*?)z"', svg):
+        left, top, wide, high = (float(one) for one in re.findall(r"(?<![\d.])-?[\d.]+", way)[:4])
+        panel = Box("", left, top, left + wide, top + high)
+        assert high > 100.0
+        assert not any(panel.overlap(one) > 0.0 for one in labels)
 
 
 def test_plotly_takes_plain_json(assessment):
@@ -342,7 +337,7 @@ def test_plotly_takes_plain_json(assessment):
 
 @pytest.mark.parametrize(
     ("ending", "start"),
-    [(".html", b"<!DOCTYPE html>"), (".svg", b"<?xml"), (".pdf", b"%PDF"), (".png", b"\x89PNG")],
+    [(".html", b"<!DOCTYPE html>"), (".svg", b"<svg"), (".pdf", b"%PDF"), (".png", b"\x89PNG")],
 )
 def test_every_format_is_written(assessment, tmp_path, ending, start):
     for k, figure in enumerate(figures(assessment)[-2:]):
@@ -357,19 +352,19 @@ def test_a_printed_figure_says_below_it_what_it_belongs_to(orbit, tmp_path):
     for subject in ("", words, " ".join([words] * 4)):
         figure = dataclasses.replace(bare, subject=subject)
         sheet = figure.write(tmp_path / "one.svg").read_text(encoding="utf-8")
-        told = " ".join(markup.unescape(one) for one in re.findall(r"<!-- (.*?) -->", sheet))
+        told = " ".join(one.text for one in boxes_of(sheet))
         assert (words in told) == bool(subject)
-        assert "\n" not in subject
         heights.append(float(ET.fromstring(sheet).attrib["viewBox"].split()[3]))  # noqa: S314
-    assert heights[0] == pytest.approx(bare.height * 0.75)
+    assert heights[0] == bare.height
     assert heights[0] < heights[1] < heights[2]
     dataclasses.replace(bare, subject=words).write(tmp_path / "one.pdf")
     dataclasses.replace(bare, subject=words).write(tmp_path / "one.png")
 
 
 def test_the_same_figure_makes_the_same_file(orbit, tmp_path):
-    one, two = (ff.figure(orbit).write(tmp_path / f"{k}.svg") for k in "ab")
-    assert one.read_bytes() == two.read_bytes()
+    for ending in ("svg", "pdf", "png"):
+        one, two = (ff.figure(orbit).write(tmp_path / f"{k}.{ending}") for k in "ab")
+        assert one.read_bytes() == two.read_bytes()
 
 
 def test_bad_paths_are_refused(orbit, tmp_path):
@@ -379,10 +374,28 @@ def test_bad_paths_are_refused(orbit, tmp_path):
         ff.figure(orbit).write(tmp_path / "no" / "x.html")
 
 
-def test_without_matplotlib_the_extra_is_named(orbit, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(MissingExtra, match="report"):
-        ff.figure(orbit).write(tmp_path / "x.svg")
+@pytest.mark.parametrize(
+    ("module", "ending", "says"),
+    [
+        ("matplotlib", "svg", "Figures for print need matplotlib"),
+        ("matplotlib", "pdf", "Figures for print need matplotlib"),
+        ("typst", "pdf", "A PDF needs typst"),
+        ("typst", "png", "A PNG needs typst"),
+    ],
+)
+def test_what_is_missing_is_named_with_its_extra(
+    orbit, tmp_path, monkeypatch, module, ending, says
+):
+    monkeypatch.setitem(sys.modules, module, None)
+    for measured in (font._font, font._advance):
+        measured.cache_clear()
+    with pytest.raises(MissingExtra, match=rf"{says}: pip install 'flipflow\[report\]'"):
+        ff.figure(orbit).write(tmp_path / f"x.{ending}")
+
+
+def test_a_figure_as_svg_and_in_a_notebook_needs_no_typst(orbit, monkeypatch):
+    monkeypatch.setitem(sys.modules, "typst", None)
+    assert "<svg" in orbit._repr_html_()
 
 
 def test_general_systems_are_drawn_by_degree_of_freedom():

@@ -58,7 +58,7 @@ def design(
     duty = load_duty(file, force=force)
     require_templates()
     if pdf:
-        from flipflow.report.pdf import require_typst  # noqa: PLC0415
+        from flipflow.plotting.print import require_typst  # noqa: PLC0415
 
         require_typst()
     for warning in duty.project.warnings:

@@ -113,7 +113,8 @@ def formats_of(paper: str | None, *, tables: bool) -> tuple[Format, ...]:
     require_templates()
     formats: list[Format] = []
     if paper is not None:
-        from flipflow.report.pdf import checked_paper, pdf, require_typst  # noqa: PLC0415
+        from flipflow.plotting.print import require_typst  # noqa: PLC0415
+        from flipflow.report.pdf import checked_paper, pdf  # noqa: PLC0415
 
         checked_paper(paper, "--paper")
         require_typst()

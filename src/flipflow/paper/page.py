@@ -84,7 +84,7 @@ def write_reproduction(
     Raises
     ------
     MissingExtra
-        When jinja2 or matplotlib is not installed.
+        When jinja2, matplotlib or typst is not installed.
     StoreError
         When a file cannot be written.
     """
@@ -104,7 +104,7 @@ def write_figure(one: ReproducedFigure, folder: Path) -> tuple[str, ...]:
     Raises
     ------
     MissingExtra
-        When matplotlib is not installed.
+        When matplotlib or typst is not installed.
     StoreError
         When a file cannot be written.
     """

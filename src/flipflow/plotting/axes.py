@@ -10,12 +10,15 @@ from flipflow.errors import InputError, MissingExtra
 from flipflow.model.system import Coordinate
 from flipflow.plotting.dispatch import figure
 from flipflow.plotting.layout import MARKS, mark_size
-from flipflow.plotting.palette import MARKERS
 from flipflow.plotting.panels import Panel, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+MARKERS = {
+    "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
+    "triangle-open": "v", "diamond": "D", "diamond-open": "D", "cross": "x", "star": "*",
+}  # fmt: skip
 DASHES = {"unstable": "--", "undetermined": ":"}
 NEUTRAL = "0.35"  # of entries of the legend that belong to no line
 OF_A_LINE = "jump"  # the colour that marks upon a line have on a page

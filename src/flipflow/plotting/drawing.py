@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import html
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from flipflow.errors import MissingExtra
 from flipflow.plotting.files import write_rendered
 from flipflow.plotting.palette import INK
+from flipflow.plotting.print import typeset
 
 FORMATS = (".html", ".svg", ".pdf")
+MARGIN = 6.0  # points; of a PDF
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <style>body {{ font-family: Arial, Helvetica, sans-serif; color: {ink}; width: 690px;
@@ -57,7 +57,7 @@ class Drawing:
         StoreError
             When the file cannot be written.
         MissingExtra
-            When typst, which makes the PDF, is not installed.
+            When typst or matplotlib, which a PDF needs, is not installed.
         """
         return write_rendered(path, FORMATS, self._rendered)
 
@@ -67,17 +67,4 @@ class Drawing:
         if ending == ".html":
             title, caption = html.escape(self.title), html.escape(self.caption)
             return PAGE.format(title=title, caption=caption, svg=self.svg, ink=INK).encode()
-        return _pdf(self.svg)
-
-
-def _pdf(svg: str) -> bytes:
-    try:
-        import typst  # noqa: PLC0415  an extra
-    except ImportError as error:
-        raise MissingExtra("Drawings as PDF need typst: pip install 'flipflow[report]'.") from error
-    # A JSON string of plain text without control characters is a typst string as well.
-    text = json.dumps(svg, ensure_ascii=False)
-    source = (
-        f'#set page(width: auto, height: auto, margin: 6pt)\n#image(bytes({text}), format: "svg")'
-    )
-    return bytes(typst.compile(source.encode(), format="pdf"))
+        return typeset(self.svg, "pdf", self.title, MARGIN)

@@ -9,6 +9,7 @@ from pathlib import Path
 from flipflow.plotting.files import write_rendered
 from flipflow.plotting.layout import arrange, beside_panels
 from flipflow.plotting.panels import PanelGrid
+from flipflow.plotting.print import printed
 
 COLUMN = 250.0  # pixels that a column of panels needs at least
 ASPECT, LOWEST = 0.66, 70.0  # height of a panel over its width, and its least height in pixels
@@ -55,7 +56,7 @@ class Figure(PanelGrid):
         StoreError
             When the file cannot be written.
         MissingExtra
-            When matplotlib is needed and not installed.
+            When matplotlib, or typst for PDF and PNG, is needed and not installed.
         """
         return write_rendered(path, FORMATS, self._rendered)
 
@@ -68,6 +69,4 @@ class Figure(PanelGrid):
             from flipflow.plotting.plotly import page  # noqa: PLC0415  loads plotly
 
             return page(self).encode()
-        from flipflow.plotting.print import printed  # noqa: PLC0415  loads matplotlib
-
         return printed(self, ending.removeprefix("."))

@@ -1,4 +1,4 @@
-"""Where panels, legend and labels go, in pixels: one geometry for both renderers."""
+"""Where panels, legend and labels go, in pixels: one geometry for all renderers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from flipflow.plotting.panels import PAGE_WIDTH, Line, Panel, PanelGrid
 
 PIXELS_A_MM = 96.0 / 25.4
+POINT = 72.0 / 96.0  # points a pixel
 FONT = 32.0 / 3.0  # 8 point
 CHARACTER = 6.3
 LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19

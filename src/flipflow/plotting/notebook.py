@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from flipflow.errors import FlipflowError
 from flipflow.plotting.dispatch import figure
-from flipflow.plotting.print import printed
+from flipflow.plotting.print import svg_alone
 
 PICTURE = 110.0  # mm
 
 
 def picture_of(result: object) -> str:
-    """The figure as SVG; none of a result without points, or without matplotlib to draw it."""
+    """The figure as SVG; none of a result without points, or where matplotlib is missing."""
     try:
-        drawing = printed(figure(result, width=PICTURE), "svg").decode()
+        return svg_alone(figure(result, width=PICTURE))
     except FlipflowError:
         return ""
-    return drawing[drawing.index("<svg") :]

@@ -1,4 +1,4 @@
-"""What the names of colours, dashes and symbols mean, for both renderers.
+"""What the names of colours, dashes and symbols mean, for all renderers.
 
 Colours differ in lightness as well as in hue, and every line also differs by symbol or dash, so
 that a figure can be read in black and white.
@@ -49,10 +49,6 @@ TINTS: Mapping[str, str] = {
     "case 4": "#d9bfe2",
     "case 5": "#b4bac0",
 }
-MARKERS: Mapping[str, str] = {  # of matplotlib
-    "circle": "o", "circle-open": "o", "square": "s", "square-open": "s", "triangle": "^",
-    "triangle-open": "v", "diamond": "D", "diamond-open": "D", "cross": "x", "star": "*",
-}  # fmt: skip
 DASHES: Mapping[str, str] = {"unstable": "dash", "undetermined": "dot"}
 SYMBOLS = ("", "circle", "square", "triangle", "diamond", "cross")
 HATCHES = ("", "/", "\\", "x", "-", ".")

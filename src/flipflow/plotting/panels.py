@@ -1,7 +1,8 @@
 """The parts of a neutral figure: what is drawn, in the units of its axes, without a word on how.
 
-Builders make them from results; :mod:`flipflow.plotting.plotly` and :mod:`flipflow.plotting.print`
-draw them. Colours are named by what they mean; :mod:`flipflow.plotting.palette` says what they are.
+Builders make them from results; :mod:`flipflow.plotting.plotly` and :mod:`flipflow.plotting.svg`
+draw them. Colours are named by what they mean;
+:mod:`flipflow.plotting.palette` says what they are.
 """
 
 from __future__ import annotations

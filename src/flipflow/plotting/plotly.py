@@ -86,7 +86,7 @@ def element(figure: PanelGrid, narrow: PanelGrid | None = None) -> str:
     """
     inside = f'<script type="application/json">{_as_json(described(figure))}</script>'
     if narrow is not None:
-        layout = _as_json(described(narrow)["layout"])
+        layout = _as_json(layout_of(narrow, arrange(narrow)))
         inside += f'<script type="application/json" data-narrow>{layout}</script>'
     size = f"width:{figure.width:g}px;height:{figure.height}px"
     return f'<div data-figure style="{size}">{inside}</div>'
@@ -107,26 +107,42 @@ def described(figure: PanelGrid) -> Json:
     """The figure as plotly.js takes it: data, layout and config."""
     geometry = arrange(figure)
     data: list[Json] = []
+    for k, panel in enumerate(figure.panels):
+        key = _key(k)
+        shown = fitted(panel, geometry.rects[k].width)
+        data += [_cells(cells, key) for cells in shown.cells]
+        data += [item for trace in shown.traces for item in _trace(trace, shown, key)]
+        data += _bars(shown.bars, key)
+    _legend_once(data)
+    layout = layout_of(figure, geometry)
+    return {"data": _said(data, figure), "layout": layout, "config": CONFIG}
+
+
+def layout_of(figure: PanelGrid, geometry: Geometry) -> Json:
+    """The layout of a figure as plotly.js takes it, without its data."""
     layout = _frame(figure)
     for k, (panel, rect) in enumerate(zip(figure.panels, geometry.rects, strict=True)):
-        key = "" if k == 0 else str(k + 1)
-        panel = fitted(panel, rect.width)  # noqa: PLW2901
-        layout[f"xaxis{key}"] = _axis(panel.x, rect, figure, key, across=True)
-        layout[f"yaxis{key}"] = _axis(panel.y, rect, figure, key, across=False)
-        if panel.equal:
+        key, shown = _key(k), fitted(panel, rect.width)
+        layout[f"xaxis{key}"] = _axis(shown.x, rect, figure, key, across=True)
+        layout[f"yaxis{key}"] = _axis(shown.y, rect, figure, key, across=False)
+        if shown.equal:
             layout[f"yaxis{key}"] |= {"scaleanchor": f"x{key}", "constrain": "domain"}
             layout[f"xaxis{key}"]["constrain"] = "domain"
-        layout["shapes"] += _shapes(panel, key)
-        layout["annotations"] += _annotations(panel, key, geometry, k)
-        data += [_cells(cells, key) for cells in panel.cells]
-        data += [item for trace in panel.traces for item in _trace(trace, panel, key)]
-        data += _bars(panel.bars, key)
-    _legend_once(data)
+        layout["shapes"] += _shapes(shown, key)
+        layout["annotations"] += _annotations(shown, key, geometry, k)
     layout["showlegend"] = len(legend_names(figure)) > 1
-    found: Json = {"data": data, "layout": layout}
-    if figure.symbols:
-        found = described_with_symbols(found)
-    return found | {"config": CONFIG}
+    said: Json = _said(layout, figure)
+    return said
+
+
+def _key(index: int) -> str:
+    """What plotly.js calls the axes of a panel, behind their letter."""
+    return "" if index == 0 else str(index + 1)
+
+
+def _said(found: Any, figure: PanelGrid) -> Any:
+    """What is shown of a figure, with symbols where it has them."""
+    return described_with_symbols(found) if figure.symbols else found
 
 
 def _frame(figure: PanelGrid) -> Json:

@@ -49,11 +49,6 @@ def html_subscript(letter: str, index: str) -> str:
     return f"{letter}<sub>{index}</sub>"
 
 
-def mathtext_subscript(letter: str, index: str) -> str:
-    """For matplotlib, in the font of the words around."""
-    return rf"$\mathregular{{{letter}_{{{index}}}}}$"
-
-
 def svg_with_symbols(svg: str) -> str:
     """A drawing whose words carry symbols; what follows a subscript returns to the line."""
     return re.sub(r"(?<=>)([^<>]+)(?=</text>)", lambda match: _svg_words(match[1]), svg)
@@ -63,8 +58,8 @@ def _svg_words(text: str) -> str:
     first, *rest = with_symbols(text, lambda a, b: f"{a}\0{b}\0").split("\0")
     pieces = [first]
     for index, after in zip(rest[::2], rest[1::2], strict=True):
-        pieces.append(f'<tspan dy="3" font-size="9">{index}</tspan>')
-        pieces.append(f'<tspan dy="-3">{after}</tspan>' if after else "")
+        pieces.append(f'<tspan dy="0.27em" font-size="75%">{index}</tspan>')
+        pieces.append(f'<tspan dy="-0.2em">{after}</tspan>' if after else "")
     return "".join(pieces)
 
 

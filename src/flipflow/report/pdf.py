@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from types import MappingProxyType
 from typing import Any
 
-from flipflow.errors import InputError, MissingExtra
+from flipflow.errors import InputError
+from flipflow.plotting.font import font_folder
+from flipflow.plotting.layout import POINT
 from flipflow.plotting.panels import PAGE_WIDTH
-from flipflow.plotting.print import POINT, font_folder, require_matplotlib, searchable_svg
+from flipflow.plotting.print import require_typst
+from flipflow.plotting.svg import searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
 from flipflow.report.html import (
     KIND,
@@ -90,7 +93,7 @@ def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper
         source,
         format="pdf",
         # Fonts of the machine are asked for letters that these have not, as Chinese ones.
-        font_paths=[font_folder()],
+        font_paths=[str(font_folder())],
         sys_inputs={"report": json.dumps(report)},
     )
     return bytes(content)
@@ -107,23 +110,6 @@ def checked_paper(paper: str, field: str = "paper") -> str:
     if paper not in PAPERS:
         raise InputError(field, paper, f"choose one of {', '.join(PAPERS)}")
     return paper
-
-
-def require_typst() -> Callable[..., Any]:
-    """What sets the pages; called before long work, so that it is not lost for want of it.
-
-    Raises
-    ------
-    MissingExtra
-        When typst or matplotlib is not installed.
-    """
-    try:
-        import typst  # noqa: PLC0415  an extra
-    except ImportError as error:
-        raise MissingExtra("A PDF needs typst: pip install 'flipflow[report]'.") from error
-    require_matplotlib()
-    compiled: Callable[..., Any] = typst.compile
-    return compiled
 
 
 def _shown(block: Block, highest: float) -> dict[str, Any]:

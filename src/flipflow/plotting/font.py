@@ -1,0 +1,78 @@
+"""How wide words are in the widest font of figures for print, which matplotlib carries."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flipflow.errors import MissingExtra
+from flipflow.plotting.layout import FONT
+
+if TYPE_CHECKING:
+    from matplotlib.ft2font import FT2Font
+
+FAMILY = "DejaVu Sans"
+FILE = "DejaVuSans.ttf"
+# In pixels: capitals above the base line, half of that, letters below it, from line to line.
+ASCENT, MIDDLE, DESCENT, LINE_HEIGHT = 0.76 * FONT, 0.365 * FONT, 0.24 * FONT, 1.2 * FONT
+
+
+def require_matplotlib() -> None:
+    """See that figures can be printed.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    try:
+        import matplotlib  # noqa: F401, ICN001, PLC0415  slow to import
+    except ImportError as error:
+        raise MissingExtra(
+            "Figures for print need matplotlib: pip install 'flipflow[report]'."
+        ) from error
+
+
+def font_folder() -> Path:
+    """Where matplotlib keeps the font.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    require_matplotlib()
+    found = find_spec("matplotlib")
+    return Path(str(found and found.origin)).parent / "mpl-data" / "fonts" / "ttf"
+
+
+def width_of(text: str) -> float:
+    """Width in pixels of the widest line of a text.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    return max(sum(map(_advance, line)) for line in text.split("\n"))
+
+
+@cache
+def _advance(letter: str) -> float:
+    """Width of a letter in pixels; one that the font has not is taken from another, and wide."""
+    font = _font()
+    if not font.get_char_index(ord(letter)):
+        return FONT
+    return float(font.load_char(ord(letter)).linearHoriAdvance / 65536.0)
+
+
+@cache
+def _font() -> FT2Font:
+    folder = font_folder()
+    from matplotlib.ft2font import FT2Font  # noqa: PLC0415  an extra, slow to import
+
+    font = FT2Font(str(folder / FILE))
+    font.set_size(FONT, 72.0)
+    return font
