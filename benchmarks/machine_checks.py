@@ -51,7 +51,8 @@ def branch_record(branch):
 
 def compare(balance, exact_solver):
     """Stated against true error of the series, at the same omega and the same motion."""
-    stated, omega = balance.error, balance.omega
+    # balance.omega may not be written to, for which a kernel would be compiled anew.
+    stated, omega = balance.error, balance.traced.omega
     states = balance.formulation.solver().states(balance.traced.u, omega)
     harmonics, series = balance.formulation.solver().series(balance.traced.u, omega)
     theta = 2.0 * np.pi * np.arange(GRID) / GRID

@@ -34,7 +34,16 @@ TOGETHER = {
     "test_report_offline.py": "reports",
     "test_paper_claims.py": "paper", "test_paper_figures.py": "paper",
     "test_reproduction_page.py": "paper",
+    "test_results_travel.py": "results", "test_journal_figures.py": "results",
 }  # fmt: skip
+# What takes longest, begun first: one begun last would leave the other processes idle.
+LONGEST = (
+    "reports", "results", "test_design.py", "test_derivatives.py", "paper", "test_study_kills.py",
+    "test_laws.py", "test_kernel_cache.py", "test_drive.py", "test_stopping.py",
+    "test_bad_input.py", "test_study_workers.py", "test_destination.py", "test_starts.py",
+    "test_unusual_machines.py", "test_lanes.py", "test_jump_risk.py", "test_field_solver.py",
+    "test_near_grazing.py", "test_random_machines.py", "test_paths.py", "test_smooth_law.py",
+)  # fmt: skip
 
 
 def pytest_configure() -> None:
@@ -49,6 +58,17 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes longest comes first, what is left in the order of the names of files."""
+    places = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(_group(item.path.name), len(places)))
+
+
+def _group(file: str) -> str:
+    """What stays on one process: a file, or several that share what takes long."""
+    return TOGETHER.get(file, file)
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes() -> None:
     """Large kernels are compiled before the processes start that would each compile them."""
@@ -57,14 +77,18 @@ def pytest_xdist_setupnodes() -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """Tests of a file stay on one process: what they share is then made once."""
+    """Tests of a file stay on one process: what they share is then made once.
+
+    Files are begun in the order of collection, and not those with the most tests first.
+    """
     from xdist.scheduler import LoadFileScheduling  # noqa: PLC0415  only with pytest-xdist
 
     class Grouped(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = super()._split_scope(nodeid)
-            return TOGETHER.get(file.rpartition("/")[2], file)
+            return _group(file.rpartition("/")[2])
 
+    config.option.loadscopereorder = False
     return Grouped(config, log)
 
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from flipflow.batch.lane_path import predict as predict_lane
+from flipflow.compiled import status
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
-from flipflow.continuation.frequency_loop import predict
+from flipflow.continuation.correction import Course, new_corrector
+from flipflow.continuation.frequency_loop import new_branch, predict
+from flipflow.continuation.refinement import TRACE_ALL, follow
 from flipflow.continuation.varied import varied_residual
 from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
 from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.dynamics.machine_series import set_machine
-from flipflow.periodic.balance import balance_residual
-from flipflow.periodic.sampled import sampled_residual
-from flipflow.periodic.shooting import shooting_residual
+from flipflow.periodic.shooting import shooting_step
 from flipflow.periodic.two_event import force_excess
+
+NO_STEPS = Course(0.0, math.inf, math.nan, math.nan, 1.0, 1.0)
 
 
 @kernel(entry=True)
@@ -40,10 +45,9 @@ def range_of(motion, duration):
     return extremes(motion, motion.rate.shape[0], 0, duration)
 
 
-@kernel(entry=True)
 def shoot(problem, work, z, omega, r, J):
-    """``shooting_residual``."""
-    return shooting_residual(problem, work, z, omega, r, J)
+    """``shooting_residual``, by the package's own entry to it."""
+    return shooting_step(problem, work, z, omega, r, J)[0]
 
 
 @kernel(entry=True)
@@ -52,16 +56,18 @@ def lane_guess(work, omega):
     predict_lane(work, omega)
 
 
-@kernel(entry=True)
 def balance(problem, work, u, omega, r, J):
-    """``balance_residual``."""
-    return balance_residual(problem, work, u, omega, r, J)
+    """``balance_residual`` or ``sampled_residual``, by the loop that follows branches.
 
-
-@kernel(entry=True)
-def sampled(problem, work, u, omega, r, J):
-    """``sampled_residual``."""
-    return sampled_residual(problem, work, u, omega, r, J)
+    The loop is compiled already, and of these alone it would be compiled anew. Its first correction
+    begins with the residual at (u, omega), and ends there for want of a length of its steps.
+    """
+    corrector = new_corrector(u.size, np.ones(1))
+    corrector.r[:], corrector.J[:] = np.nan, np.nan
+    record = new_branch(u.size, 1, 1, with_jacobian=False)
+    follow(problem, work, corrector, record, u, omega, NO_STEPS, TRACE_ALL, 0.0, 0.0, 0)
+    r[:], J[:] = corrector.r, corrector.J
+    return status.OK if np.isfinite(J).all() else status.NOT_FINITE
 
 
 @kernel(entry=True)

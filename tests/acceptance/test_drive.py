@@ -586,9 +586,8 @@ def test_bad_limits_on_the_way(tmp_path, section, told):
     assert all(word in str(caught.value) for word in told), caught.value
 
 
-def test_an_assessment_opens_as_it_was(tmp_path):
-    project = ff.load_project("ffs0827")
-    found = assess(dataclasses.replace(project, load_cases=project.load_cases[:2]))
+def test_an_assessment_opens_as_it_was(analysed, tmp_path):
+    found = analysed("ffs0827")
     ff.save(found, tmp_path / "a.json")
     again = ff.open_result(tmp_path / "a.json")
     assert document_of(again) == document_of(found)

@@ -80,6 +80,11 @@ def response() -> Branch:
     return ff.frequency_response(screen(), (190.0, 210.0))
 
 
+@functools.cache
+def risk() -> JumpRisk:
+    return ff.jump_risk(bistable(), 1.2)
+
+
 def assessed() -> Assessment:
     project = ff.load_project("ffs0827")
     return ff.assess(dataclasses.replace(project, load_cases=project.load_cases[:2]))
@@ -144,7 +149,7 @@ MADE: dict[type, list[Callable[[], object]]] = {
     Basins: [
         lambda: ff.basins(bistable(), 1.2, {0: np.linspace(-2.0, 2.0, 4)}, {0: [0.0, 1.0]}),
     ],
-    JumpRisk: [lambda: ff.jump_risk(bistable(), 1.2)],
+    JumpRisk: [risk],
     History: [
         lambda: ff.simulate(screen(), 120.0, 3, disturbances=[ff.Impulse(0.05, "main", 50.0)]),
         lambda: ff.simulate(chain(), 0.8, 2),
@@ -328,10 +333,9 @@ def test_a_run_that_grew_beyond_all_bounds_is_saved(tmp_path):
 
 
 def test_an_infinite_lump_is_not_a_plain_impulse(tmp_path):
-    risk = MADE[JumpRisk][0]()
-    assert risk.impulses
-    heavy = dataclasses.replace(risk.impulses[0], lump=math.inf)
-    again = through_a_file(dataclasses.replace(risk, lumps=(heavy,)), tmp_path)
+    assert risk().impulses
+    heavy = dataclasses.replace(risk().impulses[0], lump=math.inf)
+    again = through_a_file(dataclasses.replace(risk(), lumps=(heavy,)), tmp_path)
     assert again.lumps[0].lump == math.inf
     assert again.impulses[0].lump is None
 

@@ -288,34 +288,39 @@ def test_a_machine_of_its_user_has_no_units() -> None:
     assert any(text.endswith(f"{branch().folds[0].omega:.4g} rad/s") for text in in_si)
 
 
-def results_of(machine: ff.FlipFlowScreen | ff.MechanicalSystem, omega: float) -> list[object]:
-    """Results that hang on the units of a machine, one of each kind."""
-    which = 0 if isinstance(machine, ff.MechanicalSystem) else "relative"
-    followed = ff.frequency_response(machine, (0.7 * omega, 1.3 * omega))
+def results_of_chain(omega: float) -> list[object]:
+    """Results that hang on the units of a machine, one of each kind, of one that has none."""
+    machine = chain()
     orbits = ff.periodic_orbits(machine, omega)
-    rate = 0.01 * omega**2
     return [
-        followed,
+        ff.frequency_response(machine, (0.7 * omega, 1.3 * omega)),
         orbits[0],
         ff.linear_response(machine, [omega, 1.1 * omega]),
         ff.sweep(machine, [omega, 1.01 * omega]),
         ff.simulate(machine, omega=omega, periods=3),
         ff.poincare_section(machine, omega, 5, skip=5),
-        ff.spectrum(orbits[0], which),
+        ff.spectrum(orbits[0], 0),
         ff.lyapunov_exponents(machine, omega, periods=64, skip=16),
-        ff.basins(machine, omega=omega, displacement={which: [0.0, 0.1]}, velocity={which: [0.0]}),
+        ff.basins(machine, omega=omega, displacement={0: [0.0, 0.1]}, velocity={0: [0.0]}),
         ff.jump_risk(machine, orbits[0]),
-        ff.ramp(machine, (omega, 1.1 * omega), rate),
-        ff.continue_orbit(orbits[0], "springs[0].clearance", (0.35, 0.45))
-        if isinstance(machine, ff.MechanicalSystem)
-        else ff.continue_orbit(orbits[0], "clearance", (5e-3, 7e-3)),
+        ff.ramp(machine, (omega, 1.1 * omega), 0.01 * omega**2),
+        ff.continue_orbit(orbits[0], "springs[0].clearance", (0.35, 0.45)),
     ]
+
+
+def results_of_screen(kinds: set[str]) -> list[object]:
+    """The same of a screen: those that are made already, but for the one of the chain."""
+    exponents = ff.lyapunov_exponents(screen(), 89.0, periods=64, skip=16)
+    return [*(made(kind) for kind in sorted(kinds - {"LyapunovExponents"})), exponents]
 
 
 def test_no_unit_is_written_of_a_machine_that_has_none() -> None:
     """Neither in words nor in tables; those of a screen are SI. An angle is in rad for both."""
-    for machine, omega, known in ((chain(), 1.25, False), (screen(), 89.0, True)):
-        for result in results_of(machine, omega):
+    without = results_of_chain(1.25)
+    kinds = {type(result).__name__ for result in without}
+    assert len(kinds) == len(without)
+    for results, known in ((without, False), (results_of_screen(kinds), True)):
+        for result in results:
             units = {v.attrs.get("units") for v in result.to_xarray().variables.values()}
             units -= {None, "", "rad"}
             assert bool(units) == known, (result, units)

@@ -38,7 +38,7 @@ def undisturbed(kills, tmp_path_factory):
     return found
 
 
-@pytest.mark.parametrize(("cluster", "times"), [(False, 8), (True, 2)])
+@pytest.mark.parametrize(("cluster", "times"), [(False, 4), (True, 2)])
 def test_the_process_is_killed(kills, undisturbed, tmp_path, cluster, times):
     rng = np.random.default_rng(1)
     folders = kills.kill_runs(kills.quick, tmp_path, times, rng, cluster=cluster)

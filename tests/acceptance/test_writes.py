@@ -28,7 +28,7 @@ from flipflow.results.store import json_text
 # Linear, of one load case and one limit: for what is written, not for what is found.
 SMALL = str(Path(__file__).parents[1] / "machines" / "small.toml")
 QUICK = (SMALL, "--speeds", "800 rpm", "900 rpm")
-KILLS = 12
+KILLS = 6
 # Writes the set of one folder, then that of the other, again and again, as a command does.
 WRITER = """
 import sys

@@ -266,9 +266,12 @@ def test_extremes_of_random_sums(seed: int, terms: int) -> None:
     m = motion(rng.normal(), rng.normal(size=terms) + 1j * rng.normal(size=terms), rate)
     y = sampled(m, np.linspace(0.0, 2.0, SAMPLES))
     size = np.abs(y).max() + abs(m.offset[0])
-    low, high = range_of(m, 2.0)
+    low, high, at_low, at_high = range_of(m, 2.0)
     close("least", low, y.min(), abs=1e-6 * size)
     close("most", high, y.max(), abs=1e-6 * size)
+    for value, at in ((low, at_low), (high, at_high)):
+        assert 0.0 <= at <= 2.0 * (1.0 + 1e-15)
+        close("value at its time", sampled(m, np.array([at]))[0], value, abs=1e-9 * size)
     assert low <= y.min() + 1e-12 * size
     assert high >= y.max() - 1e-12 * size
 
@@ -280,6 +283,6 @@ def test_extremes_of_a_ripple_that_grows() -> None:
         rate = np.array([-0.1 + 1.0j, rng.uniform(4.0, 6.0) + 1j * rng.uniform(40.0, 80.0)])
         m = motion(0.1, [1.0, 1e-4 * np.exp(1j * rng.uniform(0.0, 6.0))], rate)
         y = sampled(m, np.linspace(0.0, 2.0, SAMPLES))
-        low, high = range_of(m, 2.0)
+        low, high, _, _ = range_of(m, 2.0)
         close("least", low, y.min(), abs=1e-6)
         close("most", high, y.max(), abs=1e-6)

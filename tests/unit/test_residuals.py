@@ -16,7 +16,7 @@ from flipflow.periodic.sampled import new_sampled, new_sampled_work
 from flipflow.periodic.series import new_balance, new_balance_work
 from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from judge import close
-from kernel_calls import balance, central_differences, jump, residual_of, sampled, shoot
+from kernel_calls import balance, central_differences, jump, residual_of, shoot
 from reference import integrate
 
 pytestmark = pytest.mark.numerical
@@ -104,7 +104,7 @@ def test_jacobian_of_sampled_balance(screen, case: str, order: int, sharpness: f
     u = np.random.default_rng(order).normal(size=unknowns) * 1.0e-3
     u[0 if symmetric else 1] = 9e-3
     work = new_sampled_work(new_balance_work(balanced))
-    evaluate = residual_of(sampled, problem, work, unknowns)
+    evaluate = residual_of(balance, problem, work, unknowns)
     _, J = evaluate(u, 120.0)
     assert work.beyond[0] > 0, "there is contact in this test"
     step = min(1e-7, 1e-4 / sharpness)

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -89,15 +89,15 @@ class Study(Result):
         Each quantity of the machine itself, (C, F) or (C,).
     at_low, at_high
         With one field at the low or the high end of its range, (D, C, F) or (D, C).
+    notes
+        A sentence for each thing to keep in mind.
+    version
+        Version of flipflow.
     parameters
         With respect to which the quantities were differentiated, (P,).
     derivatives
         Derivatives of each quantity, SI, (S, C, F, P); NaN where there is none, and where it has
         another one to each side.
-    notes
-        A sentence for each thing to keep in mind.
-    version
-        Version of flipflow.
     """
 
     machine: Machine
@@ -115,10 +115,10 @@ class Study(Result):
     nominal: Mapping[str, Real]
     at_low: Mapping[str, Real]
     at_high: Mapping[str, Real]
-    parameters: tuple[str, ...]
-    derivatives: Mapping[str, Real]
     notes: tuple[str, ...]
     version: str
+    parameters: tuple[str, ...] = ()
+    derivatives: Mapping[str, Real] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         whole = "" if self.complete else ", not complete"
@@ -415,10 +415,10 @@ def _study(plan: Plan, values: Arrays, reference: Arrays, notes: tuple[str, ...]
         nominal=ends(NOMINAL),
         at_low=ends(LOW),
         at_high=ends(HIGH),
-        parameters=plan.derivatives,
-        derivatives={name: values[slope_key(name)] for name in plan.quantities if plan.derivatives},
         notes=(*notes, *_notes(plan, reason)),
         version=__version__,
+        parameters=plan.derivatives,
+        derivatives={name: values[slope_key(name)] for name in plan.quantities if plan.derivatives},
     )
 
 
