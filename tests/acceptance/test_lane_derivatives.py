@@ -1,5 +1,7 @@
 """Derivatives of many machines in one call: those of each motion alone."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from flipflow.batch.reasons import FOUND
 from flipflow.batch.slope_readings import SlopesAsked
 from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes, solve_slopes
 from flipflow.batch.variants import batches
+from flipflow.model.parameters import with_values
 from flipflow.model.quantities import quantities_for, quantity_named
 from flipflow.studies.lane_values import lane_values, on_lanes, slope_key
 from flipflow.studies.quantity_values import MOTION_VALUES
@@ -98,34 +101,44 @@ def test_states_multipliers_and_shares_of_contact(screen, gap):
                 same(slope, own[np.abs(orbit.multipliers - mu).argmin()], rtol=1e-7)
 
 
-def drawn_system(rng):
-    """One to three masses, one or two stops of any law, some without gap or with a static force."""
+def drawn_system(rng, omega):
+    """One to three masses, one or two stops that they meet, each of any law, some without gap."""
     size, stops = int(rng.integers(1, 4)), int(rng.integers(1, 3))
     A = rng.normal(size=(size, size))
     M, K = np.diag(rng.uniform(0.5, 3.0, size)), A @ A.T + np.diag(rng.uniform(0.2, 2.0, size))
-    cross = 0.02 * rng.normal(size=(size, size)) if rng.random() < 0.3 else 0.0
+    C = 0.05 * K + 0.02 * M + (0.02 * rng.normal(size=(size, size)) if rng.random() < 0.3 else 0.0)
+    force = rng.normal(size=size) * np.exp(1j * rng.uniform(0.0, 6.0, size))
+    excitation = [ff.HarmonicForce(tuple(force))]
+    if rng.random() < 0.4:
+        excitation.append(ff.HarmonicForce(tuple(0.3 * force), order=int(rng.integers(2, 4))))
+    free = np.abs(np.linalg.solve(K - omega**2 * M + 1j * omega * C, force))
     springs = []
-    law = str(rng.choice(LAWS))
     for _ in range(stops):
-        gap, stiffness = float(rng.uniform(0.1, 1.0)), float(10.0 ** rng.uniform(0.0, 2.0))
-        other = float(rng.choice([gap, np.inf, rng.uniform(0.1, 1.0)]))
+        direction, stiffness = rng.normal(size=size), float(10.0 ** rng.uniform(0.0, 2.0))
+        gap = float(rng.uniform(0.3, 0.9) * np.abs(direction) @ free)
+        other = float(rng.choice([gap, np.inf, rng.uniform(0.5, 1.5) * gap]))
         if rng.random() < 0.15:
             gap = other = 0.0
         damping = float(rng.uniform(0.01, 0.5) * np.sqrt(stiffness))
-        direction = tuple(rng.normal(size=size))
-        springs.append(ff.ClearanceSpring(direction, stiffness, damping, gap, other, law=law))
-    force = rng.normal(size=size) * np.exp(1j * rng.uniform(0.0, 6.0, size))
-    still = tuple(0.2 * rng.normal(size=size)) if rng.random() < 0.3 else None
-    return ff.MechanicalSystem(
-        M, 0.05 * K + 0.02 * M + cross, K, tuple(springs), ff.HarmonicForce(tuple(force)),
-        static_force=still,
-    )  # fmt: skip
+        law = str(rng.choice(LAWS))
+        springs.append(
+            ff.ClearanceSpring(tuple(direction), stiffness, damping, gap, other, law=law)
+        )
+    still = tuple(0.2 * free * rng.normal(size=size)) if rng.random() < 0.3 else None
+    return ff.MechanicalSystem(M, C, K, tuple(springs), tuple(excitation), static_force=still)
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_machines_that_nobody_chose(seed):
+@pytest.fixture(scope="module")
+def compared():
+    """Of each seed how many derivatives were compared, and whether a stop was touched."""
+    return {}
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_machines_that_nobody_chose(seed, compared):
     rng = np.random.default_rng(seed)
-    machine, omega = drawn_system(rng), float(rng.uniform(0.3, 3.0))
+    omega = float(rng.uniform(0.3, 3.0))
+    machine = drawn_system(rng, omega)
     names = ["forcing"]
     for j, spring in enumerate(machine.springs):
         names += [f"springs[{j}].stiffness", f"springs[{j}].damping"]
@@ -135,15 +148,26 @@ def test_machines_that_nobody_chose(seed):
         machine, {"forcing": np.array([1.0, 1.1])}, asked, np.array([omega]), (0.1, 4.0),
         "from-below", names=names,
     )  # fmt: skip
-    if why[0, 0] != FOUND:
-        return  # no motion of one period is reached from below
     size = next(one for one in asked if one.part == "amplitude")
-    value = found[size.name][0, 0]
-    orbits = [one for one in ff.periodic_orbits(machine, omega=omega) if one.stable]
-    orbit = min(orbits, key=lambda one: abs(one.amplitude(size.coordinate) - value))
-    assert orbit.amplitude(size.coordinate) == pytest.approx(value, rel=1e-7)
-    for one in asked:
-        same(found[slope_key(one.name)][0, 0], told(orbit, one.name, names), rtol=1e-6, floor=1e-12)
+    compared[seed] = 0
+    for row in np.flatnonzero(why[:, 0] == FOUND):  # others reach no motion of one period
+        alone = with_values(machine, {"forcing": (1.0, 1.1)[row]})
+        value = found[size.name][row, 0]
+        orbits = [one for one in ff.periodic_orbits(alone, omega=omega) if one.stable]
+        orbit = min(orbits, key=lambda one: abs(one.amplitude(size.coordinate) - value))
+        if orbit.amplitude(size.coordinate) != pytest.approx(value, rel=1e-7):
+            continue  # a search may miss a motion
+        factor = np.where(np.array(names) == "forcing", (1.0, 1.1)[row], 1.0)
+        for one in asked:
+            wanted = told(orbit, one.name, names)
+            slope = found[slope_key(one.name)][row, 0]
+            same(slope * factor, wanted, rtol=1e-6, floor=1e-12)
+            compared[seed] += np.isfinite(wanted).sum() * bool(orbit.touches)
+
+
+def test_enough_of_them_touch_a_stop(compared):
+    if len(compared) == 30:  # all have run in this process
+        assert sum(count > 0 for count in compared.values()) >= 20
 
 
 def test_what_has_another_derivative_to_each_side_has_none(screen):
@@ -155,7 +179,64 @@ def test_what_has_another_derivative_to_each_side_has_none(screen):
     assert np.isnan(found[slope_key("stop_force")]).tolist() == [[[False, True]]]
 
 
-def test_a_motion_that_grazes_has_none_under_a_law_with_a_corner():
+def test_the_middle_of_an_even_motion_has_a_kink(screen):
+    """The weight moves it to one side, and would to the other."""
+    even = screen.replace(deck_angle=0.0, clearance_measured="drawn")
+    names = ("deck_angle", "stop_stiffness")
+    asked = [quantity_named("relative_offset", even)]
+    columns = {"stop_stiffness": np.array([screen.stop_stiffness])}
+    found, _ = read(even, columns, asked, 150.0, names)
+    assert np.isnan(found["d_relative_offset"][0, 0]).tolist() == [True, False]
+    orbit = ff.frequency_response(even, omega=SPAN).orbit_from_below(150.0)
+    with pytest.raises(ff.IncompleteError, match="to each side"):
+        orbit.sensitivity("relative_offset", ["deck_angle"])
+
+
+@dataclasses.dataclass(frozen=True)
+class TwoOrders:
+    """x = cos theta - cos 2 theta without contact: two valleys are as low."""
+
+    damping: float = 0.1
+
+    def system(self):  # noqa: D102
+        w = 0.7
+        first = ff.HarmonicForce([1.0 - w**2 + 0.1j * w])
+        second = ff.HarmonicForce([-(1.0 - 4.0 * w**2 + 0.2j * w)], order=2)
+        return ff.MechanicalSystem(
+            [[1.0]], [[self.damping]], [[1.0]],
+            (ff.ClearanceSpring([1.0], 5.0, 0.1, 50.0, 50.0),), (first, second),
+        )  # fmt: skip
+
+
+def test_two_extremes_as_high_that_move_differently_have_none():
+    machine = TwoOrders()
+    asked = [quantities_for(machine)["amplitude[0]"]]
+    found, why = lane_values(
+        machine, {"damping": np.array([0.1])}, asked, np.array([0.7]), (0.1, 2.0), "from-below",
+        names=("damping",),
+    )  # fmt: skip
+    assert why[0, 0] == FOUND
+    assert np.isnan(found["d_amplitude[0]"][0, 0, 0])
+
+
+def test_means_behind_a_heavily_damped_contact(screen):
+    own = screen.replace(stop_damping=1e8)
+    steps = own.clearance * (1.0 + 1e-3 * np.array([-2.0, -1.0, 0.0, 1.0, 2.0]))
+    found = ff.study(
+        own, {"clearance": steps}, "shear_piece_power", 150.0, sampling="list",
+        derivatives=["clearance"],
+    )  # fmt: skip
+    v = found.values["shear_piece_power"][:, 0, 0]
+    wanted = (v[0] - 8.0 * v[1] + 8.0 * v[3] - v[4]) / (12.0 * 1e-3 * own.clearance)
+    slope = found.derivatives["shear_piece_power"][2, 0, 0, 0]
+    assert slope == pytest.approx(wanted, rel=1e-6)
+    orbit = ff.frequency_response(own, omega=SPAN).orbit_from_below(150.0)
+    alone = orbit.sensitivity("shear_piece_power", ["clearance"])[0]
+    assert alone == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("beside", [1.0, 1.0 - 2e-16, 1.0 + 2e-16, 1.0 - 1e-12])
+def test_a_motion_that_grazes_has_none_under_a_law_with_a_corner(beside):
     def machine(law, gap):
         return ff.MechanicalSystem(
             [[1.0]], [[0.1]], [[1.0]],
@@ -165,7 +246,7 @@ def test_a_motion_that_grazes_has_none_under_a_law_with_a_corner():
 
     free = abs(0.5 / complex(1.0 - 0.7**2, 0.1 * 0.7))
     for law, known in (("paper", True), ("compression-only", False)):
-        grazing = machine(law, free)
+        grazing = machine(law, free * beside)
         asked = [one for one in quantities_for(grazing).values() if one.part == "amplitude"]
         found, why = lane_values(
             grazing, {"forcing": np.ones(1)}, asked, np.array([0.7]), (0.1, 2.0), "from-below",
@@ -229,8 +310,9 @@ def test_a_store_holds_derivatives_of_parameters_that_do_not_vary(screen, tmp_pa
 @pytest.mark.parametrize(
     ("quantity", "names", "told"),
     [
-        ("omega_lb", ["clearance"], "of a motion"),
-        ("relative_amplitude", ["colour"], "colour"),
+        ("omega_lb", ["clearance"], "ask an orbit or a fold"),
+        ("relative_amplitude", ["colour"], "derivatives = 'colour'"),
+        ("relative_amplitude", ["omega"], "derivatives = 'omega': choose one of 'main_mass'"),
         ("relative_amplitude", "clearance", "in a list"),
         ("relative_amplitude", ["clearance", "clearance"], "twice"),
         ("relative_amplitude", ["clearance_minus"], "finite value"),
@@ -239,6 +321,24 @@ def test_a_store_holds_derivatives_of_parameters_that_do_not_vary(screen, tmp_pa
 def test_what_cannot_be_differentiated_is_said(screen, quantity, names, told):
     with pytest.raises(ff.InputError, match=told):
         ff.study(screen, {"clearance": (5e-3, 7e-3)}, quantity, 150.0, derivatives=names)
+
+
+def test_names_that_arrays_of_a_study_have_are_refused():
+    two = ff.MechanicalSystem(
+        np.eye(2), 0.1 * np.eye(2), [[2.0, -1.0], [-1.0, 2.0]],
+        (ff.ClearanceSpring((1.0, -1.0), 20.0, 0.2, 0.2),), ff.HarmonicForce((1.0, 0.0)),
+        coordinates={"x": (1.0, 0.0), "d_x": (0.0, 1.0)},
+    )  # fmt: skip
+    asked = ["x_amplitude", "d_x_amplitude"]
+    ff.study(two, {"forcing": np.ones(2)}, asked, 1.2, sampling="list")
+    with pytest.raises(ff.InputError, match="derivatives of x_amplitude are called"):
+        ff.study(two, {"forcing": np.ones(2)}, asked, 1.2, sampling="list", derivatives=["forcing"])
+    own = dataclasses.make_dataclass(
+        "Own", [("parameter", float, 0.1)], frozen=True,
+        namespace={"system": lambda self: TwoOrders(self.parameter).system()},
+    )  # fmt: skip
+    with pytest.raises(ff.InputError, match="name the field otherwise"):
+        ff.study(own(), {"parameter": np.array([0.1, 0.2])}, "amplitude[0]", 0.7, sampling="list")
 
 
 def test_a_study_file_names_what_quantities_are_differentiated_by(command, tmp_path):

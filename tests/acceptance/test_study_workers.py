@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -118,14 +119,36 @@ def test_a_scheduler_that_is_gone_ends_the_study(tmp_path, how):
     assert (ff.open_study(tmp_path / "s").reason != -1).sum() >= 3 * 64
 
 
-def test_a_cluster_without_workers_ends_the_study(tmp_path, monkeypatch):
+def slow(folder, index):
+    """Takes a while, and says that it was here."""
+    Path(folder, str(index)).touch()
+    time.sleep(0.5)
+    return index
+
+
+def test_a_cluster_that_has_lost_all_workers_ends_the_study(tmp_path, monkeypatch):
     """A nanny of dask gives up whose worker ends while it begins, and nobody computes any more."""
     monkeypatch.setattr("flipflow.batch.run_chunks.LOOK", 0.02)
     with (
         distributed.LocalCluster(
-            n_workers=0, processes=False, dashboard_address=":0", silence_logs=50
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0",
+            silence_logs=50,
         ) as cluster,
         distributed.Client(cluster) as client,
-        pytest.raises(ff.IncompleteError, match="no worker"),
-    ):
-        list(run_chunks(client.get_executor(), deadly, [(0, (str(tmp_path), 0, 0))]))
+        distributed.Client(processes=False, n_workers=0, dashboard_address=":0"),
+    ):  # fmt: skip
+
+        def tasks():
+            yield 0, (str(tmp_path), 0)
+            while not Path(tmp_path, "0").exists():
+                time.sleep(0.01)
+            time.sleep(1.0)
+            cluster.scale(0)
+            while client.nthreads():
+                time.sleep(0.01)
+            yield 1, (str(tmp_path), 1)
+
+        # The client without workers that was made last is another one.
+        assert list(run_chunks(client.get_executor(), slow, [(7, (str(tmp_path), 7))])) == [(7, 7)]
+        with pytest.raises(ff.IncompleteError, match="lost all workers"):
+            list(run_chunks(client.get_executor(), slow, tasks()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from flipflow.dynamics.machine_columns import (
 from flipflow.dynamics.parameter_tangent import Columns
 from flipflow.errors import InputError
 from flipflow.model.contact_law import NUMBER
-from flipflow.model.parameters import value_of, with_values
 from flipflow.model.system import Machine, MechanicalSystem
 
 
@@ -92,9 +91,8 @@ def _one_by_one(
 ) -> LaneColumns:
     found, bonded, known = [], [], []
     for row in batch.rows.tolist():
-        own = variant(machine, columns, row)
-        system = own.system()
-        told = [_told(system, _named(own, name)) for name in names]
+        system = variant(machine, columns, row).system()
+        told = [_told(system, _named(machine, columns, row, name)) for name in names]
         parameters = [one for one, _ in told]
         found.append(machine_columns(system, parameters))
         bonded.append(_bonded(system, parameters))
@@ -111,10 +109,15 @@ def _one_by_one(
     )
 
 
-def _named(machine: Machine, name: str) -> Named:
-    """A parameter of one machine, as its systems see it."""
-    own = cast("float", value_of(machine, name))
-    return Named(name, own, lambda value: with_values(machine, {name: value}).system())
+def _named(machine: Machine, columns: Mapping[str, NDArray[Any]], row: int, name: str) -> Named:
+    """A parameter of one variant, counted as its column is."""
+    own = float(columns[name][row])
+
+    def at(value: float) -> MechanicalSystem:
+        moved = dict(columns) | {name: np.full(row + 1, value)}
+        return variant(machine, moved, row).system()
+
+    return Named(name, own, at)
 
 
 def _told(system: MechanicalSystem, one: Named) -> tuple[Named, bool]:

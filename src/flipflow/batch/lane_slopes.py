@@ -12,8 +12,18 @@ import math
 from flipflow.batch.lane_kernels import Found, machine_of, problem_of
 from flipflow.batch.lane_path import forget, is_even
 from flipflow.batch.lane_readings import Asked
+from flipflow.batch.mean_slopes import mean_slopes
 from flipflow.batch.reasons import FOUND
-from flipflow.batch.slope_readings import Slopes, SlopesAsked, SlopeWork, read_slopes, set_end
+from flipflow.batch.slope_readings import (
+    Slopes,
+    SlopesAsked,
+    SlopeWork,
+    contact_slopes,
+    coordinate_slopes,
+    force_slopes,
+    set_end,
+)
+from flipflow.batch.vector_slopes import vector_slopes
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
@@ -22,12 +32,9 @@ from flipflow.compiled.eigen import eigenvector, real_schur
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import run_flow
 from flipflow.dynamics.parameter_tangent import Columns, carry_starts
-from flipflow.dynamics.parameter_variation import carry_variation, set_shifts
-from flipflow.periodic.near_grazing import near_grazing
+from flipflow.dynamics.parameter_variation import APART, carry_variation, set_shifts
+from flipflow.periodic.near_grazing import GRAZES, near_grazing_of
 from flipflow.periodic.shooting import Shooting
-
-GRAZES = 1e-9  # depth of a touch, as a share of the motion, that is grazing
-APART = 1e-7  # distance of two multipliers, as a share of the largest, below which they are one
 
 
 @kernel(inline=True)
@@ -56,12 +63,11 @@ def slope_lanes(
             problem = problem_of(machine, half, length)
             if not state_slopes(problem, columns, omega[f], work, found, out, lane, f):
                 continue
-            corner, room = has_corner(machine, wanted), math.inf
-            if corner or wanted.multipliers:
-                room = grazing(problem, work, omega[f])
-            if wanted.multipliers and room > GRAZES:
+            z = found.state[lane, f]
+            torn = grazes(problem, work, omega[f], wanted, z, True)
+            if wanted.multipliers and not grazes(problem, work, omega[f], wanted, z, False):
                 multiplier_slopes(problem, columns, omega[f], work, found, out, lane, f)
-            if room > GRAZES or not corner:
+            if not torn:
                 read_slopes(problem, columns, omega[f], asked, wanted, work, out, lane, f)
 
 
@@ -119,23 +125,21 @@ def solve_state(problem: Shooting, work: SlopeWork, segments: int, p: int, state
 
 
 @kernel
-def has_corner(machine: MachineArrays, wanted: SlopesAsked) -> bool:
-    """Whether a stop kicks the tangent of a motion that grazes it."""
-    for j in range(machine.direction.shape[0]):
-        if machine.stops.damping[j] > 0.0 and wanted.corner[j] != 0:
-            return True
-    return False
-
-
-@kernel
-def grazing(problem: Shooting, work: SlopeWork, omega: float) -> float:
-    """Distance from a grazing, as a share of the motion."""
-    z, n = work.lane.z, work.lane.z.shape[0] // 2
-    large = 0.0
+def grazes(
+    problem: Shooting, work: SlopeWork, omega: float, wanted: SlopesAsked, z: Real, corners: bool
+) -> bool:
+    """Whether the motion grazes a stop; of ``corners`` one that kicks the tangent there."""
+    n, stops = z.shape[0] // 2, problem.machine.stops
+    large = problem.length
     for k in range(n):
         large = max(large, abs(z[k]), abs(z[n + k]) / omega)
-    room, depth = near_grazing(problem, work.lane.shooting, omega)
-    return min(room, depth) / max(large, problem.length)
+    for j in range(stops.damping.shape[0]):
+        if corners and (wanted.corner[j] == 0 or stops.damping[j] == 0.0):
+            continue
+        room, depth = near_grazing_of(problem, work.lane.shooting, omega, j)
+        if min(room, depth) < GRAZES * large:
+            return True
+    return False
 
 
 @kernel
@@ -241,3 +245,27 @@ def set_multiplier(
         if away < off:
             place, off = i, away
     out.multiplier[lane, f, place, p] = slope
+
+
+@kernel
+def read_slopes(
+    problem: Shooting, columns: Columns, omega: float, asked: Asked, wanted: SlopesAsked,
+    work: SlopeWork, out: Slopes, lane: int, f: int,
+) -> None:  # fmt: skip
+    """Derivatives of all readings of the motion whose flow is recorded."""
+    machine, flow = problem.machine, work.lane.shooting.flow
+    turn = problem.fraction * 2.0 * math.pi / omega
+    for g in range(asked.coordinate.shape[0]):
+        coordinate_slopes(problem, columns, omega, asked.coordinate, g, work, out, lane, f)
+    for j in range(machine.direction.shape[0]):
+        force_slopes(machine, columns, omega, j, work, out.force[lane, f, j])
+    contact_slopes(machine, columns, omega, turn, work, out, lane, f)
+    if wanted.means:
+        mean_slopes(machine, flow, columns, omega, turn, asked, work, out, lane, f)
+    which = lane if asked.linear.shape[0] > 1 else 0
+    for q in range(asked.linear.shape[1]):
+        vector_slopes(
+            machine, columns, omega, asked.linear[which, q], asked.along[which, f, q],
+            asked.across[which, f, q], wanted.linear[which, q], wanted.along[which, f, q],
+            wanted.across[which, f, q], work, out.peak[lane, f, q],
+        )  # fmt: skip

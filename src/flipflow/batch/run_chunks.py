@@ -25,7 +25,7 @@ from flipflow.errors import IncompleteError, InputError
 WINDOW = 256  # chunks handed out at once: enough for a cluster, few to hold
 MOST_LOST = 10  # times that the worker of one chunk may be lost
 LOOK = 5.0  # s without a finished chunk, after which workers are counted
-MOST_LOOKS = 12  # in a row at which a cluster may have none: one that is started anew takes seconds
+MOST_LOOKS = 12  # in a row at which all may be gone: one that is started anew takes seconds
 
 
 @contextmanager
@@ -75,18 +75,18 @@ def run_chunks(
     ------
     IncompleteError
         When a chunk loses its worker again and again, when the executor is gone, and when a
-        cluster has had no worker for a minute.
+        cluster has lost all its workers for some time.
     """
     waiting: dict[Future[Any], tuple[int, tuple[Any, ...]]] = {}
     lost: dict[int, int] = {}
-    todo = iter(tasks)
+    todo, cluster = iter(tasks), _Cluster(executor)
     try:
         while True:
             for task in _some(todo, WINDOW - len(waiting)):
                 waiting[_submitted(executor, work, task, 0)] = task
             if not waiting:
                 return
-            for future in _ended(executor, waiting):
+            for future in cluster.ended(waiting):
                 index, arguments = waiting.pop(future)
                 if _is_lost(future, index, lost):
                     again = index, arguments
@@ -98,27 +98,39 @@ def run_chunks(
             future.cancel()
 
 
-def _ended(executor: Executor, waiting: Mapping[Future[Any], Any]) -> set[Future[Any]]:
-    """The chunks that have ended, at least one."""
-    looks = 0
-    while True:
-        done, _ = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED)
-        if done:
-            return done
-        looks = looks + 1 if _without_workers(executor) else 0
-        if looks == MOST_LOOKS:
-            told = f"The cluster has had no worker for {LOOK * MOST_LOOKS:.0f} s"
-            raise IncompleteError(f"{told}; start one, and go on.")
+class _Cluster:
+    """Looks after the workers of an executor of dask; other executors tell of theirs."""
 
+    def __init__(self, executor: Executor) -> None:
+        of_dask = isinstance(executor, _loaded("distributed.cfexecutor", "ClientExecutor"))
+        self._client = executor._client if of_dask else None  # type: ignore[attr-defined]  # noqa: SLF001  it has no other way to its client
+        self._seen, self._looks = False, 0
 
-def _without_workers(executor: Executor) -> bool:
-    """Whether an executor of dask has nobody who computes."""
-    if not isinstance(executor, _loaded("distributed.cfexecutor", "ClientExecutor")):
-        return False
-    try:
-        return not sys.modules["distributed"].default_client().nthreads()
-    except (OSError, ValueError):  # the scheduler is gone, and its futures are about to tell
-        return False
+    def ended(self, waiting: Mapping[Future[Any], Any]) -> set[Future[Any]]:
+        """The chunks that have ended, at least one.
+
+        Raises
+        ------
+        IncompleteError
+            When the workers that were there have been gone for a while.
+        """
+        while True:
+            done, _ = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED)
+            there = bool(done) or self._client is None or self._has_workers(self._client)
+            self._seen = self._seen or there
+            self._looks = 0 if there else self._looks + 1
+            if done:
+                return done
+            if self._seen and self._looks >= MOST_LOOKS:
+                told = f"The cluster has lost all workers, {LOOK * MOST_LOOKS:.0f} s ago"
+                raise IncompleteError(f"{told}; start one, and go on.")
+
+    @staticmethod
+    def _has_workers(client: Any) -> bool:
+        try:
+            return bool(client.nthreads())
+        except (OSError, ValueError):  # the scheduler is gone, and its futures are about to tell
+            return True
 
 
 def _some(todo: Iterator[tuple[int, tuple[Any, ...]]], count: int) -> Iterator[Any]:

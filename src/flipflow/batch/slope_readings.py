@@ -20,7 +20,6 @@ from flipflow.batch.lane_readings import (
     ReadingWork,
     force_peak,
     new_reading_work,
-    set_vector,
 )
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
@@ -28,7 +27,6 @@ from flipflow.dynamics.contact_search import (
     GapMotion,
     exponential,
     extremes,
-    modulus,
     prepare_search,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
@@ -42,19 +40,16 @@ from flipflow.dynamics.parameter_tangent import (
     kick_columns,
     new_column_work,
 )
-from flipflow.dynamics.pieces import length_at, longest
 from flipflow.periodic.shooting import Shooting
 
+GAUSS_POINTS = 12  # in each part of a segment in which a mean is taken
 TIED = 1e-9  # share of the highest summit within which another one is as high
 AGREE = 1e-6  # share of a derivative to which those of two summits must agree
-GAUSS_POINTS = 12
-PER_RADIAN = 0.5  # parts of a segment in which means are taken, per radian of its fastest term
-MOST_PARTS = 64
 AT_END = 1e-12  # share of a segment from its end within which its last sample stands
 
 
 class SlopesAsked(NamedTuple):
-    """What is differentiated besides states, extremes and forces; L is 1 where all lanes agree."""
+    """What is differentiated besides states, extremes and forces; L is 1 where no vector is."""
 
     linear: Real  # (L, Q, 3, N, P) of the c_0, c_1, c_2 of vectors
     along: Complex  # (L, F, Q, P) of A
@@ -99,6 +94,8 @@ class SlopeWork(NamedTuple):
     rate: Real  # (2 N,) and its rate
     height: Real  # (2 E,) summits of the parts of a turn
     when: Real  # (2 E,) since the start of the segment
+    at_end: Int  # (2 E,) 1 where it stands at an end of the part
+    side: Real  # (2 E,) +1 or -1 times the coordinate
     row: Real  # (P,)
     node: Real  # (K,) of Gauss' rule on (0, 1)
     weight: Real  # (K,)
@@ -132,6 +129,8 @@ def new_slope_work(
         rate=np.zeros(size),
         height=np.zeros(2 * segments),
         when=np.zeros(2 * segments),
+        at_end=np.zeros(2 * segments, np.int64),
+        side=np.zeros(2 * segments),
         row=np.zeros(parameters),
         node=0.5 * (node + 1.0),
         weight=0.5 * weight,
@@ -168,30 +167,6 @@ def new_slopes(found: Found, machine: MachineArrays, asked: Asked, parameters: i
 
 
 @kernel
-def read_slopes(
-    problem: Shooting, columns: Columns, omega: float, asked: Asked, wanted: SlopesAsked,
-    work: SlopeWork, out: Slopes, lane: int, f: int,
-) -> None:  # fmt: skip
-    """Derivatives of all readings of the motion whose flow is recorded."""
-    machine, flow = problem.machine, work.lane.shooting.flow
-    turn = problem.fraction * 2.0 * math.pi / omega
-    for g in range(asked.coordinate.shape[0]):
-        coordinate_slopes(problem, columns, omega, asked.coordinate, g, work, out, lane, f)
-    for j in range(machine.direction.shape[0]):
-        force_slopes(machine, columns, omega, j, work, out.force[lane, f, j])
-    contact_slopes(machine, columns, omega, turn, work, out, lane, f)
-    if wanted.means:
-        mean_slopes(machine, flow, columns, omega, turn, asked, work, out, lane, f)
-    which = lane if asked.linear.shape[0] > 1 else 0
-    for q in range(asked.linear.shape[1]):
-        vector_slopes(
-            machine, columns, omega, asked.linear[which, q], asked.along[which, f, q],
-            asked.across[which, f, q], wanted.linear[which, q], wanted.along[which, f, q],
-            wanted.across[which, f, q], work, out.peak[lane, f, q],
-        )  # fmt: skip
-
-
-@kernel
 def move_to(
     machine: MachineArrays, columns: Columns, e: int, omega: float, t: float, work: SlopeWork
 ) -> None:
@@ -209,42 +184,85 @@ def coordinate_slopes(
     problem: Shooting, columns: Columns, omega: float, coordinate: Real, g: int, work: SlopeWork,
     out: Slopes, lane: int, f: int,
 ) -> None:  # fmt: skip
-    """Derivatives of the extremes of one coordinate."""
-    machine, flow = problem.machine, work.lane.shooting.flow
-    motion, n = work.reading.coordinate, machine.direction.shape[1]
-    low, high, low_at, high_at, low_in, high_in = math.inf, -math.inf, 0.0, 0.0, 0, 0
-    for e in range(flow.segments[0]):
-        count = segment_motion(machine, flow, e, omega, coordinate, motion)
-        prepare_search(motion, count)
-        least, most, at_least, at_most = extremes(motion, count, g, flow.length[e])
-        if least < low:
-            low, low_at, low_in = least, at_least, e
-        if most > high:
-            high, high_at, high_in = most, at_most, e
-    mirrored = problem.sign < 0.0
+    """Derivatives of the extremes of one coordinate; its mirror image is as high and as low."""
+    machine, mirrored = problem.machine, problem.sign < 0.0
     upper, lower = out.high[lane, f, g], out.low[lane, f, g]
-    if not mirrored or high >= -low:
-        move_to(machine, columns, high_in, omega, high_at, work)
-        set_coordinate(coordinate, g, work, 1.0, n, upper)
-    if not mirrored or high < -low:
-        move_to(machine, columns, low_in, omega, low_at, work)
-        set_coordinate(coordinate, g, work, 1.0, n, lower)
-    for p in range(upper.shape[0] if mirrored else 0):
-        if high >= -low:
-            lower[p] = -upper[p]
-        else:
-            upper[p] = -lower[p]
+    set_extremes(machine, columns, omega, coordinate, g, True, mirrored, work, upper)
+    if not mirrored:
+        set_extremes(machine, columns, omega, coordinate, g, False, True, work, lower)
+    for p in range(upper.shape[0]):
+        lower[p] = -upper[p] if mirrored else -lower[p]
 
 
 @kernel
-def set_coordinate(
-    coordinate: Real, g: int, work: SlopeWork, sign: float, n: int, row: Real
+def set_extremes(
+    machine: MachineArrays, columns: Columns, omega: float, coordinate: Real, g: int, upper: bool,
+    lower: bool, work: SlopeWork, row: Real,
+) -> None:  # fmt: skip
+    """Derivatives of the greatest value of a coordinate, of minus its least, or of the greater.
+
+    A flow of one segment is looked at in halves, in each of which a summit may be as high.
+    """
+    flow, motion = work.lane.shooting.flow, work.reading.coordinate
+    segments = flow.segments[0]
+    parts = 2 if segments == 1 else 1
+    for place in range(parts * segments):
+        e = place // parts
+        begin, duration = (place % parts) * flow.length[e] / parts, flow.length[e] / parts
+        count = segment_motion(machine, flow, e, omega, coordinate, motion)
+        delay(motion, count, g, begin)
+        prepare_search(motion, count)
+        least, most, at_least, at_most = extremes(motion, count, g, duration)
+        low = lower and (not upper or -least > most)
+        work.side[place] = -1.0 if low else 1.0
+        at = at_least if low else at_most
+        note_summit(work, place, -least if low else most, at, begin, duration)
+    first = True
+    for place in range(parts * segments):
+        if not is_summit(work, place, parts * segments):
+            continue
+        move_to(machine, columns, place // parts, omega, work.when[place], work)
+        for p in range(row.shape[0]):
+            work.row[p] = 0.0
+            for k in range(machine.direction.shape[1]):
+                work.row[p] += work.side[place] * coordinate[g, k] * work.U[k, p]
+        keep(row, first, work.row)
+        first = False
+
+
+@kernel
+def note_summit(
+    work: SlopeWork, place: int, height: float, at: float, begin: float, duration: float
 ) -> None:
-    """Derivatives of a coordinate at the place that is read."""
-    for p in range(row.shape[0]):
-        row[p] = 0.0
-        for k in range(n):
-            row[p] += sign * coordinate[g, k] * work.U[k, p]
+    """Write down the highest value in a part of the flow, and whether it stands at an end of it."""
+    work.height[place], work.when[place] = height, begin + at
+    at_end = at <= 0.0 or at >= duration * (1.0 - AT_END)
+    work.at_end[place] = 1 if at_end else 0
+
+
+@kernel
+def is_summit(work: SlopeWork, place: int, places: int) -> bool:
+    """Whether a part's highest value is that of the flow, or as high.
+
+    An end of a part that hardly reaches it belongs to the summit beside, unless that is an end,
+    too.
+    """
+    best = 0
+    for other in range(places):
+        if work.height[other] > work.height[best]:
+            best = other
+    top = work.height[best]
+    if work.height[place] < top - TIED * abs(top):
+        return False
+    return place == best or work.at_end[place] == 0 or work.at_end[best] != 0
+
+
+@kernel
+def delay(motion: GapMotion, count: int, g: int, t: float) -> None:
+    """A sum of exponentials counted from a later time."""
+    motion.offset[g] += motion.drift[g] * t
+    for i in range(count if t != 0.0 else 0):
+        motion.amplitude[g, i] *= exponential(motion.rate[i] * t)
 
 
 @kernel
@@ -262,18 +280,19 @@ def force_slopes(
     machine: MachineArrays, columns: Columns, omega: float, j: int, work: SlopeWork, row: Real
 ) -> None:
     """Derivatives of the greatest force of stop j; 0 without contact."""
-    flow, motion, best = work.lane.shooting.flow, work.reading.stop, 0.0
+    flow, motion, touched = work.lane.shooting.flow, work.reading.stop, False
     for e in range(flow.segments[0]):
-        work.height[e] = 0.0
+        note_summit(work, e, 0.0, 0.5 * flow.length[e], 0.0, flow.length[e])
         if kind(machine.stops, j, flow.regimes[e, j]) != 0:
             count = segment_motion(machine, flow, e, omega, machine.direction, motion)
-            work.height[e], work.when[e] = force_peak(machine, flow, motion, count, e, j)
-        best = max(best, work.height[e])
+            height, at = force_peak(machine, flow, motion, count, e, j)
+            note_summit(work, e, height, at, 0.0, flow.length[e])
+            touched = touched or height > 0.0
     first = True
     for p in range(row.shape[0]):
         row[p] = 0.0
     for e in range(flow.segments[0]):
-        if best > 0.0 and work.height[e] >= best * (1.0 - TIED):
+        if touched and is_summit(work, e, flow.segments[0]):
             set_force(machine, columns, e, omega, j, work.when[e], work)
             keep(row, first, work.row)
             first = False
@@ -415,171 +434,3 @@ def set_end(
     end_segment(machine, flow, e, omega, end.z, end.rate)
     if flow.kick[e] != 0.0:
         kick_columns(machine, flow, e, columns, -1.0, work.ended, end)
-
-
-@kernel
-def mean_slopes(
-    machine: MachineArrays, flow: Flow, columns: Columns, omega: float, turn: float, asked: Asked,
-    work: SlopeWork, out: Slopes, lane: int, f: int,
-) -> None:  # fmt: skip
-    """Derivatives of first harmonics and of mean squares of rates, by Gauss' rule."""
-    first, square = out.first[lane, f], out.square[lane, f]
-    for p in range(work.row.shape[0]):
-        for g in range(first.shape[0]):
-            first[g, p] = 0j
-        for g in range(square.shape[0]):
-            square[g, p] = 0.0
-    modes, driven = flow.modes, 0.0
-    for w in range(machine.order.shape[0]):
-        driven = max(driven, machine.order[w] * omega)
-    for e in range(flow.segments[0]):
-        slot, fastest = flow.slot[e], driven
-        for i in range(modes.mode_count[slot]):
-            fastest = max(fastest, modulus(modes.rate[slot, i]))
-        parts = min(1 + int(PER_RADIAN * fastest * flow.length[e]), MOST_PARTS)
-        step = flow.length[e] / parts
-        for part in range(parts):
-            for node in range(work.node.shape[0]):
-                t = step * (part + work.node[node])
-                move_to(machine, columns, e, omega, t, work)
-                weight = step * work.weight[node] / turn
-                turned = 2.0 * weight * exponential(-1j * (omega * (flow.start[e] + t)))
-                add_means(asked, turned, 2.0 * weight, work, first, square)
-
-
-@kernel
-def add_means(
-    asked: Asked, turned: complex, weight: float, work: SlopeWork, first: Complex, square: Real
-) -> None:
-    """What one node adds to the derivatives of harmonics and mean squares."""
-    n, parameters = work.z.shape[0] // 2, work.U.shape[1]
-    for g in range(first.shape[0]):
-        for p in range(parameters):
-            for k in range(n):
-                first[g, p] += turned * (asked.coordinate[g, k] * work.U[k, p])
-    for g in range(square.shape[0]):
-        rate = 0.0
-        for k in range(n):
-            rate += asked.squared[g, k] * work.z[n + k]
-        for p in range(parameters):
-            for k in range(n):
-                square[g, p] += weight * rate * asked.squared[g, k] * work.U[n + k, p]
-
-
-@kernel
-def vector_slopes(
-    machine: MachineArrays, columns: Columns, omega: float, linear: Real, along: complex,
-    across: complex, linear_slope: Real, along_slope: Complex, across_slope: Complex,
-    work: SlopeWork, row: Real,
-) -> None:  # fmt: skip
-    """Derivatives of the greatest length of a vector.
-
-    A flow without contact is looked at in halves, in each of which a summit may be as high.
-    """
-    flow, motion, best = work.lane.shooting.flow, work.reading.vector, 0.0
-    segments = flow.segments[0]
-    parts = 2 if segments == 1 else 1
-    for e in range(segments):
-        duration = flow.length[e] / parts
-        for part in range(parts):
-            count = set_vector(machine, flow, motion, e, omega, linear, along, across)
-            delay(motion, count, part * duration)
-            height, when = longest(motion, count, duration)
-            work.height[parts * e + part], work.when[parts * e + part] = (
-                height, part * duration + when,
-            )  # fmt: skip
-            best = max(best, height)
-    first = True
-    for p in range(row.shape[0]):
-        row[p] = 0.0
-    for place in range(parts * segments):
-        if not (best > 0.0 and work.height[place] >= best * (1.0 - TIED)):
-            continue
-        e, t = place // parts, work.when[place]
-        set_length(
-            machine, columns, e, omega, t, linear, along, across, linear_slope, along_slope,
-            across_slope, work,
-        )  # fmt: skip
-        keep(row, first, work.row)
-        first = False
-
-
-@kernel
-def delay(motion: GapMotion, count: int, t: float) -> None:
-    """Both parts of a vector counted from a later time."""
-    for part in range(2):
-        motion.offset[part] += motion.drift[part] * t
-        for i in range(count):
-            motion.amplitude[part, i] *= exponential(motion.rate[i] * t)
-
-
-@kernel
-def set_length(
-    machine: MachineArrays, columns: Columns, e: int, omega: float, t: float, linear: Real,
-    along: complex, across: complex, linear_slope: Real, along_slope: Complex,
-    across_slope: Complex, work: SlopeWork,
-) -> None:  # fmt: skip
-    """Derivatives of a vector's length at a time of segment e into work.row."""
-    flow, n = work.lane.shooting.flow, machine.direction.shape[1]
-    motion = work.reading.vector
-    count = set_vector(machine, flow, motion, e, omega, linear, along, across)
-    half_square, rate = length_at(motion, count, t)
-    length = math.sqrt(2.0 * half_square)
-    one, two = motion.offset[0] + motion.drift[0] * t, motion.offset[1] + motion.drift[1] * t
-    for i in range(count):
-        grown = exponential(motion.rate[i] * t)
-        one += (motion.amplitude[0, i] * grown).real
-        two += (motion.amplitude[1, i] * grown).real
-    move_to(machine, columns, e, omega, t, work)
-    set_accelerations(machine, columns, e, omega, flow.start[e] + t, work)
-    turned = exponential(1j * (omega * (flow.start[e] + t)))
-    for p in range(work.row.shape[0]):
-        slope = one * (along_slope[p] * turned).real + two * (across_slope[p] * turned).real
-        for k in range(n):
-            part = linear[0, k] * work.U[k, p] + linear[1, k] * work.U[n + k, p]
-            part += linear[2, k] * work.acceleration[k, p]
-            part += linear_slope[0, k, p] * work.z[k] + linear_slope[1, k, p] * work.z[n + k]
-            part += linear_slope[2, k, p] * work.rate[n + k]
-            slope += one * part
-        work.row[p] = (slope + rate * shifted(flow, work, e, t, p)) / length
-
-
-@kernel
-def set_accelerations(
-    machine: MachineArrays, columns: Columns, e: int, omega: float, t: float, work: SlopeWork
-) -> None:
-    """Derivatives of the accelerations, by the equation of motion, at the place that is read."""
-    flow, n, U = work.lane.shooting.flow, machine.direction.shape[1], work.U
-    for p in range(U.shape[1]):
-        for k in range(n):
-            total = columns.static[p, k]
-            for s in range(n):
-                total -= machine.stiffness[k, s] * U[s, p] + machine.damping[k, s] * U[n + s, p]
-                total -= columns.stiffness[p, k, s] * work.z[s]
-                total -= columns.damping[p, k, s] * work.z[n + s]
-                total -= columns.inertia[p, k, s] * work.rate[n + s]
-            for x in range(machine.power.shape[0]):
-                turning = 1j * (machine.order[machine.wave[x]] * omega * t)
-                push = omega ** machine.power[x] * columns.push[p, x, k]
-                total += (push * exponential(turning)).real
-            work.acceleration[k, p] = total
-        for j in range(machine.direction.shape[0]):
-            add_stop(machine, flow, columns, e, j, p, work)
-
-
-@kernel
-def add_stop(
-    machine: MachineArrays, flow: Flow, columns: Columns, e: int, j: int, p: int, work: SlopeWork
-) -> None:
-    """What stop j adds to the derivatives of the accelerations."""
-    stops, regime, n = machine.stops, flow.regimes[e, j], machine.direction.shape[1]
-    if kind(stops, j, regime) == 0:
-        return
-    k = stiffness_share(stops, j, regime) * stops.stiffness[j]
-    c = damping_share(stops, j, regime) * stops.damping[j]
-    slope = force_slope(machine, flow, columns, e, j, p, work)
-    for s in range(n):
-        slope += machine.direction[j, s] * (k * work.U[s, p] + c * work.U[n + s, p])
-    force = stop_force(machine, flow, e, j, work.z)
-    for s in range(n):
-        work.acceleration[s, p] -= machine.reach[j, s] * slope + columns.reach[p, j, s] * force

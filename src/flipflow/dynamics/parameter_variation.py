@@ -24,6 +24,8 @@ from flipflow.dynamics.parameter_tangent import (
     spread_free,
 )
 
+APART = 1e-7  # distance of two multipliers, as a share of the largest, below which they are one
+
 
 @kernel
 def set_shifts(

@@ -40,22 +40,26 @@ class Parameter:
     at: Callable[[float], Machine]
 
 
-def parameter_of(machine: Machine, name: object) -> Parameter:
+def parameter_of(
+    machine: Machine, name: object, field: str = "field", besides: tuple[str, ...] = ("omega",)
+) -> Parameter:
     """The parameter of a machine along which motions are followed, by its name.
 
     Raises
     ------
     InputError
-        For a name that the machine does not have, with those it has; for a value that is not
-        finite.
+        For a name that the machine does not have, with those it has and those ``besides``; for a
+        value that is not finite. ``field`` is what the user calls the name.
     """
-    found = named_parameter(machine, name, "field", ("omega",))
+    found = named_parameter(machine, name, field, besides)
     if not math.isfinite(found.value):
         raise InputError(found.name, found.value, FINITE)
     return found
 
 
-def differentiable(machine: Machine, name: object) -> Parameter:
+def differentiable(
+    machine: Machine, name: object, field: str = "field", besides: tuple[str, ...] = ("omega",)
+) -> Parameter:
     """The parameter of a machine with respect to which a motion is differentiated, by its name.
 
     Of a screen any field that holds a number and no count will do, those of quantities, too.
@@ -65,13 +69,13 @@ def differentiable(machine: Machine, name: object) -> Parameter:
     InputError
         As of :func:`parameter_of`.
     """
-    field = FIELD.get(name) if isinstance(name, str) else None
-    if isinstance(machine, FlipFlowScreen) and field is not None and not field.whole:
-        found = _of_fields(machine, field.name)
+    known = FIELD.get(name) if isinstance(name, str) else None
+    if isinstance(machine, FlipFlowScreen) and known is not None and not known.whole:
+        found = _of_fields(machine, known.name)
         if not math.isfinite(found.value):
-            raise InputError(field.name, getattr(machine, field.name), FINITE)
+            raise InputError(known.name, getattr(machine, known.name), FINITE)
         return found
-    return parameter_of(machine, name)
+    return parameter_of(machine, name, field, besides)
 
 
 def named_parameter(

@@ -73,7 +73,8 @@ class BalanceSolver(Solver):
         """
         kept_u, kept_omega, series = self._last
         if not (np.array_equal(kept_u, u) and np.array_equal(kept_omega, omega)):
-            series = self._read_off(np.ascontiguousarray(u), omega)
+            # A read-only array is another type to the compiler, and would be compiled for anew.
+            series = self._read_off(np.array(u), np.array(omega))
             self._last = u.copy(), omega.copy(), series
         return series
 

@@ -22,10 +22,11 @@ from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import MachineColumns
 from flipflow.dynamics.motion import Motion, motion_of_flow
 from flipflow.dynamics.parameter_tangent import new_column_work
-from flipflow.dynamics.parameter_variation import carry_variation, columns_at
+from flipflow.dynamics.parameter_variation import APART, carry_variation, columns_at
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.contact_law import shares, signed_gap
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.near_grazing import GRAZES
 from flipflow.periodic.parameter_shooting import residual_columns
 from flipflow.periodic.shooting import Shooting
 from flipflow.periodic.solver import Formulation
@@ -33,10 +34,8 @@ from flipflow.periodic.stability import full_turn
 
 Pieces = NDArray[np.intp]
 SINGULAR = 1e-9  # share of the largest singular value of I - M below which the least one is none
-GRAZES = 1e-9  # depth of a touch, as a share of the motion, that is grazing
 NEWTON = 6  # steps towards the summit of a path at a gap
 SAMPLES = 2048  # times of a period at which a grazing touch is looked for
-APART = 1e-7  # distance of two multipliers, as a share of the largest, below which they are one
 SMOOTH_LAWS = ("paper", "elasto-gap")  # under which a motion that grazes has a derivative
 FOLDED = (
     "The motion stands at a fold, where it moves infinitely fast with every parameter; ask the "

@@ -15,6 +15,7 @@ from flipflow.dynamics.contact_search import (
     exponential,
     exponentials,
     gap_state,
+    modulus,
     prepare_search,
     switching_state,
 )
@@ -28,6 +29,8 @@ PER_RADIAN = 3.0  # samples of a motion in a radian of its fastest oscillation
 MOST_SAMPLES = 4000
 MOST_NEWTON = 60  # steps to one place where a function stands still
 STILL = 1e-8  # last of these steps, as a share of the time between two samples
+GRAZES = 1e-9  # depth of a touch, as a share of the motion, that is grazing
+ROUNDING = 1e-15  # of h, as a share of the terms of its sum, with the gap
 
 
 @kernel(entry=True)
@@ -37,18 +40,29 @@ def near_grazing(problem: Shooting, work: ShootingWork, omega: float) -> tuple[f
     The room is what the motion that is nearest to one more contact has left before it, the depth
     that of the shallowest contact; infinite where there is none.
     """
+    room, depth = math.inf, math.inf
+    for j in range(problem.machine.direction.shape[0]):
+        left, deep = near_grazing_of(problem, work, omega, j)
+        room, depth = min(room, left), min(depth, deep)
+    return room, depth
+
+
+@kernel
+def near_grazing_of(
+    problem: Shooting, work: ShootingWork, omega: float, j: int
+) -> tuple[float, float]:
+    """The same of one spring."""
     machine, flow, motion = problem.machine, work.flow, work.flow.motion
     room, depth = math.inf, math.inf
     for e in range(flow.segments[0]):
         count = segment_motion(machine, flow, e, omega, machine.direction, motion)
         prepare_search(motion, count)
-        for j in range(machine.direction.shape[0]):
-            left, deep = _of_spring(
-                machine, motion, count, j, flow.regimes[e, j], omega, flow.length[e]
-            )
-            room, depth = min(room, left), min(depth, deep)
-            left, deep = _turned_back(machine, flow, e, j, count)
-            room, depth = min(room, left), min(depth, deep)
+        left, deep = _of_spring(
+            machine, motion, count, j, flow.regimes[e, j], omega, flow.length[e]
+        )
+        room, depth = min(room, left), min(depth, deep)
+        left, deep = _turned_back(machine, flow, e, j, count)
+        room, depth = min(room, left), min(depth, deep)
     return room, depth
 
 
@@ -104,7 +118,7 @@ def _of_spring(
 def _stands_still(
     motion: GapMotion, count: int, j: int, gap: float, alpha: float, beta: float, duration: float
 ) -> tuple[float, float]:
-    """Least positive minimum and least positive maximum of h = alpha (y_j - gap) + beta y_j'.
+    """Least minimum and least maximum, none below 0, of h = alpha (y_j - gap) + beta y_j'.
 
     They are sought within [0, duration] where the rate of h changes its sign between two samples;
     infinite where there is none.
@@ -117,6 +131,10 @@ def _stands_still(
     for i in range(count):
         motion.turn[i] = motion.amplitude[j, i] * (alpha + beta * motion.rate[i]) * motion.rate[i]
         motion.ratio[i] = exponential(motion.rate[i] * step)
+    zero = -ROUNDING * abs(alpha * gap)  # below which h is no rounding of 0
+    for i in range(count):
+        size = ROUNDING * modulus(motion.amplitude[j, i])
+        zero -= size * (abs(alpha) + abs(beta) * modulus(motion.rate[i]))
     least, shallowest, before = math.inf, math.inf, 0.0
     for k in range(samples + 1):
         slope = alpha * motion.drift[j]
@@ -125,10 +143,10 @@ def _stands_still(
             motion.turn[i] *= motion.ratio[i]
         if k > 0 and slope * before < 0.0:
             h = _still_value(motion, count, j, gap, alpha, beta, (k - 1) * step, step, before)
-            if h > 0.0 and before < 0.0:
-                least = min(least, h)
-            elif h > 0.0:
-                shallowest = min(shallowest, h)
+            if h > zero and before < 0.0:
+                least = min(least, max(h, 0.0))
+            elif h > zero:
+                shallowest = min(shallowest, max(h, 0.0))
         before = slope
     return least, shallowest
 

@@ -100,19 +100,20 @@ class LanePlan:
         linear = np.zeros((lanes, peaks, 3, self.system.size))
         along, across = np.zeros((2, lanes, self.omega.size, peaks), np.complex128)
         for q, name in enumerate(self.vectors):
-            self._set_vector(name, linear[:, q], along[:, :, q], across[:, :, q])
+            self._set_terms(
+                name, self.fields, self.normal, linear[:, q], along[:, :, q], across[:, :, q]
+            )
         linear[:, len(self.vectors) :, :2] = self.bonded
         return asked._replace(linear=linear, along=along, across=across)
-
-    def _set_vector(self, name: str, linear: Real, along: Complex, across: Complex) -> None:
-        """Coefficients (L, 3, 2) of x, x', x'' and harmonics (L, K) of one vector of a screen."""
-        self._set_terms(name, self.fields, self.normal, linear, along, across)
 
     def _set_terms(
         self, name: str, fields: Mapping[str, Real], normal: Complex, linear: Real, along: Complex,
         across: Complex,
     ) -> None:  # fmt: skip
-        """The same for given fields and a given amplitude Y normal to the surface."""
+        """Coefficients (L, 3, 2) of x, x', x'' and harmonics (L, K) of one vector of a screen.
+
+        Y is the amplitude ``normal`` to the surface.
+        """
         field = fields.__getitem__
         terms, along[:], across[:] = vector_terms(name, field, self.omega, normal, self.sense)
         for (derivative, degree), value in terms.items():

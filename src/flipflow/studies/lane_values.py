@@ -80,8 +80,7 @@ def lane_values(
         Values, NaN where there is none; reasons of :mod:`flipflow.batch.reasons`.
     """
     rows = len(next(iter(columns.values())))
-    own = {name: np.full(rows, value_of(machine, name)) for name in names if name not in columns}
-    columns = dict(columns) | own
+    columns = with_own(machine, columns, names)
     values = {one.name: np.full((rows, omega.size), np.nan) for one in quantities}
     if names:
         slopes = (rows, omega.size, len(names))
@@ -101,6 +100,13 @@ def lane_values(
         for name, table in values.items():
             table[batch.rows] = np.where(_beside(why == FOUND, table), found[name], np.nan)
     return values, reason
+
+
+def with_own(machine: Machine, columns: Columns, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """The columns, with the machine's own values of what does not vary of some parameters."""
+    rows = len(next(iter(columns.values())))
+    missing = [name for name in names if name not in columns]
+    return dict(columns) | {name: np.full(rows, value_of(machine, name)) for name in missing}
 
 
 def slope_key(name: str) -> str:

@@ -40,6 +40,7 @@ UNLOADED = "empty"
 NOMINAL, LOW, HIGH = "nominal", "low", "high"
 ROWS = "sample", "case", "omega"
 PARAMETER = "parameter"
+RESERVED = (*ROWS, "field", PARAMETER, REASON)  # names that no parameter of a machine can have
 # Machines, each under each load, of a chunk: seconds of work, so that little is lost with it.
 CHUNK_MACHINES = 64
 MOST_CHUNKS = 2048  # of a study: each is a file of every quantity
@@ -233,6 +234,10 @@ def plan_of(
     """
     system_of(machine)
     design = design_of(machine, vary, sampling)
+    for name in design.columns:
+        if name in RESERVED:
+            remedy = f"arrays of a study are called {', '.join(RESERVED)}; name the field otherwise"
+            raise InputError("vary", name, remedy)
     asked = _asked(quantities, machine)
     checked_word("branch", branch, get_args(BranchWord))
     frequencies = np.array([np.nan])
@@ -341,11 +346,15 @@ def _differentiated(
     for k, name in enumerate(names):
         if checked_text("derivatives", name) in names[:k]:
             raise InputError("derivatives", name, "it is named twice, name each once")
-        differentiable(machine, name)
+        differentiable(machine, name, "derivatives", besides=())
+    keys = {slope_key(one.name): one.name for one in asked}
     for one in asked if names else ():
         if not on_lanes(machine, one):
-            remedy = "derivatives are of quantities of a motion; of jumps, SpecialPoint.sensitivity"
+            remedy = "many machines at once do not tell how it moves; ask an orbit or a fold for it"
             raise InputError("derivatives", one.name, remedy)
+        if one.name in keys:
+            remedy = f"that is what the derivatives of {keys[one.name]} are called, leave one out"
+            raise InputError("quantities", one.name, remedy)
     return tuple(names)
 
 

@@ -16,7 +16,7 @@ from flipflow.batch.reasons import (
 )
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
-from flipflow.model.parameters import value_of, with_values
+from flipflow.model.parameters import with_values
 from flipflow.model.quantities import BranchWord, Quantity, quantity_named
 from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen, Load, loaded_columns
@@ -28,6 +28,7 @@ from flipflow.studies.lane_values import (
     on_lanes,
     one_motion,
     slope_key,
+    with_own,
 )
 from flipflow.studies.quantity_values import number_or_nan
 from flipflow.studies.sensitivity_samples import (
@@ -124,23 +125,18 @@ def evaluate_loaded(
     """As :func:`evaluate`, of the machines under a load; the columns hold what they are without."""
     if load is None or not isinstance(machine, FlipFlowScreen):
         return evaluate(machine, columns, quantities, omega, branch, threads, names)
-    rows = len(next(iter(columns.values())))
-    own = {name: np.full(rows, value_of(machine, name)) for name in names if name not in columns}
-    columns = dict(columns) | own
+    columns = with_own(machine, columns, names)
     loaded = _loaded(machine, load, columns)
     moved = _moved_by(machine, load, columns, names)
     values, reasons = evaluate(
         machine.loaded(load), loaded, quantities, omega, branch, threads, tuple(moved)
     )
     if names:
-        changes = np.stack(list(moved.values()))  # (loaded fields, rows, P)
-        for name in quantities:
-            slopes = values[slope_key(name)]
-            # What a field does not move is not asked for its derivative, which may be none.
-            terms = np.where(changes[:, :, None] != 0.0, changes[:, :, None], np.nan)
-            terms = terms * np.moveaxis(slopes, 2, 0)[..., None]
-            counted = np.where(changes[:, :, None] != 0.0, terms, 0.0)
-            values[slope_key(name)] = counted.sum(axis=0)
+        changes = np.stack(list(moved.values()))[:, :, None]  # (loaded fields, rows, 1, P)
+        for key in map(slope_key, quantities):
+            terms = changes * np.moveaxis(values[key], 2, 0)[..., None]
+            # What a parameter does not move may have no derivative.
+            values[key] = np.where(changes != 0.0, terms, 0.0).sum(axis=0)
     # A mass below zero stays impossible with material on it.
     fine = _fine({name: column for name, column in columns.items() if name in FIELD})
     refused = ~np.all(fine, axis=0) if fine else np.zeros(len(reasons), bool)

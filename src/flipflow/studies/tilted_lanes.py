@@ -18,7 +18,7 @@ from flipflow.batch.slope_readings import AGREE, TIED, Slopes
 from flipflow.model.quantities import Quantity
 from flipflow.studies.lane_quantities import LanePlan
 from flipflow.studies.quantity_values import MOTION_VALUES, Frame
-from flipflow.studies.tilted_motion import TILT
+from flipflow.studies.tilted_motion import TILT, beside_zero
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -49,7 +49,8 @@ class TiltedLanes:
             told = getattr(self, quantity.part)(quantity.coordinate)
         else:
             formula = cast("Callable[[Any], Complex]", MOTION_VALUES[quantity.name])
-            told = formula(self)
+            with np.errstate(divide="ignore", invalid="ignore"):  # of what has no derivative
+                told = formula(self)
         shape = *self.read.approach.shape, len(self.names)
         return np.array(np.broadcast_to(np.asarray(told, np.complex128).imag / TILT, shape))
 
@@ -76,7 +77,9 @@ class TiltedLanes:
     def offset(self) -> Complex:
         low, high = self._extremes("relative")
         mean = 0.5 * (high + low)
-        return np.where(mean.real < 0.0, -mean, mean)
+        offset = np.where(mean.real < 0.0, -mean, mean)
+        offset.imag[beside_zero(mean, high, low)] = np.nan
+        return offset
 
     def reach(self) -> Complex:
         low, high = self._extremes("relative")
@@ -150,8 +153,9 @@ def _greatest(choices: Complex) -> Complex:
     """The greatest of the first axis; its derivative is NaN where another one has another."""
     best = np.take_along_axis(choices, choices.real.argmax(axis=0)[None], axis=0)[0].copy()
     near = choices.real >= best.real - TIED * np.abs(best.real)
+    unknown = np.isnan(choices.imag)
     apart = np.abs(choices.imag - best.imag)
     size = np.maximum(np.abs(choices.imag), np.abs(best.imag))
-    torn = (near & (apart > AGREE * size)).any(axis=0)
+    torn = (near & (unknown | (apart > AGREE * size))).any(axis=0)
     best.imag[torn] = np.nan
     return np.asarray(best)

@@ -14,11 +14,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from flipflow.batch.slope_readings import AGREE, TIED
 from flipflow.dynamics.machine_columns import Named, stop_columns
 from flipflow.errors import IncompleteError
 from flipflow.model.contact_law import WHOLE, carries_force, engaged_side, shares
@@ -33,10 +35,9 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Pieces = NDArray[np.intp]
 TILT = 1e-60  # size of an imaginary part, as a share of the derivative it stands for
-TIED = 1e-9  # share of the highest peak within which another one is as high
 LOWER = 0.01  # share by which a sample of the grid may lie below the highest and lead to it
-AGREE = 1e-6  # share of a derivative to which those of two peaks must agree
 MOST_PEAKS = 64  # that are compared
+PER_RADIAN = 2.5  # parts of a piece in which means are taken, per radian of its fastest term
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +146,13 @@ class TiltedMotion:
 
     def offset(self) -> Complex:
         """How far the middle of the relative motion lies beside zero, in m."""
-        mean = self.mean("relative")
+        high, low = self._extremes("relative")
+        mean = 0.5 * (high + low)
+        if beside_zero(mean, high, low)[:-1].any():
+            raise IncompleteError(
+                "The middle of the motion stands at zero, and its distance from there grows to "
+                "each side."
+            )
         return np.where(mean.real < 0.0, -mean, mean)
 
     def reach(self) -> Complex:
@@ -387,14 +394,18 @@ class TiltedMotion:
         """The motion at Gauss nodes on all pieces, and their weights as shares of the period."""
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         times, pieces, shares_of = [], [], []
+        rates = self.motion.rate
         for e, (start, length) in enumerate(
             zip(self.motion.start, self.motion.length, strict=True)
         ):
-            parts = 1 + int(16.0 * length / self.period * self.orbit.periods)
-            for part in range(parts):
-                times.append(start + length * (part + (nodes + 1.0) / 2.0) / parts)
+            fastest = max(np.abs(rates[e].imag).max(initial=0.0), self.orbit.omega)
+            parts = 1 + int(PER_RADIAN * fastest * length)
+            limits = graded(length / parts, np.abs(rates[e].real).max(initial=0.0))
+            limits = np.append(limits, length * np.arange(2, parts + 1) / parts)
+            for begin, end in pairwise(limits):
+                times.append(start + begin + (end - begin) * (nodes + 1.0) / 2.0)
                 pieces.append(np.full(nodes.size, e))
-                shares_of.append(weights * length / (2.0 * parts * self.period))
+                shares_of.append(weights * (end - begin) / (2.0 * self.period))
         path = self._path(np.concatenate(times), np.concatenate(pieces))
         return path, np.concatenate(shares_of)
 
@@ -466,6 +477,18 @@ class TiltedMotion:
             return np.asarray(values[k])
         at = float(brentq(rate, a, b, xtol=1e-15 * self.period, rtol=1e-14))
         return np.asarray(formula(self._path(np.array([at]), piece[k : k + 1]))[0])
+
+
+def graded(length: float, decay: float) -> Real:
+    """Limits of parts of a piece of the motion, halved towards its start as long as it decays."""
+    halves = max(int(np.ceil(np.log2(max(decay * length, 1.0)))), 0)
+    return np.append(0.0, length * 0.5 ** np.arange(halves, -1, -1))
+
+
+def beside_zero(mean: Complex, high: Complex, low: Complex) -> NDArray[np.bool_]:
+    """Where the mean of two tilted numbers is zero and moves, so that its size has a kink."""
+    moves = np.abs(mean.imag) > AGREE * (np.abs(high.imag) + np.abs(low.imag))
+    return np.asarray(moves & (np.abs(mean.real) <= TIED * np.abs(high.real)))
 
 
 def _size_of(formula: Formula) -> Formula:
