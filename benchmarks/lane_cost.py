@@ -23,13 +23,13 @@ from flipflow.batch.variants import batches
 
 SERIES = {
     "lanes": (1, 4, 16, 64, 256, 1024, 4096),
-    "masses": (1, 2, 3, 4, 6, 8, 12),
+    "masses": (1, 2, 3, 4, 6, 8),
     "stops": (1, 2, 3, 4),
     "excitations": (1, 2, 3, 4),
 }
 USUAL = {"lanes": 256, "masses": 2, "stops": 1, "excitations": 1}
 OF_STOPS = {"masses": 4}  # what else is changed, so that there is room for as many stops
-SPEEDS = np.linspace(0.3, 0.55, 24)
+SPEEDS = np.linspace(0.3, 0.4, 24)
 ROUNDS = 3
 
 
@@ -38,13 +38,13 @@ def chain(masses, stops, excitations):
     K = 2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
     K[-1, -1] = 1.0
     springs = [
-        ff.ClearanceSpring(np.eye(masses)[j], 2.0, 0.05, 0.2 + 0.05 * j) for j in range(stops)
+        ff.ClearanceSpring(np.eye(masses)[j], 1.0, 0.1, 0.3 * (1.0 + j)) for j in range(stops)
     ]
     forces = [
-        ff.HarmonicForce(0.4 / (2 * h + 1) ** 2 * np.eye(masses)[0], order=2 * h + 1)
+        ff.HarmonicForce(0.6 / (2 * h + 1) ** 2 * np.eye(masses)[0], order=2 * h + 1)
         for h in range(excitations)
     ]
-    return ff.MechanicalSystem(np.eye(masses), 0.1 * K, K, tuple(springs), tuple(forces))
+    return ff.MechanicalSystem(np.eye(masses), 0.3 * K, K, tuple(springs), tuple(forces))
 
 
 def cost(numbers, rng):
