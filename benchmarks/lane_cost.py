@@ -105,7 +105,7 @@ def draw(drawn, path):
     for axes, (name, (counts, values, found)) in zip(
         figure.subplots(1, len(drawn), sharey=True), drawn.items(), strict=True
     ):
-        n = np.linspace(counts[0], counts[-1], 200)
+        n = np.geomspace(counts[0], counts[-1], 200)
         a, b, p = found
         axes.plot(n, law(n, *found), label=f"{a:.1f} + {b:.1f} n$^{{{p:.2f}}}$")
         axes.plot(counts, values, "o")
