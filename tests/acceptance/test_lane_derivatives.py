@@ -341,6 +341,40 @@ def test_names_that_arrays_of_a_study_have_are_refused():
         ff.study(own(), {"parameter": np.array([0.1, 0.2])}, "amplitude[0]", 0.7, sampling="list")
 
 
+@dataclasses.dataclass(frozen=True)
+class Kinked:
+    """Its stiffness has a kink where ``turn`` is 1."""
+
+    turn: float = 1.0
+    mass: float = 1.3
+
+    def system(self):  # noqa: D102
+        return ff.MechanicalSystem(
+            [[self.mass**3]], [[0.1]], [[1.0 + abs(self.turn - 1.0)]],
+            (ff.ClearanceSpring((1.0,), 5.0, 0.3, 0.3),), ff.HarmonicForce((1.0,)),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", [1.0, 1.01])
+def test_a_machine_has_no_derivative_at_a_kink_of_its_own_but_one_beside_it(turn):
+    machine = Kinked(turn=turn)
+    masses = np.array([1.2, 1.3])
+    found = ff.study(
+        machine, {"mass": masses}, "amplitude[0]", 0.9, sampling="list",
+        derivatives=["turn", "mass"],
+    )  # fmt: skip
+    slopes = found.derivatives["amplitude[0]"][:, 0, 0]
+    assert np.isfinite(slopes).all(axis=0).tolist() == [turn != 1.0, True]
+    orbit = ff.frequency_response(machine, (0.2, 2.0)).orbit_from_below(0.9)
+    if turn == 1.0:
+        with pytest.raises(ff.InputError, match="kink"):
+            orbit.sensitivity("amplitude[0]", ["turn"])
+    else:
+        np.testing.assert_allclose(
+            slopes[1], orbit.sensitivity("amplitude[0]", ["turn", "mass"]), rtol=1e-8
+        )
+
+
 def test_a_study_file_names_what_quantities_are_differentiated_by(command, tmp_path):
     written = tmp_path / "study.toml"
     written.write_text(

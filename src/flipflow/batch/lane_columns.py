@@ -92,11 +92,15 @@ def _one_by_one(
     found, bonded, known = [], [], []
     for row in batch.rows.tolist():
         system = variant(machine, columns, row).system()
-        told = [_told(system, _named(machine, columns, row, name)) for name in names]
-        parameters = [one for one, _ in told]
-        found.append(machine_columns(system, parameters))
+        parameters = [_named(machine, columns, row, name) for name in names]
+        try:
+            changes, smooth = machine_columns(system, parameters), [True] * len(names)
+        except InputError:  # some have a kink there
+            parameters, smooth = _without_kinks(system, parameters)
+            changes = machine_columns(system, parameters)
+        found.append(changes)
         bonded.append(_bonded(system, parameters))
-        known.append([is_known for _, is_known in told])
+        known.append(smooth)
     joined = {
         name: np.array([getattr(one.solved, name) for one in found])
         for name in Columns._fields
@@ -120,13 +124,23 @@ def _named(machine: Machine, columns: Mapping[str, NDArray[Any]], row: int, name
     return Named(name, own, at)
 
 
-def _told(system: MechanicalSystem, one: Named) -> tuple[Named, bool]:
-    """A parameter and True; where the machine has a kink there, one that changes nothing."""
-    try:
-        machine_columns(system, [one])
-    except InputError:
-        return Named(one.name, one.value, lambda _: system), False
-    return one, True
+def _without_kinks(
+    system: MechanicalSystem, parameters: Sequence[Named]
+) -> tuple[list[Named], list[bool]]:
+    """Parameters, those with a kink made to change nothing, and which have none."""
+    smooth = []
+    for one in parameters:
+        try:
+            machine_columns(system, [one])
+        except InputError:
+            smooth.append(False)
+        else:
+            smooth.append(True)
+    kept = [
+        one if fine else Named(one.name, one.value, lambda _: system)
+        for one, fine in zip(parameters, smooth, strict=True)
+    ]
+    return kept, smooth
 
 
 def _bonded(system: MechanicalSystem, parameters: Sequence[Named]) -> Real:

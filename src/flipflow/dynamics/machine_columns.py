@@ -17,6 +17,7 @@ from flipflow.errors import InputError
 from flipflow.model.system import MechanicalSystem
 
 WIDTH = 1.0 / 16.0  # half the interval over which a parameter is looked at, as a share of it
+TWO_SIDES = 1e-6  # share of an array to which the slopes to both sides must agree
 SMOOTH = "the machine has a kink or a jump at this value and no derivative; move it a little"
 
 
@@ -159,6 +160,7 @@ def _slopes(
     def at(value: float) -> dict[str, Real]:
         return _parts_at(system, kept, one, value)
 
+    sides: list[dict[str, Real]] = []
     for low, high in ((-width, width), (0.0, width), (-width, 0.0)):
         try:
             if low < 0.0 < high:
@@ -168,9 +170,22 @@ def _slopes(
             series = machine_series(lambda v, _: at(v), one.value + low, one.value + high)
         except (ArithmeticError, ValueError):  # the machine does not take a value on that side
             continue
-        if series is not None:
+        if series is not None and low < 0.0 < high:
             return _slope_of(series, one.value)
-    raise InputError(one.name, one.value, SMOOTH)
+        sides += [] if series is None else [_slope_of(series, one.value)]
+    if not sides or not _agree(own, sides, width):
+        raise InputError(one.name, one.value, SMOOTH)
+    return sides[0]
+
+
+def _agree(own: dict[str, Real], sides: list[dict[str, Real]], width: float) -> bool:
+    """Whether derivatives to both sides are the same; where there is one, a kink lies beside."""
+    for name, array in own.items():
+        size = np.abs(array[np.isfinite(array)]).max(initial=0.0)
+        apart = np.abs(sides[0][name] - sides[-1][name]).max(initial=0.0) * width
+        if apart > TWO_SIDES * max(size, np.abs(sides[0][name]).max(initial=0.0) * width):
+            return False
+    return True
 
 
 def _quadratic_slope(
