@@ -28,7 +28,7 @@ from flipflow.continuation.correction import (
 from flipflow.continuation.problem import depths, mirrored, residual, signature
 
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the other side is sought
-LEANING = 1e-3  # difference of both sides from which on a motion leans, as a share of the step
+LEANING = 1e-3  # distance from the mirror image from which on a motion leans, in steps
 EVEN = 0.1  # the same as a share of the tangent
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 
@@ -37,41 +37,49 @@ TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 def begins_to_lean(problem: Any, scratch: Any, work: Corrector, depth: Real, step: float) -> bool:
     """Whether the corrected motion leans to one side, though the last point's did not.
 
-    Where both sides of a stop begin to graze at once leaning motions branch off; the one that is
-    its own mirror image goes on, until a stop is met that is not the same on both sides. The last
-    point has depths (m, 2).
+    Where both sides of a stop begin to graze at once, be it for the second time in a turn, leaning
+    motions branch off; the one that is its own mirror image goes on, until a stop is met that is
+    not the same on both sides. The last point has depths (m, 2).
     """
-    n, leans = work.r.shape[0], False
+    n, meets = work.r.shape[0], False
     for j in range(work.depth.shape[0]):
-        size = abs(work.depth[j, 0] - work.depth[j, 1])
         met = max(work.depth[j, 0], work.depth[j, 1]) > 0.0
         evenly = work.uneven[j] == 0.0 and abs(depth[j, 0] - depth[j, 1]) <= LEANING * work.scale[0]
-        if not evenly:
-            if met:
-                return False
-        elif met and size > LEANING * step * work.scale[0]:
-            leans = True
-    if leans:
-        leans = is_mirror_image(problem, scratch, work)
-        residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
+        if met and not evenly:
+            return False
+        meets = meets or met
+    if not meets:
+        return False
+    leans = leaning(problem, scratch, work, work.w) > LEANING * step
+    leans = leans and stays_even(problem, scratch, work)
+    residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
     return leans
 
 
 @kernel
-def is_mirror_image(problem: Any, scratch: Any, work: Corrector) -> bool:
+def leaning(problem: Any, scratch: Any, work: Corrector, point: Real) -> float:
+    """How far a point's motion is from its own mirror image, in steps; what tells it is in work."""
+    n, off = work.r.shape[0], 0.0
+    if residual(mirrored(problem), scratch, point, float(point[n]), work.r, work.J) != status.OK:
+        return math.inf
+    for i in range(n):
+        off = max(off, abs(work.r[i]) / work.scale[i])
+    return off
+
+
+@kernel
+def stays_even(problem: Any, scratch: Any, work: Corrector) -> bool:
     """Whether the last point's motion is its own mirror image, and stays so along the branch.
 
     A branch of leaning motions passes the even one, too, on the way to their mirror images.
     """
-    n, off = work.r.shape[0], 0.0
-    omega = float(work.here[n])
-    code = residual(mirrored(problem), scratch, work.here, omega, work.r, work.J)
-    for i in range(n):
+    off = leaning(problem, scratch, work, work.here)
+    for i in range(work.r.shape[0]):
         turn = 0.0
-        for k in range(n + 1):
+        for k in range(work.w.shape[0]):
             turn += work.J[i, k] * work.here_tangent[k]
-        off = max(off, abs(work.r[i]) / work.scale[i], LEANING * abs(turn) / (EVEN * work.scale[i]))
-    return code == status.OK and off < LEANING
+        off = max(off, LEANING * abs(turn) / (EVEN * work.scale[i]))
+    return off < LEANING
 
 
 @kernel
@@ -112,20 +120,19 @@ def contacts_beside(
 
 @kernel
 def turn_corner(
-    problem: Any, scratch: Any, work: Corrector, depth: Real, step: float, course: Course
-) -> float:
-    """Go on from the last point round a corner that a contact makes; the step, 0 if there is none.
+    problem: Any, scratch: Any, work: Corrector, branch: Any, p: int, step: float, course: Course
+) -> float:  # fmt: skip
+    """Go on from point p round a corner that a contact makes; the step, 0 if there is none.
 
-    The last point has depths (m, 2). Where both sides of a stop graze at once, neither can be met
-    alone: then the motion that goes on is sought as its own mirror image. The point is left
-    corrected in work.
+    Where both sides of a stop graze at once, neither can be met alone: then the motion that goes on
+    is sought as its own mirror image. The point is left corrected in work.
     """
     recall(problem, work, course)
-    length = go_round(problem, problem, scratch, work, depth, step, course)
+    length = go_round(problem, problem, scratch, work, branch, p, step, course)
     if length == 0.0:
         recall(problem, work, course)
         half = mirrored(problem)
-        length = go_round(half, problem, scratch, work, depth, step, course)
+        length = go_round(half, problem, scratch, work, branch, p, step, course)
     if length == 0.0:
         recall(problem, work, course)
     return length
@@ -133,7 +140,7 @@ def turn_corner(
 
 @kernel
 def go_round(
-    sought: Any, problem: Any, scratch: Any, work: Corrector, depth: Real, step: float,
+    sought: Any, problem: Any, scratch: Any, work: Corrector, branch: Any, p: int, step: float,
     course: Course,
 ) -> float:  # fmt: skip
     """The same for motions of the problem that solve ``sought`` as well.
@@ -142,7 +149,6 @@ def go_round(
     to where those contacts are.
     """
     here, along = work.here, work.tangent
-    came_from = contacts_beside(sought, scratch, work, work.behind, work.before, 0.0)
     before = contacts_beside(sought, scratch, work, here, work.before, 0.0)
     contacts = contacts_beside(sought, scratch, work, here, work.before, step)
     for k in range(work.border.shape[0]):
@@ -156,11 +162,26 @@ def go_round(
         behind = contacts_beside(sought, scratch, work, here, along, -length) == contacts
         if ahead != behind:
             way = length if ahead else -length
-            turned_back = behind and contacts == came_from
+            turned_back = behind and came_through(work, branch, p, contacts, length)
             if turned_back or not step_round(sought, scratch, work, contacts, way, course):
                 return 0.0
-            return length if confirm(problem, scratch, work, depth, length) else 0.0
+            return length if confirm(problem, scratch, work, branch.depth[p], length) else 0.0
     return 0.0
+
+
+@kernel
+def came_through(work: Corrector, branch: Any, p: int, contacts: int, length: float) -> bool:
+    """Whether the branch had such contacts within a length, in steps, before point p."""
+    n, way, q = work.r.shape[0], 0.0, p
+    while q > 0 and way < length:
+        square = ((branch.omega[q] - branch.omega[q - 1]) / work.scale[n]) ** 2
+        for k in range(n):
+            square += ((branch.u[q, k] - branch.u[q - 1, k]) / work.scale[k]) ** 2
+        way += math.sqrt(square)
+        q -= 1
+        if branch.signature[q] == contacts:
+            return True
+    return False
 
 
 @kernel

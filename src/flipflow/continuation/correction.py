@@ -186,7 +186,7 @@ def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tu
             return status.NO_CONVERGENCE, iteration
         # A step that no longer shrinks and is tiny has met the rounding of the residual, unless it
         # goes to and fro over a grazing.
-        if length < tolerance or (same and before <= length < QUICK):
+        if length < tolerance or (same and before <= length < min(QUICK, 100.0 * tolerance)):
             return status.OK, iteration
         before = length
     return status.NO_CONVERGENCE, NEWTON_MOST

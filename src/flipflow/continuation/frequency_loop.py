@@ -57,6 +57,9 @@ BACK = 1.0  # share of a step within which it may then have come back to that po
 MET = 1e-3  # distance from that point of a branch that has
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
 STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
+CROSSING_STEP = 1e-2  # the same where the branch goes straight on: close to a crossing tangents mix
+STRAIGHT = 0.9999  # cosine between the tangents from which on it does
+STRAIGHT_MOST = 1e-3  # largest distance from the guess for that, as a share of the step
 CROSSING = 1e-2  # least pivot of that matrix, as a share of its largest, where others may cross
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
@@ -187,11 +190,12 @@ def judge(
         return REASON_CONTACT
     other_side = work.side[0] != branch.side[p]
     # Where another branch crosses the matrix is singular; a mere jump to another strand is not.
-    may_cross = step <= STRAND_STEP and (changed or lu_spread(work.A) < CROSSING)
+    straight = not changed and cosine > STRAIGHT and astray(work) < STRAIGHT_MOST * step
+    longest = CROSSING_STEP if straight else STRAND_STEP
+    may_cross = step <= longest and (changed or lu_spread(work.A) < CROSSING)
     depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
-    if (other_side and not may_cross) or begins_to_lean(
-        problem, scratch, work, branch.depth[p], step
-    ):
+    leans = changed and begins_to_lean(problem, scratch, work, branch.depth[p], step)
+    if leans or (other_side and not may_cross):
         return REASON_STRAND
     if changed and other_side:
         orient(problem, scratch, work, contacts, step)
@@ -332,8 +336,8 @@ def attempt(
     branch.rejected[p] += 1
     if step > CORNER_STEP:
         return 0.0, False, iterations
-    depth = branch.depth[p - 1]
-    return turn_corner(problem, scratch, work, depth, step, course), False, NEWTON_FEW
+    step = turn_corner(problem, scratch, work, branch, p - 1, step, course)
+    return step, False, NEWTON_FEW
 
 
 @kernel
