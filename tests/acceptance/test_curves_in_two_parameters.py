@@ -388,3 +388,59 @@ def test_a_curve_that_meets_a_valley_within_a_contact_ends_there() -> None:
     orbit = curve.orbits[0]
     valleys = tops(orbit.displacement(2, np.linspace(0.0, orbit.period, 20_001))) + 0.969
     assert np.abs(valleys).min() < 1e-5
+
+
+@pytest.mark.parametrize("names", [("eccentric_moment", "stop_stiffness"),
+                                   ("stop_stiffness", "eccentric_moment")])  # fmt: skip
+def test_either_parameter_may_stand_first(screen, exact, names) -> None:
+    """Before a contact the stop's stiffness moves nothing: the curve is a line beside it."""
+    point = exact.points_of("contact begin")[-1]
+    bounds = [(0.5 * getattr(screen, name), 2.0 * getattr(screen, name)) for name in names]
+    curve = ff.continue_bifurcation(point, names, bounds)
+    assert curve.status is ff.BranchStatus.FOLLOWED
+    values = curve.values[:, names.index("eccentric_moment")]
+    close("moment", values, np.full(values.size, screen.eccentric_moment), rel=1e-9)
+    assert np.ptp(curve.values[:, names.index("stop_stiffness")]) == pytest.approx(
+        1.5 * screen.stop_stiffness
+    )
+
+
+@dataclass(frozen=True)
+class TwoStops:
+    """One mass between two stops, of which the one that is met has equal gaps."""
+
+    mass: float = 1.0
+
+    def system(self) -> ff.MechanicalSystem:
+        """The machine."""
+        far = ff.ClearanceSpring([1.0], 1.5, 0.87, 61.0, 63.3)
+        near = ff.ClearanceSpring([1.0], 9.45, 0.0, 41.07, law="undamped-rebound")
+        return ff.MechanicalSystem(
+            [[self.mass]], [[0.0245]], [[4.04]], [far, near], ff.Unbalance([1.0])
+        )
+
+
+def test_both_sides_that_graze_all_along_are_no_second_grazing() -> None:
+    point = ff.frequency_response(TwoStops(), (0.711, 3.1)).points_of("contact end")[-1]
+    curve = ff.continue_bifurcation(point, ("omega", "mass"), ((0.42, 4.03), (0.4, 2.0)))
+    assert curve.status is ff.BranchStatus.FOLLOWED
+    assert not curve.points_of("two grazings")
+    assert not curve.notes
+
+
+def test_a_fold_that_runs_into_its_grazing_ends_there() -> None:
+    """At 3.436 mm a fold with the second side's touch meets the one without; single branches."""
+    screen = ff.FlipFlowScreen(
+        main_mass=514.5, floating_mass=167.6, eccentric_moment=0.9312, isolation_stiffness=377.2e3,
+        isolation_damping=1711.0, shear_stiffness=515.4e3, shear_damping=1276.4,
+        stop_stiffness=9.86e6, stop_damping=2692.0, clearance=2.08e-3, clearance_minus=10.41e-3,
+    )  # fmt: skip
+    fold = ff.frequency_response(screen, (20.0, 300.0)).folds[-1]
+    curve = ff.continue_fold(fold, "clearance", (2.08e-3, 5.55e-3))
+    assert curve.status is ff.BranchStatus.MEETS_GRAZING
+    assert curve.values.size < 2000
+    ends, speed = float(curve.values[-1]), float(curve.omega[-1])
+    close("where it ends", ends, 3.436e-3, rel=2e-3)
+    for gap, folds in ((0.99 * ends, 2), (1.01 * ends, 0)):
+        beside = ff.frequency_response(screen.replace(clearance=gap), (20.0, 300.0)).folds
+        assert sum(abs(fold.omega - speed) < 0.5 for fold in beside) == folds, gap

@@ -168,3 +168,33 @@ def test_gaps_that_are_nearly_equal(share: float, method) -> None:
     machine = screen.replace(clearance_minus=screen.clearance * (1.0 + share))
     branch = ff.frequency_response(machine, (60.0, 250.0), method)
     assert branch.complete, branch.status
+
+
+DRAWN = 1_690_858_624  # a seed of benchmarks/paths.py, of which these did not reach their end
+
+
+@pytest.mark.parametrize(
+    ("law", "ratio", "number"),
+    [
+        ("paper", 0.0, 261),  # a Newton step that shrinks no more was taken for rounding
+        ("paper", 0.0, 303),
+        ("paper", 0.05, 360),
+        ("compression-only", 0.05, 7),  # went back at a corner to contacts two points before
+        ("compression-only", 1.0, 215),  # leaning motions from a second touch, round and round
+        ("compression-only", 1.0, 480),
+    ],
+)
+def test_machines_whose_branch_ended_early(law: str, ratio: float, number: int) -> None:
+    machine, interval = draw()(DRAWN, number, law=law, ratio=ratio)
+    branch = ff.frequency_response(machine, interval)
+    assert branch.complete, branch.status
+    assert branch.omega[0] == interval[0]
+    assert branch.omega[-1] == interval[1]
+
+
+def test_crossings_are_passed_with_steps_of_any_length() -> None:
+    """Close to where leaning motions branch off both tangents mix; it failed once in ten."""
+    machine, interval = draw()(DRAWN, 227, law="paper", ratio=0.0)
+    for points in range(200, 300, 10):
+        branch = ff.frequency_response(machine, interval, ff.PiecewiseExact(points=points))
+        assert branch.complete, (points, branch.status)

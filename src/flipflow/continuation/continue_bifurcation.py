@@ -118,6 +118,10 @@ def continue_bifurcation(
     names = _checked_names(parameters)
     plane = _plane(point.orbit, names, bounds)
     followed = _followed(point, plane, say)
+    if followed.status is BranchStatus.NO_START and not plane.over_omega:
+        # Where the first parameter stands still at the start, only the other one can be held there.
+        plane = plane.turned
+        followed = _followed(point, plane, say)
     turned = names != plane.names
     kind = GRAZES if point.kind in (CONTACT_BEGIN, CONTACT_END) else point.kind
     return BifurcationCurve(
@@ -230,6 +234,11 @@ class Plane:
     def over_omega(self) -> bool:
         """Whether the speed varies."""
         return self.names[1] == OMEGA
+
+    @property
+    def turned(self) -> Plane:
+        """The plane with its parameters the other way round."""
+        return Plane(self.machine, self.names[::-1], self.own[::-1], self.bounds[::-1])
 
     def machine_at(self, first: float, second: float) -> Machine:
         """The machine at values of both."""

@@ -46,6 +46,7 @@ RESONANCES = {"1:1 resonance": 2.0, "1:2 resonance": -2.0, "1:3 resonance": -1.0
               "1:4 resonance": 0.0}  # fmt: skip
 JUMP = 1e-3  # a test above this share of its values at the ends has jumped there
 NOISE = 1e-8  # share of a parameter by which it changes in a step, below which it stands still
+EVEN = 1e-9  # depth, as a share of the motion, below which another gap is grazed, too
 PARALLEL = 1e-3  # share of the largest tangent in a parameter below which the curve stands still
 
 Of = Callable[[Complex], float]
@@ -154,6 +155,7 @@ def _turning_tests(solver: FieldSolver, traced: Traced) -> list[Test]:
 def _depth_tests(solver: FieldSolver, traced: Traced) -> list[Test]:
     """Depths beyond the gaps that are not held at the grazing."""
     sought, tests = solver.sought, []
+    least = EVEN * np.abs(traced.u[:, : solver.system.size]).max(initial=0.0)
     kind = _both(sought.test, GRAZING, half_turn=solver.half_turn)
     for gap in range(2 * len(solver.springs)):
         j, side = divmod(gap, 2)
@@ -161,6 +163,8 @@ def _depth_tests(solver: FieldSolver, traced: Traced) -> list[Test]:
         own = sought.test == GRAZING and gap == sought.gap
         if own or (side == 1 and solver.half_turn) or not np.isfinite(depth).all():
             continue
+        if sought.test == GRAZING and np.abs(depth).max(initial=0.0) < least:
+            continue  # both sides of a stop graze all along
         evaluate = partial(solver.depth, spring=j, side=side)
         zero = partial(solver.zero_between, traced, gap)
         tests.append(Test(kind, depth, evaluate, j, 1 - 2 * side, zero=zero))

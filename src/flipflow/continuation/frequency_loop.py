@@ -49,6 +49,8 @@ SHRINK = 0.7  # factor on the step after many iterations
 HALVE = 0.5  # factor on a step that was refused
 LONGEST = 1.0  # length beyond which a step does not grow
 SHORTEST = 1e-10  # length below which the branch is given up
+CREEPING = 1e-3  # length of steps that lead nowhere where many follow each other
+CREEPING_MOST = 500  # such steps in a row after which the branch is given up where they begin
 FAR = 2.0  # from this many chords on, the tangent predicts a step, not the cubic
 ASTRAY_MOST = 0.05  # largest distance of the corrected point from the guess, as a share of the step
 ASTRAY_AT_CORNER = 0.3  # the same for a step up to SHORT_STEP
@@ -341,6 +343,14 @@ def attempt(
 
 
 @kernel
+def length_after(step: float, iterations: int, length: float) -> float:
+    """Length of the next step after one that took so many iterations, sought at ``length``."""
+    if iterations <= NEWTON_FEW:
+        return min(step * GROW, LONGEST)
+    return step * SHRINK if iterations >= NEWTON_MANY else length
+
+
+@kernel
 def trace(
     problem: Any, scratch: Any, work: Corrector, branch: Record, u: Real, omega: float,
     course: Course,
@@ -360,7 +370,7 @@ def trace(
         code = advance(problem, scratch, work, branch, 0, course)
     if code != status.OK:
         return code, 0
-    length, travelled, p = 0.1, 0.0, 1
+    length, travelled, p, creeping = 0.1, 0.0, 1, 0
     clear(branch, p)
     while p < branch.omega.shape[0]:
         longest = min(length, 0.999 / max(abs(float(work.before[n])), 1e-3))
@@ -383,10 +393,10 @@ def trace(
         clear(branch, p)
         if ended != status.OK:
             return ended, p
-        if iterations <= NEWTON_FEW:
-            length = min(step * GROW, LONGEST)
-        elif iterations >= NEWTON_MANY:
-            length = step * SHRINK
+        creeping = creeping + 1 if step < CREEPING else 0
+        if creeping > CREEPING_MOST:
+            return status.STEP_TOO_SMALL, p - CREEPING_MOST
+        length = length_after(step, iterations, length)
     return status.POINT_LIMIT, p
 
 

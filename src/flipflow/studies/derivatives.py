@@ -24,6 +24,7 @@ from flipflow.model.parameters import differentiable
 from flipflow.model.quantities import Quantity, missing_words, quantities_for
 from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.derivatives import MotionDerivatives
+from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.quantity_values import MOTION_VALUES
 from flipflow.studies.tilted_motion import TILT, TiltedMotion
@@ -43,6 +44,7 @@ READINGS: Mapping[str, Callable[[TiltedMotion, Coordinate], Complex]] = {
     "stop_force_peak": lambda motion, spring: motion.stop_force_peak(_spring(motion, spring)),
 }
 NULL = 1e-4  # share of the largest singular value of I - M below which one is that of a fold
+JUMPED = 1e-3  # distance of a multiplier from what it is at a special point beyond which it jumps
 
 
 def orbit_sensitivity(orbit: Orbit, quantity: Asked, names: Sequence[str]) -> NDArray[Any]:
@@ -176,19 +178,29 @@ def _of_doubling(
             f"not with other values of {_words(parameters)}: there is no such point beside it."
         )
     value, slope = slopes.eigenvalues
-    return np.asarray(slope[int(np.abs(value + 1.0).argmin())].real)
+    off = np.abs(value + 1.0)
+    _refuse_corner(point, parameters, off.min(), "no multiplier is -1")
+    return np.asarray(slope[int(off.argmin())].real)
 
 
 def _of_neimark_sacker(
-    point: SpecialPoint,  # noqa: ARG001
-    parameters: Sequence[Named],  # noqa: ARG001
-    slopes: MotionDerivatives,
+    point: SpecialPoint, parameters: Sequence[Named], slopes: MotionDerivatives
 ) -> Real:
     """Derivatives of half the square of the size of the pair on the unit circle, (P + 1,)."""
     value, slope = slopes.eigenvalues
     away = np.where(value.imag > 0.0, np.abs(np.abs(value) - 1.0), np.inf)
     pair = int(away.argmin())
+    _refuse_corner(point, parameters, away[pair], "no pair of multipliers has the size 1")
     return np.asarray((value[pair].conjugate() * slope[pair]).real)
+
+
+def _refuse_corner(point: SpecialPoint, parameters: Sequence[Named], off: float, why: str) -> None:
+    """Refuse an exact point at which multipliers jump past what they are said to be."""
+    if off > JUMPED and point.orbit.point.formulation.kind is ExactSolver:
+        raise IncompleteError(
+            f"The {point.kind} at {point.omega:.9g} rad/s of {_words(parameters)} is no smooth "
+            f"one: {why}, the branch has a corner there."
+        )
 
 
 _TESTS: Mapping[str, Callable[[SpecialPoint, Sequence[Named], MotionDerivatives], Real]] = {
