@@ -29,7 +29,8 @@ from flipflow.dynamics.law import Stops, entered, exit_of, signed_gap
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 
 NOTHING = -9  # no regime: nothing has changed yet
-MAX_SEARCH = 20_000  # steps of one search; thirty are usual
+MAX_SEARCH = 20_000  # steps of one search
+USUAL = 60  # steps that most searches stay below
 AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
 SHORT = 1e-3  # exponent whose sixth power is nothing beside 1
 CLOSE = 3e-5  # share of the distance of two samples from which the parabola's summit is exact
@@ -227,7 +228,7 @@ def next_change(
     least = SMALLEST_STEP * horizon
     prepare_search(motion, count)
     longest = longest_step(motion, count, horizon)
-    for _ in range(MAX_SEARCH):
+    for search in range(MAX_SEARCH):
         exponentials(motion, count, t)
         step = longest
         for j in range(regime.shape[0]):
@@ -238,7 +239,7 @@ def next_change(
                     return max(t + max(min(low, least), -least), 0.0), j, new
                 # Newton's step is no safe one where a function and its rate vanish together.
                 low = least
-            if low < HARDLY * longest:
+            if search > USUAL and low < HARDLY * longest:
                 low = quiet_time(motion, stops, regime[j], count, j, max(low, least))
             step = min(step, max(low, least))
         t += step
@@ -318,7 +319,7 @@ def _approach(
     return safe_step(max(h, noise), slope, curvature, second, third), NOTHING
 
 
-@kernel(inline=True)
+@kernel(shared=True)
 def quiet_time(
     motion: GapMotion, stops: Stops, regime: int, count: int, j: int, step: float
 ) -> float:
