@@ -7,6 +7,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import flipflow as ff
 from flipflow.model.contact_law import ContactLaw
@@ -202,3 +203,42 @@ def test_a_document_of_usual_length_is_whole(command, tmp_path):
     command("simulate", "ffs0827", "--periods", "20", "--json", str(tmp_path / "whole.json"))
     whole = ff.open_result(tmp_path / "whole.json")
     assert (whole.t.size, whole.notes) == (20 * 128 + 1, ())
+
+
+def chain_at_a_stop(law: ContactLaw, phase: float, gap: float) -> ff.MechanicalSystem:
+    """Five masses in a row, the last one driven, the first one beside a stop."""
+    K = 2.0 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1)
+    K[4, 4] = 1.0
+    stop = ff.ClearanceSpring([1.0, 0.0, 0.0, 0.0, 0.0], 5.0, 0.1, gap, math.inf, law=law)
+    force = ff.HarmonicForce([0.0, 0.0, 0.0, 0.0, np.exp(1j * phase)])
+    return ff.MechanicalSystem(np.eye(5), 0.05 * K, K, [stop], force)
+
+
+@pytest.mark.parametrize("law", get_args(ContactLaw))
+@pytest.mark.parametrize("phase", [0.0, 0.5 * math.pi, 2.0])
+def test_from_rest_at_a_stop_the_first_derivative_that_moves_it_decides(law, phase) -> None:
+    """At first y is a tenth power of time, far below rounding: as with a gap of 1e-9 beside it."""
+    times = np.linspace(0.0, 30.0, 61)
+    at, apart = (
+        ff.simulate(chain_at_a_stop(law, phase, gap), 1.3, 7, t=times) for gap in (0.0, 1e-9)
+    )
+    assert np.abs(at.x - apart.x).max() < 1e-7
+    assert ff.sweep(chain_at_a_stop(law, phase, 0.0), [1.3]).words == ("periodic",)
+
+
+def test_from_rest_at_a_stop_as_dop853_tells() -> None:
+    """Steps of 5 ms at most, no events: the force of the paper's law jumps by c v, v nearly 0."""
+    machine = chain_at_a_stop("paper", 0.0, 0.0)
+    (stop,) = machine.springs
+
+    def slope(t, z):
+        x, v = z[:5], z[5:]
+        contact = stop.stiffness * x[0] + stop.damping * v[0] if x[0] > 0.0 else 0.0
+        force = machine.excitation.vector.real * math.cos(1.3 * t) - machine.C @ v - machine.K @ x
+        return np.concatenate([v, force - contact * stop.direction])
+
+    told = ff.simulate(machine, 1.3, 5, t=[0.0, 20.0]).x[-1]
+    run = solve_ivp(
+        slope, (0.0, 20.0), np.zeros(10), "DOP853", rtol=1e-9, atol=1e-12, max_step=5e-3
+    )
+    assert np.abs(told - run.y[:5, -1]).max() < 1e-6

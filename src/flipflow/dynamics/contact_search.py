@@ -29,10 +29,14 @@ from flipflow.dynamics.law import Stops, entered, exit_of, signed_gap
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
 
 NOTHING = -9  # no regime: nothing has changed yet
-MAX_SEARCH = 20_000  # steps of one search; thirty are usual
+MAX_SEARCH = 20_000  # steps of one search
+USUAL = 60  # steps that most searches stay below
 AT_GAP = 4e-16  # a switching function this small, relative to its terms, is zero but for rounding
 SHORT = 1e-3  # exponent whose sixth power is nothing beside 1
 CLOSE = 3e-5  # share of the distance of two samples from which the parabola's summit is exact
+HARDLY = 1e-4  # share of the longest step below which a longer one is sought
+MOST_FOURFOLD = 20  # times that it is made four times as long
+MOST_DERIVATIVES = 24  # that may vanish
 SMALLEST_STEP = 1e-11  # share of the horizon: least step, which bounds their number at grazing
 
 
@@ -49,6 +53,7 @@ class GapMotion(NamedTuple):
     curve: Complex  # (m, r) amplitude rate^2, filled by ``prepare_search``
     bound: Real  # (m, r) its size
     size: Real  # (r,) |rate|
+    noise: Real  # (m, 2) rounding of y and y', filled by ``prepare_search``
     growth: Real  # (r,) greatest exp(Re rate s) within a step, filled by ``longest_step``
     turn: Complex  # (r,) terms of one gap, carried from sample to sample by ``extremes``
     ratio: Complex  # (r,) factors from one sample to the next
@@ -81,9 +86,14 @@ def prepare_search(motion: GapMotion, count: int) -> None:
     for i in range(count):
         motion.size[i] = modulus(motion.rate[i])
     for j in range(motion.offset.shape[0]):
+        place, speed = abs(motion.offset[j]), abs(motion.drift[j])
         for i in range(count):
             motion.curve[j, i] = motion.amplitude[j, i] * motion.rate[i] * motion.rate[i]
-            motion.bound[j, i] = modulus(motion.amplitude[j, i]) * motion.size[i] * motion.size[i]
+            size = modulus(motion.amplitude[j, i])
+            place += size
+            speed += size * motion.size[i]
+            motion.bound[j, i] = size * motion.size[i] * motion.size[i]
+        motion.noise[j, 0], motion.noise[j, 1] = AT_GAP * place, AT_GAP * speed
 
 
 @kernel(inline=True)
@@ -192,7 +202,6 @@ def root_of_bound(h: float, slope: float, bound: float) -> float:
 @kernel(inline=True)
 def safe_step(h: float, slope: float, curvature: float, second: float, third: float) -> float:
     """Time before which h has no zero; second and third bound its derivatives until then."""
-    h = max(h, 0.0)
     certain = root_of_bound(h, slope, second)
     reach = root_of_bound(h, slope, -curvature)
     if reach > 8.0 * certain:
@@ -219,7 +228,7 @@ def next_change(
     least = SMALLEST_STEP * horizon
     prepare_search(motion, count)
     longest = longest_step(motion, count, horizon)
-    for _ in range(MAX_SEARCH):
+    for search in range(MAX_SEARCH):
         exponentials(motion, count, t)
         step = longest
         for j in range(regime.shape[0]):
@@ -230,6 +239,8 @@ def next_change(
                     return max(t + max(min(low, least), -least), 0.0), j, new
                 # Newton's step is no safe one where a function and its rate vanish together.
                 low = least
+            if search > USUAL and low < HARDLY * longest:
+                low = quiet_time(motion, stops, regime[j], count, j, max(low, least))
             step = min(step, max(low, least))
         t += step
         if t >= horizon:
@@ -244,16 +255,16 @@ def spring_change(
     """Time before which spring j cannot change, or Newton's last step and its new regime."""
     y, v = gap_state(motion, count, j)
     a, second, third = gap_bounds(motion, count, j)
-    scale = abs(y) + abs(motion.offset[j])
+    noise, slow = motion.noise[j, 0], motion.noise[j, 1]
     if regime == OPEN:
         up = stops.gap[j, 0] - y
         down = y + stops.gap[j, 1]
         piece = entered(stops, j)
         if v > 0.0:
-            one = _approach(up, -v, -a, second, third, scale, piece)
-            return _unless_later(one, down, v, a, second, third, scale, -piece)
-        one = _approach(down, v, a, second, third, scale, -piece)
-        return _unless_later(one, up, -v, -a, second, third, scale, piece)
+            one = _approach(up, -v, -a, second, third, noise, slow, piece)
+            return _unless_later(one, down, v, a, second, third, noise, slow, -piece)
+        one = _approach(down, v, a, second, third, noise, slow, -piece)
+        return _unless_later(one, up, -v, -a, second, third, noise, slow, piece)
     side = 1 if regime > OPEN else -1
     gap = signed_gap(stops, j, regime)
     found = (math.inf, NOTHING)
@@ -263,11 +274,11 @@ def spring_change(
             continue
         new = side * target
         if target == OPEN:
-            one = _approach(side * (y - gap), side * v, side * a, second, third, scale, new)
+            one = _approach(side * (y - gap), side * v, side * a, second, third, noise, slow, new)
         else:
             h, slope, bend, low2, low3 = switching_state(motion, count, j, gap, alpha, beta)
-            size = abs(alpha) * scale + abs(beta) * abs(v)
-            one = _approach(side * h, side * slope, side * bend, low2, low3, size, new)
+            unsure = abs(alpha) * noise + abs(beta) * slow
+            one = _approach(side * h, side * slope, side * bend, low2, low3, unsure, 0.0, new)
         found = _sooner(found, one)
     return found
 
@@ -283,25 +294,91 @@ def _sooner(one: tuple[float, int], two: tuple[float, int]) -> tuple[float, int]
 @kernel(inline=True)
 def _unless_later(
     one: tuple[float, int], h: float, slope: float, curvature: float, second: float, third: float,
-    scale: float, target: int,
+    noise: float, slow: float, target: int,
 ) -> tuple[float, int]:  # fmt: skip
     """The sooner of a change and the zero of h; mostly that is seen to come later without roots."""
     step, new = one
-    if new != NOTHING or (h > AT_GAP * scale and h + step * (slope - 0.5 * second * step) > 0.0):
+    if new != NOTHING or (h > noise and h + step * (slope - 0.5 * second * step) > 0.0):
         return one
-    return _sooner(one, _approach(h, slope, curvature, second, third, scale, target))
+    return _sooner(one, _approach(h, slope, curvature, second, third, noise, slow, target))
 
 
 @kernel(inline=True)
 def _approach(
-    h: float, slope: float, curvature: float, second: float, third: float, scale: float, target: int
-) -> tuple[float, int]:
-    """Safe step towards the zero of h; Newton's step and ``target`` once it is there."""
+    h: float, slope: float, curvature: float, second: float, third: float, noise: float,
+    slow: float, target: int,
+) -> tuple[float, int]:  # fmt: skip
+    """Safe step towards the zero of h; Newton's step and ``target`` once it is there.
+
+    Where h and its rate both are rounding, as at rest just beside a stop, it has not begun to move.
+    """
     if h == math.inf:
         return math.inf, NOTHING
-    if h <= AT_GAP * scale and slope < 0.0:
+    if slope < 0.0 and (h < -noise or (h <= noise and slope < -slow)):
         return -h / slope, target
-    return safe_step(h, slope, curvature, second, third), NOTHING
+    return safe_step(max(h, noise), slope, curvature, second, third), NOTHING
+
+
+@kernel(shared=True)
+def quiet_time(
+    motion: GapMotion, stops: Stops, regime: int, count: int, j: int, step: float
+) -> float:
+    """How long, from ``step`` on, spring j stays as it is where it is all but at rest at a gap.
+
+    There more derivatives than two may vanish, as where only another mass is driven, and safe steps
+    would be many.
+    """
+    if regime == OPEN:
+        y, _ = gap_state(motion, count, j)
+        to_gap = min(abs(stops.gap[j, 0] - y), abs(stops.gap[j, 1] + y))
+        return _time_within(motion, count, j, 1.0, 0.0, to_gap, step)
+    quiet, gap = math.inf, signed_gap(stops, j, regime)
+    for e in range(MOST_EXITS):
+        alpha, beta, target = exit_of(stops, j, regime, e)
+        if target != NO_EXIT:
+            h = switching_state(motion, count, j, gap, alpha, beta)[0]
+            quiet = min(quiet, _time_within(motion, count, j, alpha, beta, abs(h), step))
+    return quiet
+
+
+@kernel(inline=True)
+def _time_within(
+    motion: GapMotion, count: int, j: int, alpha: float, beta: float, reach: float, step: float
+) -> float:
+    """How long, from ``step`` on, alpha y + beta y' changes by less than its rounding or reach."""
+    reach = max(reach, abs(alpha) * motion.noise[j, 0] + abs(beta) * motion.noise[j, 1])
+    for _ in range(MOST_FOURFOLD):
+        if not _changes_less(motion, count, j, alpha, beta, reach, 4.0 * step):
+            break
+        step *= 4.0
+    return step
+
+
+@kernel(inline=True)
+def _changes_less(
+    motion: GapMotion, count: int, j: int, alpha: float, beta: float, reach: float, span: float
+) -> bool:
+    """Whether alpha y + beta y' surely changes by less than ``reach`` over a span.
+
+    By Taylor's series, whose remainder is at most the sum of the sizes of its terms.
+    """
+    for i in range(count):
+        amplitude = motion.amplitude[j, i] * motion.factor[i]
+        motion.turn[i] = amplitude * (alpha + beta * motion.rate[i])
+    change, power = 0.0, 1.0
+    for order in range(1, MOST_DERIVATIVES):
+        value, most = alpha * motion.drift[j] if order == 1 else 0.0, 0.0
+        for i in range(count):
+            motion.turn[i] *= motion.rate[i]
+            value += motion.turn[i].real
+            most += modulus(motion.turn[i]) * motion.growth[i]
+        power *= span / order
+        if order > 1 and change + most * power <= reach:
+            return True
+        change += abs(value) * power
+        if change > reach:
+            return False
+    return False
 
 
 @kernel(shared=True)
@@ -476,6 +553,7 @@ def new_gap_motion(gaps: int, rates: Complex, spacing: int = 0) -> GapMotion:
         curve=np.zeros(shape, np.complex128),
         bound=np.zeros(shape),
         size=np.zeros(rates.size),
+        noise=np.zeros((gaps, 2)),
         growth=np.ones(rates.size),
         turn=np.zeros(rates.size, np.complex128),
         ratio=np.zeros(rates.size, np.complex128),
