@@ -71,7 +71,7 @@ def sensitivity(
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.io.vary import read_vary  # noqa: PLC0415
 
-    project = in_case(load_project(file, force=force), case)
+    project = in_case(load_project(file, force=force), case, speed)
     for warning in project.warnings:
         typer.echo(f"Warning: {warning}", err=True)
     ranges = read_vary(vary or [], project.screen)

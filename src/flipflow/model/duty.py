@@ -238,7 +238,12 @@ class Duty:
         if not self.temperatures:
             return self.load_cases
         return tuple(
-            replace(load, temperature=degrees, name=f"{load.name or 'empty'}, {degrees:g} degC")
+            replace(
+                load,
+                temperature=degrees,
+                temperature_of="rubber",
+                name=f"{load.name or 'empty'}, {degrees:g} degC",
+            )
             for load, degrees in itertools.product(self.load_cases, self.temperatures)
         )
 
