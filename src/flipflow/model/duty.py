@@ -93,7 +93,8 @@ class Duty:
     free
         Fields that may be chosen: an interval (low, high), or ``ff.Choice`` of values.
     load_cases
-        The loads; those of the machine file where none are given.
+        The loads; those of the machine file where none are given. Under one that gives the air's
+        temperature, each candidate's rubber is as warm as its own work keeps it.
     temperatures
         Temperatures of the rubber in degrees Celsius with which every load case is combined.
     scatter

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.continuation.frequency_response import frequency_response
+from flipflow.errors import IncompleteError, InputError
 from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load, as_cool_as_air, of_air
@@ -109,7 +110,10 @@ def _warmed(
     def warmer(rubber: Real, _: Int) -> Real:
         held = replace(cool, temperature=float(np.clip(rubber[0], low, high)))
         machine = screen.loaded(held)
-        branch = frequency_response(machine, span or analysed_range(screen, omega), method)
+        try:
+            branch = frequency_response(machine, span or analysed_range(screen, omega), method)
+        except (InputError, IncompleteError):  # a machine without damping, say
+            return np.array([np.nan])
         working = working_motion(machine, branch, omega)
         rise = None if working is None else working.value(RISE)
         return np.array([np.nan if rise is None else rise])

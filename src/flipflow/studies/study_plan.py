@@ -376,14 +376,14 @@ def _loads(load_cases: object, machine: Machine) -> tuple[Load, ...]:
 
 
 def _refuse_air(loads: tuple[Load, ...], asked: Sequence[Quantity], omega: Real) -> None:
-    """See that a frequency is given at which the rubber gets warm in the air of a load."""
+    """See that it is known at which speed the rubber gets warm, for what belongs to no speed."""
     airy = next((load for load in loads if of_air(load)), None)
     whole = next((one for one in asked if one.of == "response"), None)
     if airy is None or whole is None or (omega.size == 1 and np.isfinite(omega[0])):
         return
     remedy = (
-        f"give omega, the one working speed, with {whole.name}: the rubber gets as warm as its "
-        "work at that speed keeps it"
+        f"ask for {whole.name} at one speed, the working speed: the rubber gets as warm as its "
+        "work there keeps it"
     )
     raise InputError(f"temperature_of of {case_words(airy.name)}", airy.temperature_of, remedy)
 
