@@ -128,6 +128,7 @@ def test_a_command_for_a_case_takes_the_same_rubber(command, project, file, tmp_
     code, _, err = command(name, file, *words, "-o", tmp_path / "out")
     assert code == 0, err
     assert f"Note: Case air: the rubber settles at {rubber:.3g} degC at 870 rpm." in err
+    assert ("all variants is as warm" in err) == (name == "sensitivity")
     document = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
     if name == "simulate":
         stiffness = document["system"]["K"][1][1]
