@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 NOT_COMPUTED, FOUND, REFUSED, INCOMPLETE, NO_MOTION, UNSTABLE = -1, 0, 1, 2, 3, 4
+UNSETTLED = 5
 
 REASONS: Mapping[int, str] = {
     NOT_COMPUTED: "not computed yet",
@@ -13,6 +14,7 @@ REASONS: Mapping[int, str] = {
     INCOMPLETE: "the branch of motions could not be followed to its end",
     NO_MOTION: "no such motion was found at this speed",
     UNSTABLE: "no motion of one period settles at this speed",
+    UNSETTLED: "the rubber does not settle at a temperature at this speed",
 }
 """Why a machine has no values at a speed; where there is no reason, a NaN says that the quantity
 itself has no value: no jump speed, say, of a machine that does not jump."""

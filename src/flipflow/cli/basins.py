@@ -46,7 +46,7 @@ def basins(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = in_case(load_project(file, force=force), case)
+    project = in_case(load_project(file, force=force), case, speed)
     omega = speed_of(project, speed)
     with Destination(output or Path(f"{project.name}-flipflow"), json, [file]) as target:
         found, risk, reason = _computed(project.screen, omega, cells)

@@ -50,6 +50,7 @@ def _show(result: Check, out: Console) -> None:
     out.print(f"Unbalance over all mass (m0r/(m1+m2)): {1e3 * result.static_amplitude:.4g} mm")
     out.print()
     out.print(_cases(result.load_cases))
+    print_list(out, "Notes", map(printable, result.notes))
     print_list(out, "Sources", _sources(result))
     print_list(out, "Assumed", result.assumed)
     print_list(out, "Missing", (f"{g.missing}: disables {g.disables}" for g in result.missing))
@@ -98,10 +99,18 @@ def _cases(cases: Iterable[Case]) -> Table:
             case.stiffness_factor, case.damping_factor, case.stop_stiffness_factor,
             case.stop_damping_factor, case.main_mass, case.floating_mass,
         )  # fmt: skip
-        warm = "" if case.temperature is None else f"{case.temperature:.4g}"
-        warm += " air" if case.temperature_of == "air" else ""
-        table.add_row(printable(case.name), *(f"{number:.4g}" for number in numbers), warm)
+        table.add_row(printable(case.name), *(f"{number:.4g}" for number in numbers), _warmth(case))
     return table
+
+
+def _warmth(case: Case) -> str:
+    """Temperature of the rubber; of the air, where that is given, behind it."""
+    if case.temperature is None:
+        return ""
+    if case.temperature_of != "air":
+        return f"{case.temperature:.4g}"
+    air = f"air {case.temperature:.4g}"
+    return air if case.rubber is None else f"{case.rubber:.3g}, {air}"
 
 
 def _sources(result: Check) -> Iterator[str]:

@@ -14,6 +14,7 @@ from flipflow.model import constants
 
 if TYPE_CHECKING:
     from flipflow.model.project import Project
+    from flipflow.model.screen import Load
 
 RPM = constants.RPM
 # Slower, a turn takes minutes of calculation; faster, no screen runs.
@@ -93,17 +94,43 @@ def as_written(option: str, written: str) -> Iterator[None]:
         raise InputError(option, written, error.remedy) from None
 
 
-def in_case(project: Project, name: str | None) -> Project:
-    """The project of a machine under one of its load cases; as it is where none is named."""
+def in_case(project: Project, name: str | None, speed: str | None = None) -> Project:
+    """The project of a machine under one of its load cases; as it is where none is named.
+
+    Where the case gives the air's temperature, the rubber is as warm as its work keeps it at the
+    speed asked for, else at that of the machine file; stderr tells how warm.
+    """
     from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
 
     if name is None:
         return project
     for load in project.load_cases:
         if load.name == name:
+            load = _at_work(project, load, speed)  # noqa: PLW2901
             return replace(project, screen=project.screen.loaded(load), load_cases=(load,))
     known = ", ".join(repr(load.name) for load in project.load_cases)
     raise InputError("--case", name, f"there is no such load case, choose one of {known}")
+
+
+def _at_work(project: Project, load: Load, speed: str | None) -> Load:
+    """A load case with the temperature of the rubber."""
+    from flipflow.cli.progress import progress  # noqa: PLC0415  keeps --help quick
+    from flipflow.model.load_case import case_words  # noqa: PLC0415
+    from flipflow.model.screen import of_air  # noqa: PLC0415
+
+    if not of_air(load):
+        return load
+    from flipflow.studies.rubber_temperature import warmed_load  # noqa: PLC0415  slow to import
+
+    omega = speed_of(project, speed)
+    with progress("warming the rubber; the first run of a version compiles"):
+        found = warmed_load(project.screen, load, omega)
+    told = found.note or (
+        f"{case_words(load.name, capital=True)}: the rubber settles at {found.rubber:.3g} degC "
+        f"at {omega * RPM:.4g} rpm."
+    )
+    typer.echo(f"Note: {told}", err=True)
+    return found.load
 
 
 def title_of(project: Project, case: str | None) -> str:

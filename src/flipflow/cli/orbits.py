@@ -48,7 +48,7 @@ def orbits(
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.studies.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
 
-    project = in_case(load_project(file, force=force), case)
+    project = in_case(load_project(file, force=force), case, speed)
     omega = speed_of(project, speed)
     with Destination(output, json, [file]) as target:
         with progress("searching; the first run of a version compiles") as tell:

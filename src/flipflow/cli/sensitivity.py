@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from flipflow.studies.sensitivity import Sensitivity
 
 POINTS = 100
+SAME_RUBBER = "the rubber of all variants is as warm; flipflow study finds that of each."
 
 
 def sensitivity(
@@ -70,10 +71,14 @@ def sensitivity(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.io.vary import read_vary  # noqa: PLC0415
+    from flipflow.model.screen import of_air  # noqa: PLC0415
 
-    project = in_case(load_project(file, force=force), case)
+    empty = load_project(file, force=force)
+    project = in_case(empty, case, speed)
     for warning in project.warnings:
         typer.echo(f"Warning: {warning}", err=True)
+    if any(load.name == case and of_air(load) for load in empty.load_cases):
+        typer.echo(f"Note: {SAME_RUBBER}", err=True)
     ranges = read_vary(vary or [], project.screen)
     omega = _omega(project, quantity, speed, speeds)
     options = {"n": n, "rng": seed, "branch": branch}

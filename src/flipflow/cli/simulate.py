@@ -62,7 +62,7 @@ def simulate(
     from flipflow.transient.history import thinned  # noqa: PLC0415
     from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
 
-    project = in_case(load_project(file, force=force), case)
+    project = in_case(load_project(file, force=force), case, speed)
     omega = speed_of(project, speed)
     blows = _blows(impulse or (), periods * 2.0 * math.pi / omega)
     with Destination(output, json, [file]) as target:

@@ -79,7 +79,7 @@ def startup(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = in_case(load_project(file, force=force), case)
+    project = in_case(load_project(file, force=force), case, speed)
     if profile is not None:
         given = {"--speed": speed, "--motor-power": motor_power, "--inertia": inertia}
         _refuse_beside_profile(given | {"--duration": duration})

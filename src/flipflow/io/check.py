@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from flipflow.io.derived import Derived, derive
 from flipflow.io.layout import SECTIONS, SPEED, Entry, unchecked_without
@@ -14,6 +15,9 @@ from flipflow.model.fields import FIELD, FIELDS
 from flipflow.model.limits import LIMIT_FIELDS
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, needing
+
+if TYPE_CHECKING:
+    from flipflow.studies.rubber_temperature import WarmedLoad
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,11 @@ class Speed:
 
 @dataclass(frozen=True)
 class Case:
-    """What a load case does to the machine."""
+    """What a load case does to the machine at work.
+
+    ``temperature`` is the one that the file gives; where it is the air's, ``rubber`` is that at
+    which the rubber settles at working speed, None where it is not known.
+    """
 
     name: str
     stiffness_factor: float
@@ -53,6 +61,7 @@ class Case:
     stop_stiffness_factor: float = 1.0
     stop_damping_factor: float = 1.0
     temperature_of: str = "rubber"
+    rubber: float | None = None
 
 
 @dataclass(frozen=True)
@@ -77,15 +86,18 @@ class Check:
     assumed: tuple[str, ...]
     missing: tuple[Gap, ...]
     warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
-def check_project(project: Project) -> Check:
+def check_project(project: Project, warmed: Sequence[WarmedLoad] | None = None) -> Check:
     """Collect what a machine file says and leaves open.
 
     Parameters
     ----------
     project
         A loaded machine file.
+    warmed
+        Its load cases with the temperature of the rubber; None: it is found at working speed.
 
     Returns
     -------
@@ -94,6 +106,7 @@ def check_project(project: Project) -> Check:
         and what is missing.
     """
     derived = derive(project.screen)
+    loads = _warmed(project) if warmed is None else warmed
     return Check(
         name=project.document.name,
         values=tuple(_values(project)),
@@ -101,10 +114,11 @@ def check_project(project: Project) -> Check:
         speeds=tuple(_speeds(project, derived)),
         static_amplitude=derived.static_amplitude,
         damping_ratios=derived.damping_ratios,
-        load_cases=tuple(_cases(project)),
+        load_cases=tuple(_cases(project, loads)),
         assumed=project.assumed,
         missing=tuple(_missing(project)),
         warnings=project.warnings,
+        notes=tuple(one.note for one in loads if one.note),
     )
 
 
@@ -151,22 +165,29 @@ def _speeds(project: Project, derived: Derived) -> Iterator[Speed]:
             yield Speed(name, meaning, omega, hz, rpm)
 
 
-def _cases(project: Project) -> Iterator[Case]:
+def _warmed(project: Project) -> Sequence[WarmedLoad]:
+    from flipflow.studies.rubber_temperature import warmed_load  # noqa: PLC0415  slow to import
+
+    return [warmed_load(project.screen, load, project.speed) for load in project.load_cases]
+
+
+def _cases(project: Project, loads: Sequence[WarmedLoad]) -> Iterator[Case]:
     screen, sources = project.screen, project.sources
-    for load in project.load_cases:
-        warm = screen.temperature_stiffness_factor(load.temperature)
+    for load, warmed in zip(project.load_cases, loads, strict=True):
+        held = warmed.load.temperature
         yield Case(
             name=load.name,
-            stiffness_factor=load.stiffness_factor * warm,
+            stiffness_factor=load.stiffness_factor * screen.temperature_stiffness_factor(held),
             damping_factor=load.damping_factor,
             main_mass=load.main_mass,
             floating_mass=load.floating_mass,
             temperature=load.temperature,
             source=sources.get(f"load_cases.{load.name}", sources.get("load_cases", "")),
             stop_stiffness_factor=load.stop_stiffness_factor
-            * screen.stop_temperature_stiffness_factor(load.temperature),
+            * screen.stop_temperature_stiffness_factor(held),
             stop_damping_factor=load.stop_damping_factor,
             temperature_of=load.temperature_of,
+            rubber=warmed.rubber,
         )
 
 

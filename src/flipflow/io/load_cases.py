@@ -9,7 +9,7 @@ from flipflow.errors import InputError
 from flipflow.io.layout import LOAD_FIELDS, MATERIAL, MATERIAL_PER_AREA, SECTIONS, refuse_unknown
 from flipflow.io.units import measured
 from flipflow.io.values import LEFT_OUT, Notes, Table, read_number, read_text
-from flipflow.model.screen import FlipFlowScreen, Load, TemperatureOf
+from flipflow.model.screen import FlipFlowScreen, Load, TemperatureOf, as_cool_as_air
 
 
 def read_load_cases(tables: list[Table], screen: FlipFlowScreen, notes: Notes) -> tuple[Load, ...]:
@@ -52,7 +52,7 @@ def _read_case(table: Table, label: str, screen: FlipFlowScreen, notes: Notes) -
             notes.written[f"{label}, {key}"] = written
     load = Load(name=name, **values)
     try:
-        screen.loaded(load)
+        screen.loaded(as_cool_as_air(load))
     except InputError as error:
         written = table.get(error.field, error.value)
         raise InputError(f"{label}, {error.field}", written, error.remedy) from None

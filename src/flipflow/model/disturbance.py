@@ -12,7 +12,7 @@ from flipflow.model.arguments import (
     checked_positive,
     checked_word,
 )
-from flipflow.model.screen import Load
+from flipflow.model.screen import Load, refuse_air
 from flipflow.model.system import Coordinate, checked_coordinate
 
 MOST_IMPULSE = 1e6
@@ -69,6 +69,7 @@ class LoadStep:
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", _time(self.t))
         checked_kind("load", self.load, Load, "give an ff.Load, as ff.Load(main_mass=50)")
+        refuse_air(self.load)
 
 
 @dataclass(frozen=True)

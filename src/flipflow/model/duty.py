@@ -93,7 +93,8 @@ class Duty:
     free
         Fields that may be chosen: an interval (low, high), or ``ff.Choice`` of values.
     load_cases
-        The loads; those of the machine file where none are given.
+        The loads; those of the machine file where none are given. Under one that gives the air's
+        temperature, each candidate's rubber is as warm as its own work keeps it.
     temperatures
         Temperatures of the rubber in degrees Celsius with which every load case is combined.
     scatter
@@ -238,7 +239,12 @@ class Duty:
         if not self.temperatures:
             return self.load_cases
         return tuple(
-            replace(load, temperature=degrees, name=f"{load.name or 'empty'}, {degrees:g} degC")
+            replace(
+                load,
+                temperature=degrees,
+                temperature_of="rubber",
+                name=f"{load.name or 'empty'}, {degrees:g} degC",
+            )
             for load, degrees in itertools.product(self.load_cases, self.temperatures)
         )
 

@@ -39,6 +39,10 @@ LOADED = (
     "stop_damping",
 )  # fmt: skip
 DEGREES = "give a finite number of degrees Celsius, or None"
+AIR = (
+    "no speed is known here at which the rubber's own work warms it; give the rubber's "
+    "temperature, or take the load from ff.assess(project).cases"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +60,10 @@ class Load:
     temperature
         Temperature of the rubber in degrees Celsius; needs the screen's temperature table.
     temperature_of
-        ``"rubber"``, or ``"air"``: :func:`flipflow.assess` then adds what the shear springs are
-        warmer at working speed, where their conductance is known.
+        ``"rubber"``, or ``"air"``: the shear springs are then as much warmer as their work at a
+        speed keeps them, where their conductance is known. What is asked at a speed
+        (:func:`flipflow.assess`, :func:`flipflow.study`, :func:`flipflow.design`,
+        :func:`flipflow.design_map`) finds that temperature; what knows no speed refuses the load.
     name
         What the case is called in reports.
     """
@@ -201,6 +207,12 @@ class FlipFlowScreen:
 
         What the floating frame carries hangs on the shear springs of the load case. The weight
         that hung there before stays where it was measured: the factors are dynamic ones.
+
+        Raises
+        ------
+        InputError
+            For a load that gives the air's temperature, for that of the rubber depends on the
+            speed: ``ff.assess(project).cases`` hold the screen as it is under each load.
         """
         checked_kind("load", load, Load, "give an ff.Load, such as ff.Load(stiffness_factor=1.1)")
         return self.replace(
@@ -306,13 +318,44 @@ def _equations(screen: FlipFlowScreen) -> MechanicalSystem:
     )
 
 
-def loaded_values(screen: FlipFlowScreen, load: Load, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of fields of a screen, numbers or arrays in SI, as they are under a load."""
+def of_air(load: Load) -> bool:
+    """Whether the rubber is warmer than the temperature that a load gives."""
+    return load.temperature is not None and load.temperature_of == "air"
+
+
+def refuse_air(load: Load) -> None:
+    """See that a load does not leave the temperature of the rubber to the speed."""
+    if of_air(load):
+        raise InputError("temperature_of", load.temperature_of, AIR)
+
+
+def as_cool_as_air(load: Load) -> Load:
+    """The load with the rubber as warm as the temperature it gives, whosever that is."""
+    return dataclasses.replace(load, temperature_of="rubber")
+
+
+def loaded_values(
+    screen: FlipFlowScreen,
+    load: Load,
+    values: Mapping[str, Any],
+    rubber: NDArray[Any] | None = None,
+) -> dict[str, Any]:
+    """Values of fields of a screen, numbers or arrays in SI, as they are under a load.
+
+    ``rubber`` is the temperature of the rubber beside each value of an array, where the load does
+    not give it; beyond the ends of a table the stiffness stays.
+    """
+    if rubber is None:
+        refuse_air(load)
     carried = {"main_mass": load.main_mass, "floating_mass": load.floating_mass}
-    stop = screen.stop_temperature_stiffness_factor(load.temperature)
+    if rubber is None:
+        shear = screen.temperature_stiffness_factor(load.temperature)
+        stop = screen.stop_temperature_stiffness_factor(load.temperature)
+    else:
+        shear = _factors_at(screen.temperature_factor, rubber)
+        stop = _factors_at(screen.stop_temperature_factor, rubber)
     factors = {
-        "shear_stiffness": load.stiffness_factor
-        * screen.temperature_stiffness_factor(load.temperature),
+        "shear_stiffness": load.stiffness_factor * shear,
         "shear_damping": load.damping_factor,
         "stop_stiffness": load.stop_stiffness_factor * stop,
         "stop_damping": load.stop_damping_factor,
@@ -323,13 +366,17 @@ def loaded_values(screen: FlipFlowScreen, load: Load, values: Mapping[str, Any])
 
 
 def loaded_columns(
-    screen: FlipFlowScreen, load: Load, columns: Mapping[str, NDArray[Any]]
+    screen: FlipFlowScreen,
+    load: Load,
+    columns: Mapping[str, NDArray[Any]],
+    rubber: NDArray[Any] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Columns of values of many screens as they are under a load, beside ``screen.loaded(load)``.
 
     Where a varied field moves the rest between the stops, a column of ``measured_shift`` is added.
+    ``rubber`` is as of :func:`loaded_values`.
     """
-    found = loaded_values(screen, load, columns)
+    found = loaded_values(screen, load, columns, rubber)
     moving = {"floating_mass", "shear_stiffness", "deck_angle"} & set(columns)
     drawn = screen.measured_shift is None and screen.clearance_measured == "drawn"
     if not moving or not (drawn or load.floating_mass):
@@ -341,7 +388,8 @@ def loaded_columns(
         return np.where(np.isnan(values), 0.0, values)  # a deck whose angle is not known is flat
 
     fall, stiffness = GRAVITY * np.sin(column("deck_angle")), column("shear_stiffness")
-    springs = loaded_values(screen, load, {"shear_stiffness": stiffness})["shear_stiffness"]
+    under = loaded_values(screen, load, {"shear_stiffness": stiffness}, rubber)
+    springs = under["shear_stiffness"]
     before = column("floating_mass") * fall / stiffness if drawn else screen.gap_shift
     shift = np.asarray(before + load.floating_mass * fall / springs)
     rows = len(next(iter(columns.values())))
@@ -358,6 +406,18 @@ def _factor_at(table: tuple[tuple[float, float], ...], temperature: float, whose
             f"stay within the {whose} table, {degrees[0]:g} to {degrees[-1]:g} degC",
         )
     return float(np.interp(temperature, degrees, factors))
+
+
+def _factors_at(table: tuple[tuple[float, float], ...], rubber: NDArray[Any]) -> Any:
+    """Factors at temperatures, with their slope along an imaginary part; 1 without a table."""
+    if not table:
+        return 1.0
+    degrees, factors = map(np.array, zip(*table, strict=True))
+    found = np.interp(rubber.real, degrees, factors)
+    if not np.iscomplexobj(rubber):
+        return found
+    slopes = np.concatenate([[0.0], np.diff(factors) / np.diff(degrees), [0.0]])
+    return found + 1j * rubber.imag * slopes[np.searchsorted(degrees, rubber.real)]
 
 
 def is_screen(machine: object) -> bool:

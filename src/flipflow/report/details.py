@@ -31,6 +31,7 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.first_page import OVERLEAF_TITLE, overleaf, packed
 from flipflow.report.numbers import four_digits, named
+from flipflow.report.parts import warmed_loads
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
 
@@ -74,7 +75,7 @@ def machine(assessment: Assessment) -> Iterator[Block]:
 @section(Assessment, Part.DETAILS, 20)
 def parameters(assessment: Assessment) -> Iterator[Block]:
     """All values of the machine file with their sources."""
-    check = check_project(assessment.project)
+    check = check_project(assessment.project, list(warmed_loads(assessment)))
     titles = ("Value", "Symbol", "As written", "Source")
     columns = tuple(Column(title) for title in titles)
     rows = tuple(_parameter(value) for value in check.values)
@@ -196,8 +197,12 @@ def _derived(check: Check) -> Table:
     return Table("Speeds that follow", columns, rows, "Empty machine, no stop touched.")
 
 
-def _of_air(case: Case) -> str:
-    return " (air)" if case.temperature_of == "air" else ""
+def _temperature(case: Case) -> str:
+    """Temperature as the file gives it, and that of the rubber at work where it is another."""
+    if case.temperature is None:
+        return "-"
+    rubber = "" if case.rubber is None else f", rubber {case.rubber:.3g}"
+    return f"{case.temperature:.4g}" + (f" (air){rubber}" if case.temperature_of == "air" else "")
 
 
 def _load_cases(cases: tuple[Case, ...]) -> Table:
@@ -218,13 +223,14 @@ def _load_cases(cases: tuple[Case, ...]) -> Table:
             *(f"{x:.4g}" for x in (case.stiffness_factor, case.damping_factor)),
             *(f"{x:.4g}" for x in (case.stop_stiffness_factor, case.stop_damping_factor)),
             *(f"{x:.4g}" for x in (case.main_mass, case.floating_mass)),
-            "-" if case.temperature is None else f"{case.temperature:.4g}{_of_air(case)}",
+            _temperature(case),
             case.source,
         )
         for case in cases
     )
     caption = (
         "What each case does to the shear springs (k2, c2) and the stops (k3, c3), and adds to the "
-        "frames. A temperature is the rubber's unless it says air."
+        "frames. A temperature is the rubber's unless it says air; the factors are those of the "
+        "rubber at work."
     )
     return Table("Load cases", columns, rows, caption)

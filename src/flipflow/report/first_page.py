@@ -355,10 +355,14 @@ def _case_row(case: CaseAssessment) -> tuple[Cell, ...]:
 
 
 def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
-    """The first quantity's worst value and case, then the others in that case."""
+    """Quantities in the case in which the last of them that is known is worst."""
     first = names[0]
-    found = [(v, c) for c in assessment.cases if (v := c.values.get(first)) is not None]
-    if not found:
+    known = [
+        [(v, c) for c in assessment.cases if (v := c.values.get(name)) is not None]
+        for name in names
+    ]
+    found = next(filter(None, reversed(known)), None)
+    if found is None:
         screen = assessment.project.screen
         missing = QUANTITIES[first].missing(screen)
         return f"not checked, {missing_words(missing)}" if missing else "not checked"

@@ -8,10 +8,12 @@ from typing import NamedTuple
 from flipflow.model.fields import FIELD
 from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES, missing_words
+from flipflow.model.screen import of_air
 from flipflow.report.blocks import Block, Cell, Column, Note, Table
 from flipflow.report.numbers import NOTHING, named, number
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
+from flipflow.studies.rubber_temperature import RISE, WITHIN, WarmedLoad, settled_at_work
 
 EQUATION = "Minerals 2024, 14, 406, Eq. (1)"
 STOP_LAW = "Minerals 2024, 14, 406, Eq. (2), and the law chosen"
@@ -72,7 +74,14 @@ def parts(assessment: Assessment) -> Iterator[Block]:
         f"fz = {number(screen.bearing_load_factor)}, p = {number(screen.bearing_life_exponent)}."
     )
     yield Table("Parts", columns, rows, caption)
-    yield from (Note(text) for text in _notes(assessment, cases))
+    yield from (Note(text) for text in _notes(assessment))
+
+
+def warmed_loads(assessment: Assessment) -> Iterator[WarmedLoad]:
+    """The load cases with the temperature at which the rubber settles."""
+    for given, case in zip(assessment.project.load_cases, assessment.cases, strict=True):
+        rise = case.values.get(RISE)
+        yield settled_at_work(assessment.project.screen, given, case.load, rise)
 
 
 def _row(assessment: Assessment, cases: list[CaseAssessment], one: PartRow) -> tuple[Cell, ...]:
@@ -88,23 +97,25 @@ def _row(assessment: Assessment, cases: list[CaseAssessment], one: PartRow) -> t
     return Cell(one.part), Cell(label), Cell(named(one.name, value)), Cell(case.name), formula
 
 
-def _notes(assessment: Assessment, cases: list[CaseAssessment]) -> Iterator[str]:
+def _notes(assessment: Assessment) -> Iterator[str]:
     screen = assessment.project.screen
     if screen.weight_considered and screen.shear_pieces:
         yield (
             "The weight of the floating frame, which the shear springs bear at rest, is not part "
             "of their force and strain."
         )
-    given = {load.name: load for load in assessment.project.load_cases}
-    for case in cases:
-        load, rubber = given.get(case.load.name), case.load.temperature
-        if load is None or rubber is None:
+    given = assessment.project.load_cases
+    for load, warmed, case in zip(given, warmed_loads(assessment), assessment.cases, strict=True):
+        if load.temperature is None or not case.values:
             continue
-        whose = "the air's" if load.temperature_of == "air" else "the rubber's"
+        whose = "the air's" if of_air(load) else "the rubber's"
         name = case_words(case.name, capital=True)
-        text = f"{name}: {number(load.temperature or 0.0)} degC is {whose} temperature"
-        if load.temperature_of == "air" and rubber != load.temperature:
-            text += f"; the rubber settles at {number(rubber)} degC"
+        text = f"{name}: {number(load.temperature)} degC is {whose} temperature"
+        if warmed.rubber is not None:
+            text += f"; the rubber settles at {number(warmed.rubber)} degC"
+            held = warmed.load.temperature or 0.0
+            if abs(warmed.rubber - held) > WITHIN:
+                text += f", its stiffness is that at {number(held)} degC"
         yield f"{text}."
     if screen.shear_conductance is None:
         key = FIELD["shear_conductance"].key

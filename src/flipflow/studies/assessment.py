@@ -220,6 +220,9 @@ def assess(
 ) -> Assessment:
     """Judge a project: operating region, feasible window, every case against every limit.
 
+    Where a case gives the air's temperature, the rubber is as warm as its work at working speed
+    keeps it, at every speed.
+
     Parameters
     ----------
     project

@@ -23,6 +23,7 @@ from flipflow.model.limits import limit_bounds
 from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.vary import Choice, Interval
+from flipflow.studies.rubber_temperature import warmed_load
 from flipflow.studies.study_values import evaluate_loaded, jump_distance_loaded, one_motion_loaded
 
 Real = NDArray[np.float64]
@@ -318,7 +319,7 @@ class Space:
         loads = self.duty.loads
 
         def own(load: Load) -> float:
-            loaded = self.screen.loaded(load)
+            loaded = self._under(load)
             return loaded.shear_stiffness / loaded.floating_mass
 
         ends = (min(loads, key=own), max(loads, key=own))
@@ -381,8 +382,13 @@ class Space:
     @cached_property
     def _even(self) -> bool:
         """Whether the machine is the same on both sides under every load."""
-        loaded = (self.screen.loaded(load) for load in self.duty.loads)
+        loaded = map(self._under, self.duty.loads)
         return all(one.system().symmetric for one in loaded)
+
+    def _under(self, load: Load) -> FlipFlowScreen:
+        """The machine to begin with under a load, its rubber as warm as its work keeps it."""
+        omega = float(self.duty.speeds.mean())
+        return self.screen.loaded(warmed_load(self.screen, load, omega).load)
 
     def _off_target(self, amplitude: Real) -> Real:
         """By how much the farthest amplitude misses the tolerance, as a share of the target."""

@@ -26,6 +26,7 @@ from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, Response, analysed_range, landmarks
 from flipflow.studies.loading import amplitude_from_below
+from flipflow.studies.rubber_temperature import warmed_load
 
 Real = NDArray[np.float64]
 GAP, STIFFNESS, OMEGA = "clearance", "stop_stiffness", "omega"
@@ -106,7 +107,9 @@ def design_map(
     clearance, stop_stiffness
         Gaps in m and stiffnesses in N/m, at least two each.
     load
-        Load under which the amplitude is compared with that of the empty machine.
+        Load under which the amplitude is compared with that of the empty machine. It doubles the
+        time; with the air's temperature, at which the rubber of each pair settles first, it takes
+        several times as long.
     monitor
         Called with a sentence and the share done; raise from it to cancel.
 
@@ -129,9 +132,10 @@ def design_map(
     starts: list[SpecialPoint] = []
     begins: SpecialPoint | None = None
     for j, stiffness in enumerate(stops):
-        say(f"stop of {stiffness:.4g} N/m", CURVES_SHARE * j / stops.size)
         row, fold = [], None
-        for gap in gaps:
+        for k, gap in enumerate(gaps):
+            done = (j * gaps.size + k) / (stops.size * gaps.size)
+            say(f"stop of {stiffness:.4g} N/m, gap of {gap:.4g} m", CURVES_SHARE * done)
             one = screen.replace(clearance=float(gap), stop_stiffness=float(stiffness))
             branch = Response(one, analysed_range(one, omega)).branch
             marks = landmarks(one, branch)
@@ -167,7 +171,7 @@ def _cell(
 ) -> tuple[float, ...]:
     amplitude, share = amplitude_from_below(branch, omega, "relative"), math.nan
     if load is not None:
-        loaded = one.loaded(load)
+        loaded = one.loaded(warmed_load(one, load, omega).load)
         under = Response(loaded, analysed_range(loaded, omega)).branch
         share = amplitude_from_below(under, omega, "relative") / amplitude
     known = (marks.omega_cs, marks.omega_lb, marks.omega_ub)

@@ -205,7 +205,8 @@ def loading(
     ------
     InputError
         For anything but a screen and a load, an interval beside the operating region, or a load
-        that the screen has no data for.
+        that the screen has no data for, or that gives the air's temperature: it depends on the
+        speed how much warmer the rubber is.
     IncompleteError
         When no branch could be started, none reaches the operating region, or there is none.
     """

@@ -134,8 +134,9 @@ def operating_region(
     Raises
     ------
     InputError
-        For anything but a screen, whose frames the region speaks of, limits and loads, and for a
-        bad interval.
+        For anything but a screen, whose frames the region speaks of, limits and loads, for a bad
+        interval, and for a load that gives the air's temperature: it depends on the speed how
+        much warmer the rubber is.
     """
     if not isinstance(screen, FlipFlowScreen):
         raise InputError("screen", type(screen).__name__, "give a FlipFlowScreen")

@@ -30,11 +30,12 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord
 from flipflow.model.sampling import Sample
-from flipflow.model.screen import Load
+from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Machine
 from flipflow.model.vary import Distribution, Vary
 from flipflow.results.result import Result
 from flipflow.studies.lane_values import slope_key
+from flipflow.studies.rubber_temperature import air_notes
 from flipflow.studies.study_plan import (
     HIGH,
     LOW,
@@ -199,7 +200,9 @@ def study(
         Frequencies in rad/s, one or (F,); may be left out where only quantities of a whole
         response are asked for.
     load_cases
-        Loads that every machine must bear; none: as it is, "empty".
+        Loads that every machine must bear; none: as it is, "empty". Under one that gives the
+        air's temperature, each machine's rubber is as warm as its own work keeps it at each
+        frequency.
     sampling
         ``"grid"``: every combination of values; ``"list"``: the k-th values of all arrays
         together; :class:`~flipflow.Sample`: draws from the distributions. None: a grid where
@@ -229,7 +232,8 @@ def study(
     ------
     InputError
         For an unknown field or quantity, a range that physics forbids, loads of a machine that
-        takes none, a grid of an interval, and derivatives of a quantity that is not of a motion.
+        takes none, a grid of an interval, and derivatives of a quantity that is not of a motion;
+        for the air's temperature with a quantity of a whole response at other than one frequency.
     IncompleteError
         When the workers are gone; finished chunks stay in the store.
     StoreError
@@ -424,6 +428,8 @@ def _study(plan: Plan, values: Arrays, reference: Arrays, notes: tuple[str, ...]
 
 def _notes(plan: Plan, reason: NDArray[np.int8]) -> Iterator[str]:
     sample = plan.design.sample
+    if isinstance(plan.machine, FlipFlowScreen):
+        yield from air_notes(plan.machine, plan.loads)
     if sample is not None and sample.method == "sobol" and sample.n & (sample.n - 1):
         yield f"n = {sample.n} is no power of two: the sample covers the ranges less evenly."
     waiting = (reason == NOT_COMPUTED).any(axis=(1, 2))

@@ -22,10 +22,11 @@ from flipflow.model.arguments import (
     members_of,
 )
 from flipflow.model.fields import FIELD
+from flipflow.model.load_case import case_words
 from flipflow.model.parameters import differentiable, value_of
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.sampling import Columns, Design, Sample, design_of, digest_of
-from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.screen import FlipFlowScreen, Load, as_cool_as_air, of_air
 from flipflow.model.system import Machine, system_of
 from flipflow.model.vary import Choice, Distribution, Variation, Vary
 from flipflow.studies.documents import CODEC
@@ -245,6 +246,7 @@ def plan_of(
         remedy = "give the frequencies at which the quantities are meant, one or (n_omega,)"
         frequencies = checked_speeds(omega, remedy)
     loads = _loads(load_cases, machine)
+    _refuse_air(loads, asked, frequencies)
     return Plan(
         machine, design, loads, tuple(one.name for one in asked), frequencies,
         branch,  # type: ignore[arg-type]
@@ -369,8 +371,21 @@ def _loads(load_cases: object, machine: Machine) -> tuple[Load, ...]:
     for k, load in enumerate(loads):
         if names[k] in names[:k]:
             raise InputError("load_cases", load.name, "another case has this name, give each one")
-        machine.loaded(load)
+        machine.loaded(as_cool_as_air(load))
     return loads or (Load(name=UNLOADED),)
+
+
+def _refuse_air(loads: tuple[Load, ...], asked: Sequence[Quantity], omega: Real) -> None:
+    """See that it is known at which speed the rubber gets warm, for what belongs to no speed."""
+    airy = next((load for load in loads if of_air(load)), None)
+    whole = next((one for one in asked if one.of == "response"), None)
+    if airy is None or whole is None or (omega.size == 1 and np.isfinite(omega[0])):
+        return
+    remedy = (
+        f"ask for {whole.name} at one speed, the working speed: the rubber gets as warm as its "
+        "work there keeps it"
+    )
+    raise InputError(f"temperature_of of {case_words(airy.name)}", airy.temperature_of, remedy)
 
 
 def unit_of(machine: Machine, name: str) -> str:

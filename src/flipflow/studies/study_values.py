@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +15,14 @@ from flipflow.batch.reasons import (
     INCOMPLETE,
     NO_MOTION,
     REFUSED,
+    UNSETTLED,
 )
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
 from flipflow.model.parameters import with_values
 from flipflow.model.quantities import BranchWord, Quantity, quantity_named
 from flipflow.model.sampling import Columns
-from flipflow.model.screen import FlipFlowScreen, Load, loaded_columns
+from flipflow.model.screen import FlipFlowScreen, Load, loaded_columns, of_air
 from flipflow.model.system import Machine
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
 from flipflow.studies.lane_values import (
@@ -31,6 +34,13 @@ from flipflow.studies.lane_values import (
     with_own,
 )
 from flipflow.studies.quantity_values import number_or_nan
+from flipflow.studies.rubber_temperature import (
+    RISE,
+    settled,
+    table_ends,
+    warmed_load,
+    warming_known,
+)
 from flipflow.studies.sensitivity_samples import (
     STOP_FIELDS,
     Question,
@@ -122,14 +132,186 @@ def evaluate_loaded(
     threads: int = 1,
     names: Sequence[str] = (),
 ) -> Values:
-    """As :func:`evaluate`, of the machines under a load; the columns hold what they are without."""
+    """As :func:`evaluate`, of the machines under a load; the columns hold what they are without.
+
+    Where the load gives the air's temperature, the rubber of each machine is as warm as its own
+    work keeps it at each frequency, and derivatives hold what a parameter does to that, too.
+    """
     if load is None or not isinstance(machine, FlipFlowScreen):
         return evaluate(machine, columns, quantities, omega, branch, threads, names)
-    columns = with_own(machine, columns, names)
-    loaded = _loaded(machine, load, columns)
-    moved = _moved_by(machine, load, columns, names)
+    if not of_air(load):
+        under = _Under(machine, load, columns)
+        return _evaluate_under(under, quantities, omega, branch, threads, names)
+    told = [
+        _evaluate_warm(machine, load, columns, quantities, at, branch, threads, names)
+        for at in np.split(omega, omega.size)
+    ]
+    values = {key: np.concatenate([one[key] for one, _ in told], axis=1) for key in told[0][0]}
+    return values, np.concatenate([why for _, why in told], axis=1)
+
+
+def jump_distance_loaded(
+    screen: FlipFlowScreen, columns: Columns, load: Load, omega: Real, most: float, threads: int
+) -> Real:
+    """Distances (L, F) of :func:`~flipflow.studies.lane_values.jump_distance` under a load."""
+    told = []
+    for at in np.split(omega, omega.size):
+        under = _at_work(screen, load, columns, at, "from-below", threads)
+        span, speed = _span(under.near, omega), float(at[0])
+        told.append(jump_distance(under.near, under.columns, speed, most, span, threads))
+    return np.stack(told, axis=1)
+
+
+def one_motion_loaded(
+    screen: FlipFlowScreen, columns: Columns, load: Load, omega: Real, threads: int
+) -> NDArray[np.bool_]:
+    """:func:`~flipflow.studies.lane_values.one_motion` under a load."""
+    told = []
+    for at in np.split(omega, omega.size) if of_air(load) else [omega]:
+        under = _at_work(screen, load, columns, at, "from-below", threads)
+        span = _span(under.near, omega)
+        told.append(one_motion(under.near, under.columns, at, span, threads))
+    return np.concatenate(told, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Under:
+    """Screens under a load.
+
+    Parameters
+    ----------
+    screen
+        The screen whose parameters the columns replace, without the load.
+    load
+        The load, the rubber as warm as that of this screen.
+    own
+        Columns of what the screens are without the load.
+    rubber
+        Temperature of the rubber of each in degrees Celsius, (L,); None: that of the load.
+    """
+
+    screen: FlipFlowScreen
+    load: Load
+    own: Columns
+    rubber: Real | None = None
+
+    @cached_property
+    def near(self) -> FlipFlowScreen:
+        """The screen under the load, whose motions are first guesses."""
+        return self.screen.loaded(self.load)
+
+    @property
+    def columns(self) -> Columns:
+        """The columns as they are under the load."""
+        return self._loaded(self.own, self.rubber)
+
+    def moved_by(self, names: Sequence[str]) -> dict[str, Real]:
+        """Derivatives of fields under the load with respect to fields without it, (L, P) each.
+
+        By complex steps through the formulas of loads. The last of (L, P + 1) is with respect to
+        the temperature of the rubber, where each screen has its own.
+        """
+        steps = [(dict(self.own) | {k: self.own[k] + 1j * TILT}, self.rubber) for k in names]
+        if self.rubber is not None:
+            low, high = table_ends(self.screen)
+            inside = (self.rubber > low) & (self.rubber < high)
+            steps.append((dict(self.own), self.rubber + 1j * TILT * inside))
+        moved: dict[str, Real] = {}
+        for p, step in enumerate(steps):
+            for name, column in self._loaded(*step).items():
+                if np.iscomplexobj(column):
+                    moved.setdefault(name, np.zeros((column.size, len(steps))))
+                    moved[name][:, p] = column.imag / TILT
+        return moved
+
+    def _loaded(self, own: Columns, rubber: NDArray[Any] | None) -> Columns:
+        loaded = loaded_columns(self.screen, self.load, own, rubber)
+        if not self.screen.has_stop and not STOP_FIELDS & set(own):
+            loaded.pop("measured_shift", None)
+        return loaded
+
+
+def _at_work(
+    screen: FlipFlowScreen,
+    load: Load,
+    columns: Columns,
+    omega: Real,
+    branch: BranchWord,
+    threads: int,
+) -> _Under:
+    """Screens under a load at a frequency, (1,), the rubber of each as warm as its work keeps it.
+
+    Its temperature is NaN where it does not settle.
+    """
+    near = warmed_load(screen, load, float(omega[0])).load
+    if not of_air(load) or not warming_known(screen):
+        return _Under(screen, near, columns)
+    warmed = ["shear_stiffness"]
+    if screen.stop_temperature_factor and (screen.has_stop or "stop_stiffness" in columns):
+        warmed.append("stop_stiffness")
+    own = with_own(screen, columns, warmed)
+    ends = table_ends(screen)
+
+    def warmer(rubber: Real, left: NDArray[np.int64]) -> Real:
+        rows = {name: column[left] for name, column in own.items()}
+        under = _Under(screen, near, rows, np.clip(rubber, *ends))
+        return _evaluate_under(under, (RISE,), omega, branch, threads)[0][RISE][:, 0]
+
+    air = np.full(len(own["shear_stiffness"]), load.temperature, float)
+    return _Under(screen, near, own, np.clip(settled(air, warmer), *ends))
+
+
+def _evaluate_warm(
+    screen: FlipFlowScreen,
+    load: Load,
+    columns: Columns,
+    quantities: Sequence[str],
+    omega: Real,
+    branch: BranchWord,
+    threads: int,
+    names: Sequence[str],
+) -> Values:
+    """Quantities at a frequency, (1,), of screens of which the air's temperature is known."""
+    found = _at_work(screen, load, columns, omega, branch, threads)
+    if found.rubber is None:
+        return _evaluate_under(found, quantities, omega, branch, threads, names)
+    lost = np.isnan(found.rubber)
+    found = replace(found, rubber=np.nan_to_num(found.rubber, nan=float(load.temperature or 0.0)))
+    asked = [*quantities, *([RISE] if names and RISE not in quantities else [])]
+    values, reasons = _evaluate_under(found, asked, omega, branch, threads, names)
+    if names:
+        # T = air + rise(p, T), so that dT/dp = rise_p / (1 - rise_T).
+        rise = values[slope_key(RISE)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            warming = rise[..., :-1] / (1.0 - rise[..., -1:])
+        for key in map(slope_key, asked):
+            of_rubber = values[key][..., -1:]
+            more = np.where(of_rubber != 0.0, of_rubber * warming, 0.0)
+            values[key] = values[key][..., :-1] + more
+    kept = {*quantities, *map(slope_key, quantities)}
+    values = {key: table for key, table in values.items() if key in kept}
+    reasons[lost[:, None] & (reasons == FOUND)] = UNSETTLED
+    for table in values.values():
+        table[lost] = np.nan
+    return values, reasons
+
+
+def _evaluate_under(
+    under: _Under,
+    quantities: Sequence[str],
+    omega: Real,
+    branch: BranchWord,
+    threads: int,
+    names: Sequence[str] = (),
+) -> Values:
+    """Quantities of screens under a load whose rubber has the temperature that is given.
+
+    Derivatives are (L, F, P), or (L, F, P + 1) as :meth:`_Under.moved_by` has them.
+    """
+    under = replace(under, own=with_own(under.screen, under.own, names))
+    moved = under.moved_by(names) if names else {}
     values, reasons = evaluate(
-        machine.loaded(load), loaded, quantities, omega, branch, threads, tuple(moved)
+        under.near, under.columns, quantities, omega, branch, threads, tuple(moved)
     )
     if names:
         changes = np.stack(list(moved.values()))[:, :, None]  # (loaded fields, rows, 1, P)
@@ -138,7 +320,7 @@ def evaluate_loaded(
             # What a parameter does not move may have no derivative.
             values[key] = np.where(changes != 0.0, terms, 0.0).sum(axis=0)
     # A mass below zero stays impossible with material on it.
-    fine = _fine({name: column for name, column in columns.items() if name in FIELD})
+    fine = _fine({name: column for name, column in under.own.items() if name in FIELD})
     refused = ~np.all(fine, axis=0) if fine else np.zeros(len(reasons), bool)
     reasons[refused] = REFUSED
     for table in values.values():
@@ -146,53 +328,10 @@ def evaluate_loaded(
     return values, reasons
 
 
-def jump_distance_loaded(
-    screen: FlipFlowScreen, columns: Columns, load: Load, omega: Real, most: float, threads: int
-) -> Real:
-    """Distances (L, F) of :func:`~flipflow.studies.lane_values.jump_distance` under a load."""
-    loaded, machine = _loaded(screen, load, columns), screen.loaded(load)
-    span = _span(machine, omega)
-    told = [jump_distance(machine, loaded, at, most, span, threads) for at in omega.tolist()]
-    return np.stack(told, axis=1)
-
-
-def one_motion_loaded(
-    screen: FlipFlowScreen, columns: Columns, load: Load, omega: Real, threads: int
-) -> NDArray[np.bool_]:
-    """:func:`~flipflow.studies.lane_values.one_motion` under a load."""
-    loaded, machine = _loaded(screen, load, columns), screen.loaded(load)
-    return one_motion(machine, loaded, omega, _span(machine, omega), threads)
-
-
 def _span(machine: Machine, omega: Real) -> tuple[float, float]:
     """The range analysed, widened to hold the frequencies."""
     low, high = analysed_range(machine)
     return min(low, 0.9 * float(omega.min())), max(high, 1.1 * float(omega.max()))
-
-
-def _loaded(screen: FlipFlowScreen, load: Load, columns: Columns) -> Columns:
-    """The columns of screens as they are under a load."""
-    loaded = loaded_columns(screen, load, columns)
-    if not screen.has_stop and not STOP_FIELDS & set(columns):
-        loaded.pop("measured_shift", None)
-    return loaded
-
-
-def _moved_by(
-    screen: FlipFlowScreen, load: Load, columns: Columns, names: Sequence[str]
-) -> dict[str, Real]:
-    """Derivatives of fields under a load with respect to fields without it, (rows, P) each.
-
-    By complex steps through the formulas of loads.
-    """
-    moved: dict[str, Real] = {}
-    for p, name in enumerate(names):
-        tilted = dict(columns) | {name: columns[name] + 1j * TILT}
-        for own, column in _loaded(screen, load, tilted).items():
-            if np.iscomplexobj(column):
-                moved.setdefault(own, np.zeros((column.size, len(names))))
-                moved[own][:, p] = column.imag / TILT
-    return moved
 
 
 def _fine(columns: Columns) -> list[NDArray[np.bool_]]:
