@@ -20,10 +20,8 @@ from flipflow.report.blocks import Note, Text, Verdict
 from flipflow.report.first_page import verdict_state
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess
-from flipflow.studies.drive_check import SWING, Demand, drive_findings, settled_speed
+from flipflow.studies.drive_check import SWING
 from flipflow.studies.held_angles import held_angles, starts_from_rest
-from flipflow.studies.start_and_blows import CaseRuns, Transients
-from flipflow.studies.start_sentence import does_it_start
 from reference.full_start import run
 
 pytestmark = pytest.mark.numerical
@@ -194,50 +192,6 @@ def test_the_worst_angle_counts(screen):
     assert ff.start_up(screen, drive, speed=WORKING).outcome == "reached"
     assert ahead.outcome == "not started"
     assert starts_from_rest(screen, drive, WORKING)[0].outcome == "not started"
-
-
-def test_counter_flow_is_weighed_as_with_flow(screen):
-    """The torque at rest against the unbalance, and no note that its weight is left out."""
-    weak = given(1500.0, starting_ratio=None, pull_up_ratio=None)
-    told = []
-    for rotation in ("with-flow", "counter-flow"):
-        machine = screen.replace(rotation=rotation)
-        demand = Demand(machine, WORKING, ((0.0, math.inf),), {}, lambda _speed: 0.0)
-        (rest,) = (one for one in drive_findings(weak, demand) if one.subject == "torque at rest")
-        told.append(rest.sentence)
-        run = ff.start_up(machine, weak, speed=WORKING)
-        assert run.outcome == "not started"
-        assert not any("Weight not considered" in note for note in run.notes)
-    assert told[0] == told[1]
-    assert "lifting the unbalance takes 40.9 N m" in told[0]
-
-
-def test_a_working_speed_that_is_not_allowed_is_no_fault_of_the_drive(screen):
-    """The ratio that keeps it cannot help; a speed that is allowed and not kept is told."""
-    drive = given(ratio=1.7)
-    settled = settled_speed(drive, Demand(screen, WORKING, (), {}, lambda _speed: 1000.0))
-    assert settled is not None
-    for share, told in ((1.0001, []), (0.9999, ["speed"])):
-        allowed = ((share * settled, math.inf),) if share > 1.0 else ((0.0, share * settled),)
-        demand = Demand(screen, 0.9998 * settled, allowed, {}, lambda _speed: 1000.0)
-        assert [one.subject for one in drive_findings(drive, demand)] == told
-
-
-def test_one_sentence_for_starts_that_differ(screen):
-    run = ff.start_up(screen, given(), speed=WORKING)
-    slow = dataclasses.replace(run.summary, time_to_speed=2.5, final_speed=0.99 * WORKING)
-    near = dataclasses.replace(run.summary, time_to_speed=None, final_speed=0.98 * WORKING)
-
-    def said_of(**starts):
-        cases = tuple(CaseRuns(name, one, None, {}, None, {}) for name, one in starts.items())
-        return does_it_start(Transients(False, run, None, None, {}, cases)).partition(": ")[2]
-
-    ends = f"{0.98 * 850.0:.0f} to {run.final_speed / RPM:.0f} rpm in every load case."
-    head = "it reaches 850 rpm in at most 2.5 s"
-    assert said_of(a=run.summary, b=slow, c=near) == f"{head}, but not quite in case c, then {ends}"
-    assert said_of(b=slow) == f"{head}, then {0.99 * 850.0:.0f} rpm."
-    both = said_of(c=near, d=near)
-    assert both == f"it comes near 850 rpm, then {0.98 * 850.0:.0f} rpm in every load case."
 
 
 def test_kloss_understates_a_cage_motor():

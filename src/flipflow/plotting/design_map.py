@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.model.numerals import rpm
 from flipflow.plotting.branches import field_axis
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
@@ -38,7 +39,7 @@ def design_map_figure(found: DesignMap) -> Figure:
             Trace("folds are born (cusp)", at[:, 0], at[:, 1], "point", "jump",
                   symbol="diamond-open")
         )  # fmt: skip
-    working = f"working speed {found.omega * RPM:.4g} rpm"
+    working = f"working speed {rpm(found.omega)} rpm"
     speed = Line("y", found.omega * RPM, working, "speed", "dashdot")
     panels = [
         Panel(axis, Axis("shaft speed", "rpm"), traces=tuple(traces), lines=(speed,)),

@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.dynamics.normal import normal_amplitude
-from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import Converter
 from flipflow.transient.run_up import AT_SPEED
@@ -201,7 +201,7 @@ def _beyond(speed: float, allowed: tuple[Interval, ...]) -> str:
         return ", and no speed is allowed"
     ends = [end for interval in allowed for end in interval]
     nearest = min(ends, key=lambda end: abs(end - speed))
-    return f", {'above' if speed > nearest else 'below'} the allowed {_rpm(nearest, 4)}"
+    return f", {'above' if speed > nearest else 'below'} the allowed {_rpm(nearest)}"
 
 
 def _at_rest(drive: Drive, demand: Demand) -> Finding | None:
@@ -257,5 +257,5 @@ def _down(ratio: float) -> str:
     return f"{math.floor(ratio / step + 1e-9) * step:.4g}"
 
 
-def _rpm(omega: float, digits: int = 4) -> str:
-    return f"{omega * RPM:.{digits}g} rpm"
+def _rpm(omega: float) -> str:
+    return f"{rpm(omega)} rpm"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from flipflow.model.constants import RPM
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.studies.drive_check import Finding
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 
@@ -60,7 +61,7 @@ def _success(found: Transients) -> str:
     times = [start.time_to_speed for _, start in told if start.time_to_speed is not None]
     if len(told) == 1 and not times:
         return f"it {run.verdict}"
-    wanted = f"{run.speed * RPM:.4g} rpm"
+    wanted = f"{rpm(run.speed)} rpm"
     reached = f"comes near {wanted}"
     if times:
         short = [name for name, start in told if start.time_to_speed is None]

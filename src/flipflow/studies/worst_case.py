@@ -188,8 +188,8 @@ def worst_case(
     """
     question = question_of(machine, quantity, omega, branch)
     for name, given in vary.items() if isinstance(vary, Mapping) else ():
-        if not isinstance(given, (tuple, list, Interval)):
-            remedy = "a worst case needs an interval (low, high), in SI"
+        if not isinstance(given, (tuple, Interval)):
+            remedy = "a worst case needs an interval as a tuple (low, high), in SI"
             raise InputError(f"vary {name}", given, remedy)
     varied = variations(vary, machine)
     names = tuple(one.name for one in varied)
