@@ -403,10 +403,11 @@ def test_the_gap_that_was_not_free_stands_beside_the_proposed_one(tmp_path):
     document = Path(__file__).parents[1] / "documents" / "proposal.json.gz"
     (tmp_path / "found.json").write_bytes(gzip.decompress(document.read_bytes()))
     found = ff.open_result(tmp_path / "found.json")
+    free = {**found.fields, "clearance": next(iter(found.fields.values()))}
     uneven = replace(found.chosen, screen=found.screen.replace(clearance_minus=7.5e-3))
     tables = [
         {row[0].text: row[2].text for row in block.rows}
-        for one in (found, replace(found, chosen=uneven))
+        for one in (replace(found, fields=free), replace(found, fields=free, chosen=uneven))
         for block in machine_of_proposal(one)
         if isinstance(block, Table)
     ]
