@@ -221,6 +221,13 @@ def test_a_file_of_another_command(command, tmp_path, section, words):
     assert (code, err) == (2, f"Error: section = '{section}': {words}.\n")
 
 
+@pytest.mark.parametrize(("order", "kind"), [("study", "study"), ("design", "duty")])
+def test_a_machine_where_another_file_is_asked(command, order, kind):
+    code, _, err = command(order, "ffs0827")
+    told = f'this is a machine file; name it in a {kind} file, machine = "..."'
+    assert (code, err) == (2, f"Error: section = '[frames]': {told}.\n")
+
+
 def test_folder(run, tmp_path):
     result = run(tmp_path)
     assert_one_sentence(result, "machine file", "folder")

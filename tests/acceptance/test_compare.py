@@ -14,6 +14,8 @@ import flipflow as ff
 from flipflow.errors import InputError
 from flipflow.io.source import bundled_text
 from flipflow.plotting.compare import comparison_figure
+from flipflow.report.blocks import Table
+from flipflow.report.compare import main_changes
 from flipflow.studies.compare import EMPTY
 
 CASES = ("empty", "full, stiffening", "full, carried mass", "hot")
@@ -55,6 +57,20 @@ def files(tmp_path_factory):
     other = other.replace('name = "FFS0827"', long)
     (folder / "eight.toml").write_text(other, encoding="utf-8")
     return folder
+
+
+def test_a_machine_that_does_not_jump_says_so_beside_one_that_does(machine):
+    other = ff.Limits(jump_margin=0.1)
+    calm = dataclasses.replace(
+        machine, screen=machine.screen.replace(eccentric_moment=0.05), limits=other, name="calm",
+        load_cases=machine.load_cases[:1],
+    )  # fmt: skip
+    near = dataclasses.replace(
+        machine, limits=other, name="near", load_cases=machine.load_cases[:1]
+    )
+    tables = [block for block in main_changes(ff.compare([near, calm])) if isinstance(block, Table)]
+    (row,) = (row for row in tables[0].rows if row[0].text == "Margin to the jump: margin")
+    assert [cell.text for cell in row[3:]] == ["no jump", "-"]
 
 
 def test_the_gap_is_the_one_input_that_differs(found):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache
@@ -17,8 +18,12 @@ from typer.testing import CliRunner
 import flipflow as ff
 from flipflow.cli.app import app
 from flipflow.cli.output import IMPOSSIBLE
-from flipflow.io.machine_text import machine_text
+from flipflow.io.machine_text import machine_text, quantity_text
+from flipflow.io.units import parse_quantity
 from flipflow.model.constants import RPM
+from flipflow.model.fields import FIELD
+from flipflow.report.blocks import Table
+from flipflow.report.design import machine_of_proposal
 from flipflow.studies.candidates import Space
 from flipflow.studies.design_search import polish
 from judge import close
@@ -382,6 +387,32 @@ def test_the_template_runs_as_it_stands(tmp_path, monkeypatch):
     for words in ("What binds, and what it costs", "Verification", "Not covered", "without stops"):
         assert words in page
     assert CliRunner().invoke(app, ["check", "out/machine.toml"]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(15e6, '"15000 kN/m"'), (1.2e8, '"120000 kN/m"'), (1234567.0, "1234.567")]
+)
+def test_large_values_are_written_without_an_exponent(value, text):
+    written = quantity_text(value, FIELD["shear_stiffness"])
+    assert text in written
+    assert parse_quantity(written.strip('"'), "N/m", field="stiffness") == value
+
+
+def test_the_gap_that_was_not_free_stands_beside_the_proposed_one(tmp_path):
+    """A proposal of an earlier search, its machine with a gap of its own on the other side."""
+    document = Path(__file__).parents[1] / "documents" / "proposal.json.gz"
+    (tmp_path / "found.json").write_bytes(gzip.decompress(document.read_bytes()))
+    found = ff.open_result(tmp_path / "found.json")
+    free = {**found.fields, "clearance": next(iter(found.fields.values()))}
+    uneven = replace(found.chosen, screen=found.screen.replace(clearance_minus=7.5e-3))
+    tables = [
+        {row[0].text: row[2].text for row in block.rows}
+        for one in (replace(found, fields=free), replace(found, fields=free, chosen=uneven))
+        for block in machine_of_proposal(one)
+        if isinstance(block, Table)
+    ]
+    assert "stops.clearance_minus" not in tables[0]
+    assert tables[1]["stops.clearance_minus"] == "7.50 mm, unchanged"
 
 
 @pytest.mark.parametrize("name", ["ffs0827", "ffs0827-linear", "rig-lin2024"])

@@ -47,6 +47,17 @@ def test_curves_pass_through_the_cells(found) -> None:
         assert len(curve.points_of("cusp")) == 1
 
 
+def test_unequal_gaps_have_a_contact_speed_for_each_stop(screen) -> None:
+    """The side touched last depends on the stop: its figure draws the cells."""
+    found = ff.design_map(screen.replace(clearance_minus=7e-3), OMEGA, GAPS, STOPS)
+    assert np.ptp(found.omega_cs[:, 0]) > 0.1
+    assert all(curve.kind == "fold" for curve in found.curves)
+    traces = ff.figure(found).panels[0].traces
+    begins = [one for one in traces if one.name == "contact begins"]
+    for trace, row in zip(begins, found.omega_cs, strict=True):
+        close("drawn", trace.y, row * 30.0 / math.pi, rel=1e-12)
+
+
 def test_bad_input(screen) -> None:
     for gaps, stops in (((6e-3,), STOPS), (GAPS, (-1.0, 2.0)), (GAPS, "many")):
         with pytest.raises(ff.InputError):

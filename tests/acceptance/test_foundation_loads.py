@@ -16,6 +16,8 @@ from scipy.integrate import solve_ivp
 import flipflow as ff
 from flipflow.io.results import document_of
 from flipflow.report import summary
+from flipflow.report.blocks import Table
+from flipflow.report.foundation import foundation_page
 from flipflow.report.html import html
 from judge import close
 
@@ -274,6 +276,33 @@ def test_only_screens_have_a_foundation(linear) -> None:
 @pytest.fixture(scope="module")
 def assessment(analysed):
     return analysed("ffs0827")
+
+
+def test_the_case_that_weighs_most_is_named_where_it_is_another(linear) -> None:
+    full = linear.replace(floating_mass=1.1 * linear.floating_mass, eccentric_moment=1.0)
+    loads = ff.foundation_loads({"empty": motion(linear), "full": motion(full)})
+    assert "at rest (case full); running" in loads.sentence
+    assert "(case empty)" in loads.sentence
+    assert "at rest; running" in ff.foundation_loads({"full": motion(full)}).sentence
+
+
+def test_what_decides_on_lift_off_stands_beside_it(assessment) -> None:
+    """A run whose load normal to the surface exceeds the weight, and whose vertical does not."""
+    (run, *_) = assessment.foundation.runs
+    least = dataclasses.replace(run.least, normal=-4e3, vertical=2e3)
+    loads = dataclasses.replace(
+        assessment.foundation, runs=(dataclasses.replace(run, least=least),)
+    )
+    tables = [
+        block
+        for block in foundation_page(dataclasses.replace(assessment, foundation=loads))
+        if isinstance(block, Table) and block.title.endswith("start and stop")
+    ]
+    (row,) = tables[0].rows
+    heads = [column.title for column in tables[0].columns]
+    shown = dict(zip(heads, (cell.text for cell in row), strict=True))
+    assert shown["Spring"] == "lifts off"
+    assert (shown["Least, vertical"], shown["Least, normal"]) == ("0.500", "-1.00")
 
 
 def test_one_sentence_on_page_1_in_the_terminal_and_in_the_document(assessment) -> None:

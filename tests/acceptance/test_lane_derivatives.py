@@ -305,6 +305,14 @@ def test_a_store_holds_derivatives_of_parameters_that_do_not_vary(screen, tmp_pa
         ff.study(screen, vary, "relative_amplitude", 150.0, store=tmp_path / "kept.zarr")
     table = opened.to_xarray()
     assert table["d_relative_amplitude"].dims == ("sample", "case", "omega", "parameter")
+    assert table["d_relative_amplitude"].attrs["units"] == "m per parameter_unit"
+    assert table["parameter_unit"].values.tolist() == ["m", "N/m"]
+    ff.save(opened, tmp_path / "kept.csv")
+    heads = (tmp_path / "kept.csv").read_text().splitlines()[0]
+    assert "_clearance [m per m],d_" in heads
+    assert "_stop_stiffness [m per N/m]" in heads
+    with pytest.raises(ff.InputError, match=r"ff\.open_study opens it"):
+        ff.open_result(tmp_path / "kept.zarr")
 
 
 @pytest.mark.parametrize(

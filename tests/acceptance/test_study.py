@@ -56,6 +56,19 @@ def test_a_grid_is_every_combination(screen):
     assert found.failed == 0.0
 
 
+def test_a_tuple_is_an_interval_and_a_list_holds_values(linear):
+    values = [930.0, 900.0]
+    listed, array = (
+        ff.study(linear, {"main_mass": one}, "stroke", 89.0) for one in (values, np.array(values))
+    )
+    assert (listed.sampling, listed.size) == ("grid", 2)
+    np.testing.assert_array_equal(listed.values["stroke"], array.values["stroke"])
+    drawn = ff.study(linear, {"main_mass": (900.0, 930.0)}, "stroke", 89.0, sampling=ff.Sample(n=4))
+    assert drawn.size == 4
+    rows = ff.study(linear, {"main_mass": values}, "stroke", 89.0, sampling="list")
+    assert rows.columns["main_mass"].tolist() == values
+
+
 def test_a_list_is_taken_row_by_row(linear):
     masses, springs = np.array([950.0, 900.0, 920.0]), np.array([2.5e6, 2.9e6, 2.7e6])
     found = ff.study(
@@ -255,6 +268,8 @@ def test_a_monitor_hears_of_chunks_and_ends_the_work(linear):
     [
         ({"vary": {"gap": (0.0, 1.0)}}, "vary = 'gap'"),
         ({"vary": {}}, "vary"),
+        ({"vary": {"clearance": [6e-3]}}, "a list of at least two numbers"),
+        ({"vary": {"clearance": [6e-3, "wide"]}}, "a list of at least two numbers"),
         ({"quantities": ()}, "quantities = ()"),
         ({"quantities": ("size",)}, "quantity = 'size'"),
         ({"quantities": ("stroke", "stroke")}, "named twice"),

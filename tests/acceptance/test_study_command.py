@@ -125,6 +125,7 @@ def test_a_study_and_its_report(command, here):
         "What the machines do at 850 rpm",
         "What moves each quantity at 850 rpm",
         "normal, 2700 kN/m, standard deviation 90.0 kN/m",
+        "shear_stiffness and stop_stiffness, correlation 0.6",
         "Machines of the study",
     ):
         assert words in page
@@ -162,6 +163,18 @@ def test_a_grid_is_drawn_as_a_map(command, here):
     page = (here / "map-flipflow/report.html").read_text()
     assert "Shaded: machines that meet the 2 limits looked at. Not looked at: main frame" in page
     assert ff.open_study("map.zarr").grid_shape == (3, 2)
+
+
+def test_a_map_of_each_quantity_says_what_its_contours_are(screen):
+    vary = {"clearance": [5e-3, 6e-3, 7e-3], "stop_stiffness": [7e6, 9e6]}
+    found = ff.study(screen, vary, ("relative_amplitude", "stop_force", "omega_ub"), 89.0)
+    drawn = ff.figure(found)
+    titles = [panel.title for panel in drawn.panels]
+    assert titles == ["Relative amplitude in mm, at 849.9 rpm", "Stop force in kN, at 849.9 rpm"]
+    for panel in drawn.panels:
+        line, label = panel.traces[0], panel.notes[0]
+        assert np.nanmin(line.x) < label.x < np.nanmax(line.x)
+    assert "relative amplitude in mm and the stop force in kN" in drawn.caption
 
 
 def test_columns_are_named_by_speeds_that_can_be_told_apart():
@@ -306,7 +319,14 @@ def test_a_terminal_sees_the_time_left(here):
         (('"hot"]', '"cold"]'), ("study.load_cases = 'cold'", "'hot'")),
         (('"stop_force"]', '"size"]'), ("quantity = 'size'",)),
         ((", 0.6]", ", 1.6]"), ("study.correlation",)),
-        (('["shear_stiffness", "stop', '["clearance", "stop'), ("study.correlation",)),
+        (
+            ('["shear_stiffness", "stop', '["clearance", "stop'),
+            ("study.correlation", "clearance is not normal", "m +/- s"),
+        ),
+        (
+            ('["shear_stiffness", "stop', '["main_mass", "stop'),
+            ("study.correlation = 'main_mass'", "does not vary"),
+        ),
         (("seed = 4", 'speed = "850"'), ("study.speed", "unit")),
         (("seed = 4", "sead = 4"), ("study.sead", "'seed'")),
         (("seed = 4", 'branch = "middle"'), ("study.branch", "from-below")),

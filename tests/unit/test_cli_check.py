@@ -12,6 +12,7 @@ import pytest
 from flipflow import __version__
 from flipflow.cli import main as cli
 from flipflow.io.source import bundled_names
+from flipflow.model.limits import PASSING_FIELDS
 
 
 @pytest.fixture
@@ -138,6 +139,14 @@ def test_values_without_a_source_are_counted_and_grouped(run, tmp_path):
     count = int(words.split("no source given for ")[1].split()[0])
     document = json.loads(run("check", "a.toml", "--json", "-")[1])
     assert count == len(document["values"]) + len(document["load_cases"])
+
+
+def test_limits_on_the_way_stand_with_their_names(run):
+    run("new", "a.toml")
+    _, out, _ = run("check", "a.toml")
+    for passage, fields in PASSING_FIELDS.items():
+        rows = out.split(f"[limits.{passage}]")[1].splitlines()[1:]
+        assert rows[0].split()[0] in {field.name for field in fields}
 
 
 @pytest.mark.parametrize("command", ["analyze", "check"])

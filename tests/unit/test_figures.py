@@ -431,3 +431,13 @@ def test_figures_load_no_renderer():
 def test_a_figure_is_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Figure("a", "b", ()).title = "c"
+
+
+def test_the_schematic_turns_as_the_unbalance(screen):
+    """x1 counts to the right, up the slope: counter-flow goes over the top to the right."""
+    ways = {}
+    for rotation in ("with-flow", "counter-flow"):
+        drawn = schematic(screen.replace(rotation=rotation), {})
+        (begin, sweep, along) = re.search(r"M(\d+) 128a17 17 0 0 (\d) (-?\d+) 8", drawn).groups()
+        ways[rotation] = (int(begin) < 266, int(sweep), int(along))
+    assert ways == {"with-flow": (True, 0, 24), "counter-flow": (False, 1, -24)}

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from flipflow.cli.options import (
-    RPM,
     Case,
     File,
     Folder,
@@ -21,6 +20,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress, stoppable
+from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -100,7 +100,7 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
     orbits = periodic_orbits(screen, omega) or periodic_orbits(screen, omega, MOST_PERIODS)
     if not orbits:
         raise IncompleteError(
-            f"No motion that repeats itself was found at {omega * RPM:.4g} rpm, so there is none "
+            f"No motion that repeats itself was found at {rpm(omega)} rpm, so there is none "
             "to settle on: try another --speed, or see with flipflow simulate what the machine "
             "does."
         )

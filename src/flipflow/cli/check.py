@@ -67,13 +67,14 @@ def _verdict(result: Check) -> str:
 
 def _values(values: Iterable[Value]) -> Table:
     table = _table("Value", "Symbol", "As written", "In SI", fixed=True)
-    for section, rows in groupby(values, key=lambda value: value.key.split(".")[0]):
+    for section, rows in groupby(values, key=lambda value: value.key.rpartition(".")[0]):
         table.add_row(f"[{section}]", style="bold")
         for value in rows:
             digits = 6 if len(value.si) == 1 else 5  # two ends must fit the column
             numbers = " to ".join(_plain(number, digits) for number in value.si)
             si = f"{numbers} {value.unit}".strip()
-            table.add_row(value.key.split(".")[1], value.symbol, printable(value.written), si)
+            name = value.key.rpartition(".")[2]
+            table.add_row(name, value.symbol, printable(value.written), si)
     return table
 
 
@@ -115,7 +116,7 @@ def _warmth(case: Case) -> str:
 
 def _sources(result: Check) -> Iterator[str]:
     """Group by source; a value without one stands last."""
-    named = [(value.source, *value.key.split(".")) for value in result.values]
+    named = [(value.source, *value.key.rsplit(".", 1)) for value in result.values]
     named += [(case.source, "load_cases", repr(case.name)) for case in result.load_cases]
     for source, rows in groupby(sorted(named, key=_no_source_last), key=lambda row: row[0]):
         listed = tuple(rows)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from flipflow.cli.options import (
-    RPM,
     Case,
     File,
     Force,
@@ -20,6 +19,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress
+from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -71,7 +71,7 @@ def orbits(
 def _show(title: str, omega: float, found: tuple[Orbit, ...], out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
-    say(out, f"{printable(title)} at {omega * RPM:.4g} rpm: {_count(found)}", "bold")
+    say(out, f"{printable(title)} at {rpm(omega)} rpm: {_count(found)}", "bold")
     if found:
         out.print(
             f"{'':>3}{'relative':>12}{'main':>12}{'floating':>12}  {'repeats after':<15}{'returns'}"

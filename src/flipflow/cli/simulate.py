@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flipflow.cli.options import (
-    RPM,
     Case,
     File,
     Force,
@@ -23,6 +22,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress
+from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,7 +111,7 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
 
     omega = float(history.omega[-1])
     last = history.t >= history.t[-1] - 2.0 * math.pi / omega
-    head = f"{printable(title)} at {omega * RPM:.4g} rpm"
+    head = f"{printable(title)} at {rpm(omega)} rpm"
     say(out, f"{head}, {history.t[-1]:.4g} s from rest", "bold")
     if history.distance is None:
         out.print("No periodic motion lies near the end: the motion has not settled.")

@@ -212,11 +212,11 @@ def _write_figures(
     found: Study, judged: Tolerance | None, asked: _Asked, target: Destination
 ) -> None:
     from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
-    from flipflow.plotting.study import map_figure, wide_fields  # noqa: PLC0415
+    from flipflow.plotting.study import maps_figure, wide_fields  # noqa: PLC0415
 
     figures: dict[str, Any] = {"study.html": figure(found)}
     if found.sampling == "grid" and len(wide_fields(found)) > 1 and asked.file is not None:
-        figures["map.html"] = map_figure(found, limits=asked.limits)
+        figures["map.html"] = maps_figure(found, asked.limits)
     if judged is not None:
         figures["tolerance.html"] = figure(judged)
     for name, one in figures.items():

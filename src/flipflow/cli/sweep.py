@@ -23,6 +23,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import console, printable
 from flipflow.cli.progress import progress, stoppable
+from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -179,7 +180,7 @@ def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
     word = "rising" if glide.rate > 0.0 else "falling"
-    out.print(f"Speed {word} by {abs(glide.rate) * RPM:.4g} rpm/s:")
+    out.print(f"Speed {word} by {rpm(abs(glide.rate))} rpm/s:")
     for jump in glide.jumps:
         say(
             out,
@@ -191,7 +192,7 @@ def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
     if not whole:
         say(
             out,
-            f"  ended at {glide.history.omega[-1] * RPM:.4g} rpm, for want of steps: give a "
+            f"  ended at {rpm(glide.history.omega[-1])} rpm, for want of steps: give a "
             "greater --rate, or --speeds closer together",
         )
 
@@ -206,9 +207,9 @@ def _figure(project: Project, swept: tuple[Sweep, ...], ends: tuple[float, float
 def _show(title: str, found: Passed, steps: int, out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
-    low, high = min(found.up.omega) * RPM, max(found.up.omega) * RPM
+    low, high = (rpm(end) for end in (min(found.up.omega), max(found.up.omega)))
     count = f"{found.up.omega.size}" + ("" if found.up.complete else f" of {steps}")
-    say(out, f"{printable(title)}: {count} speeds from {low:.4g} to {high:.4g} rpm", "bold")
+    say(out, f"{printable(title)}: {count} speeds from {low} to {high} rpm", "bold")
     for word, swept in zip(("rising", "falling"), found.sweeps, strict=False):
         _show_sweep(word, swept, steps, out)
     for glide in found.glides:
@@ -225,7 +226,7 @@ def _show_sweep(word: str, swept: Sweep, steps: int, out: Console) -> None:
     say(
         out,
         f"Speed {word}: greatest relative amplitude {amplitude[top]:.4g} mm at "
-        f"{swept.omega[top] * RPM:.4g} rpm",
+        f"{rpm(swept.omega[top])} rpm",
     )
     for jump in swept.jumps:
         before, after = amplitude[jump.index - 1], amplitude[jump.index]

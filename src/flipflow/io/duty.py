@@ -14,7 +14,7 @@ from typing import Any
 from flipflow.errors import InputError, MissingExtra
 from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
 from flipflow.io.load_cases import read_load_cases
-from flipflow.io.project import load_project, read_limits
+from flipflow.io.project import load_project, read_limits, refuse_other_files
 from flipflow.io.source import read_source
 from flipflow.io.study_file import (
     chosen_cases,
@@ -73,6 +73,7 @@ def load_duty(path: str | os.PathLike[str], *, force: bool = False) -> Duty:
     """
     source = read_source(path)
     tables = source.tables
+    refuse_other_files(tables, "duty")
     refuse_unknown(tables, SECTIONS, place="")
     if tables.get("format", FORMAT) != FORMAT:
         remedy = f"this version of flipflow reads format = {FORMAT}"

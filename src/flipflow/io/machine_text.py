@@ -24,6 +24,7 @@ from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen, Load
 
 DIGITS = range(4, 18)  # significant ones, as few as tell the value apart
+WRITTEN_WHOLE = 1e12  # below it a number is written without an exponent
 CHOICES = {
     "exciter.rotation": "rotation", "stops.law": "stop_law",
     "stops.clearance_measured": "clearance_measured",
@@ -81,11 +82,17 @@ def quantity_text(value: float, field: Field) -> str:
         return '"inf"'
     for unit in dict.fromkeys((field.file_unit, field.unit)):
         for digits in DIGITS:
-            text = f"{in_unit(value, unit, field.unit):.{digits}g} {unit}".strip()
+            text = f"{_plain_number(in_unit(value, unit, field.unit), digits)} {unit}".strip()
             if _reads(text, field) == value:
                 return json.dumps(text) if unit else text
     text = f"{value!r} {field.unit}".strip()
     return json.dumps(text) if field.unit else text
+
+
+def _plain_number(value: float, digits: int) -> str:
+    """A number of so many digits; a large one is written whole, without an exponent."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < WRITTEN_WHOLE else text
 
 
 def _reads(text: str, field: Field) -> float:

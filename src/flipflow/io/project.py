@@ -41,6 +41,7 @@ OTHER_FILES = {
     "study": ("study", "flipflow study"),
     "vary": ("study", "flipflow study"),
 }
+MACHINE_FILE, FRAMES = "machine", "frames"  # a kind of file, and the section that only it has
 
 
 def load(name_or_path: str | os.PathLike[str], *, force: bool = False) -> FlipFlowScreen:
@@ -123,7 +124,7 @@ def _plausible(project: Project, *, force: bool) -> Project:
 
 def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
     """Check that every section is there in the right shape and holds only known keys."""
-    _refuse_other_files(tables)
+    refuse_other_files(tables, MACHINE_FILE)
     refuse_unknown(tables, ["format", *(name for name in SECTIONS if "." not in name)], place="")
     sections: Tables = {}
     for name, entries in SECTIONS.items():
@@ -146,13 +147,22 @@ def _sections(tables: Mapping[str, object]) -> tuple[Tables, list[Table]]:
     return sections, cases
 
 
-def _refuse_other_files(tables: Mapping[str, object]) -> None:
-    """Name the command of a file that is no machine's, but names one."""
+def refuse_other_files(tables: Mapping[str, object], kind: str) -> None:
+    """Name the command of a file that is not of this kind: "machine", "study" or "duty".
+
+    Raises
+    ------
+    InputError
+        For a file of another kind.
+    """
     if isinstance(tables.get("machine"), str):
-        for section, command in OTHER_FILES.items():
-            if section in tables:
-                remedy = f"this is a {command[0]} file, which {command[1]} reads"
+        for section, (other, command) in OTHER_FILES.items():
+            if section in tables and other != kind:
+                remedy = f"this is a {other} file, which {command} reads"
                 raise InputError("section", f"[{section}]", remedy)
+    elif kind != MACHINE_FILE and FRAMES in tables:
+        remedy = f'this is a machine file; name it in a {kind} file, machine = "..."'
+        raise InputError("section", f"[{FRAMES}]", remedy)
 
 
 def _check_format(tables: Mapping[str, object], notes: Notes) -> None:

@@ -10,6 +10,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
+from flipflow.batch.chunk_store import META
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
@@ -140,6 +141,8 @@ def open_result(path: str | os.PathLike[str]) -> Any:
         For a file that is no result of flipflow, is damaged, or is of a later version.
     """
     source = checked_path("path", path)
+    if _is_file(source / META):
+        raise InputError("path", str(path), "this is the store of a study, ff.open_study opens it")
     if not _is_file(source):
         raise InputError("path", str(path), "there is no such file; give one that ff.save wrote")
     if source.suffix != ".json":

@@ -10,7 +10,13 @@ from flipflow.studies.candidates import quantity_of
 from flipflow.studies.design import Proposal
 from flipflow.studies.lane_values import slope_key
 from flipflow.studies.study import Study
-from flipflow.studies.study_plan import unit_of
+from flipflow.studies.study_plan import (
+    PARAMETER,
+    PARAMETER_UNIT,
+    unit_of,
+    unit_of_slope,
+    units_of_parameters,
+)
 from flipflow.studies.tolerance import Tolerance, limits_in_words
 from flipflow.studies.worst_case import WorstCase
 
@@ -29,11 +35,7 @@ def study_arrays(found: Study) -> Arrays:
             "case": column("case", np.array(found.cases, str)),
             "omega": column("omega", found.omega, "rad/s"),
             "field": column("field", np.array(found.names, str)),
-            **(
-                {"parameter": column("parameter", np.array(found.parameters, str))}
-                if found.parameters
-                else {}
-            ),
+            **_parameters(found),
         },
         {
             **{
@@ -42,7 +44,9 @@ def study_arrays(found: Study) -> Arrays:
             },
             **{name: Variable(own[name], found.values[name], asked[name].unit) for name in asked},
             **{
-                slope_key(name): Variable((*dims, "parameter"), slopes)
+                slope_key(name): Variable(
+                    (*dims, PARAMETER), slopes, unit_of_slope(found.machine, asked[name])
+                )
                 for name, slopes in found.derivatives.items()
             },
             "reason": Variable(dims, found.reason),
@@ -58,6 +62,17 @@ def study_arrays(found: Study) -> Arrays:
         },
         {"flipflow_version": found.version, "sampling": found.sampling, "branch": found.branch},
     )
+
+
+def _parameters(found: Study) -> dict[str, Variable]:
+    """With respect to what quantities are differentiated, and in which units."""
+    if not found.parameters:
+        return {}
+    units = units_of_parameters(found.machine, found.parameters)
+    return {
+        PARAMETER: column(PARAMETER, np.array(found.parameters, str)),
+        PARAMETER_UNIT: column(PARAMETER, units),
+    }
 
 
 def tolerance_arrays(found: Tolerance) -> Arrays:

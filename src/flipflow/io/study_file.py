@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flipflow.errors import InputError
 from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
-from flipflow.io.project import load_project
+from flipflow.io.project import load_project, refuse_other_files
 from flipflow.io.source import bundled_names, read_source
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Table, read_number
@@ -87,6 +87,7 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
         For a file that cannot be read, and a value in it that is wrong or missing.
     """
     source = read_source(path)
+    refuse_other_files(source.tables, "study")
     refuse_unknown(source.tables, SECTIONS, place="")
     if source.tables.get("format", FORMAT) != FORMAT:
         remedy = f"this version of flipflow reads format = {FORMAT}"
@@ -290,12 +291,15 @@ def _covariance(written: object, vary: Mapping[str, object]) -> Any:
     for row in written if isinstance(written, list) and written else [written]:
         if not isinstance(row, list) or len(row) != 3:
             raise InputError(label, row, remedy)
-        places = [names.index(name) if name in names else -1 for name in row[:2]]
         value = row[2] if isinstance(row[2], float | int) else np.nan
-        if min(places) < 0 or places[0] == places[1] or not -1.0 < value < 1.0:
+        if row[0] == row[1] or not -1.0 < value < 1.0:
             raise InputError(label, row, remedy)
-        i, j = places
+        for name in row[:2]:
+            if name not in names:
+                raise InputError(label, name, f"it does not vary, choose of {', '.join(names)}")
+            if not isinstance(vary[name], Normal):
+                told = f'{name} is not normal; only fields "m +/- s" vary together'
+                raise InputError(label, row, told)
+        i, j = (names.index(name) for name in row[:2])
         covariance[i, j] = covariance[j, i] = value * std[i] * std[j]
-        if covariance[i, j] == 0.0 != value:
-            raise InputError(label, row, remedy)
     return tuple(map(tuple, covariance.tolist()))

@@ -80,7 +80,19 @@ def table_columns(arrays: Arrays) -> Iterator[tuple[str, Variable]]:
             for place in np.ndindex(one.data.shape[1:]):
                 words = [some[k] for some, k in zip(labels, place, strict=True)]
                 values = one.data[(slice(None), *place)]
-                yield "_".join([name, *words]), Variable((arrays.index,), values, one.units)
+                units = _units(arrays, one, place)
+                yield "_".join([name, *words]), Variable((arrays.index,), values, units)
+
+
+def _units(arrays: Arrays, one: Variable, place: tuple[int, ...]) -> str:
+    """Unit at a place: "N per parameter_unit" is N for one of the unit that stands there."""
+    units = one.units
+    for dim, k in zip(one.dims[1:], place, strict=True):
+        named = f"{dim}_unit"
+        if named in arrays.coordinates and units.endswith(f"per {named}"):
+            other = str(arrays.coordinates[named].data[k])
+            units = units.replace(named, other) if other else units.removesuffix(f"per {named}")
+    return units.strip()
 
 
 def _labels(arrays: Arrays, dim: str, count: int) -> list[str]:

@@ -124,7 +124,8 @@ def design_of(machine: Machine, vary: Vary, sampling: object = None) -> Design:
     machine
         The machine whose fields vary.
     vary
-        Fields with an interval, an array, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`.
+        Fields with an interval, an array or a list of values, :class:`~flipflow.Normal` or
+        :class:`~flipflow.Choice`.
     sampling
         ``"grid"``: every combination of the values of arrays and choices; ``"list"``: the k-th
         values of all arrays together; a :class:`Sample`; None: a grid where every field has
@@ -171,7 +172,8 @@ def _listed(varied: Sequence[Variation], vary: Vary) -> Columns:
     columns: dict[str, NDArray[Any]] = {}
     for one in varied:
         given, known = vary[one.name], _values(one, "list")
-        columns[one.name] = np.array(given if isinstance(given, np.ndarray) else known.values)
+        as_given = isinstance(given, (np.ndarray, list))
+        columns[one.name] = np.array(given if as_given else known.values)
         if columns[one.name].dtype.kind in "iu":
             columns[one.name] = columns[one.name].astype(float)
     sizes = {name: column.size for name, column in columns.items()}

@@ -1,8 +1,8 @@
 """What may vary and how: the vocabulary of sensitivity, studies and design.
 
-``vary`` maps a parameter of the machine to an interval (low, high), an array that is sampled as it
-stands, :class:`Normal` or :class:`Choice`. Each becomes a :class:`Variation`, which turns numbers
-between 0 and 1 into values of its field.
+``vary`` maps a parameter of the machine to an interval, which is a tuple (low, high), an array or a
+list of values that is sampled as it stands, :class:`Normal` or :class:`Choice`. Each becomes a
+:class:`Variation`, which turns numbers between 0 and 1 into values of its field.
 """
 
 from __future__ import annotations
@@ -32,7 +32,11 @@ Values = NDArray[np.float64] | NDArray[np.str_]
 Vary = Mapping[str, object]
 LAW = "stop_law"
 TAIL = 0.025
-REMEDY = "give an interval (low, high), an array, ff.Normal(mean, std) or ff.Choice(values)"
+REMEDY = (
+    "give an interval as a tuple (low, high), values in a list or an array, ff.Normal(mean, std) "
+    "or ff.Choice(values)"
+)
+VALUES = "give an array or a list of at least two numbers, shape (n,)"
 
 
 class Distribution(ABC):
@@ -219,11 +223,14 @@ def _distribution(name: str, given: object) -> Distribution:
     if isinstance(given, Distribution):
         return given
     field = f"vary {name}"
+    if isinstance(given, list):
+        numbers = [checked_number(field, value, VALUES) for value in given]
+        return _distribution(name, np.array(numbers))
     if isinstance(given, np.ndarray):
         if given.ndim != 1 or given.size < 2 or given.dtype.kind not in "iuf":
-            raise InputError(field, given, "give an array of at least two numbers, shape (n,)")
+            raise InputError(field, given, VALUES)
         return Choice(tuple(sorted(float(value) for value in given)))
-    if not isinstance(given, (tuple, list)) or len(given) != 2:
+    if not isinstance(given, tuple) or len(given) != 2:
         raise InputError(field, given, REMEDY)
     low, high = (checked_number(field, value, REMEDY) for value in given)
     if not low < high:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from flipflow.model.numerals import rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import within
@@ -52,7 +53,7 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
     # Notes, for lines cross this row and would cross the words of bars.
     words = [
         Note(high * RPM + 0.01 * (ends[1] - ends[0]), heights[rows[0]],
-             f"{low * RPM:.4g} to {high * RPM:.4g} rpm")
+             f"{rpm(low)} to {rpm(high)} rpm")
         for low, high in region.feasible
     ]  # fmt: skip
     if not words:
@@ -72,7 +73,7 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
         if at is not None and ends[0] <= at * RPM <= ends[1]
     )
     if omega is not None:
-        lines += (Line("x", omega * RPM, f"{omega * RPM:.4g} rpm", "speed", "dashdot"),)
+        lines += (Line("x", omega * RPM, f"{rpm(omega)} rpm", "speed", "dashdot"),)
     bands = tuple(Band("x", low * RPM, high * RPM) for low, high in region.feasible)
     panel = Panel(
         Axis("shaft speed", "rpm", ends), Axis("", "", (-0.6, len(rows) - 0.4), ticks),

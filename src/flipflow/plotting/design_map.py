@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.model.numerals import rpm
 from flipflow.plotting.branches import field_axis
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
@@ -24,17 +25,13 @@ def design_map_figure(found: DesignMap) -> Figure:
     x = found.clearance * MM
     words = [f"k3 = {k * MN:.4g} MN/m" for k in found.stop_stiffness]
     colour = {float(k): case_colour(j) for j, k in enumerate(found.stop_stiffness)}
-    traces, cusps = [], []
+    traces, cusps = _contact(found), []
     for curve in found.curves:
+        if curve.kind == "grazing":
+            continue
         stiffness = float(curve.machine.stop_stiffness)  # type: ignore[attr-defined]
-        grazing = curve.kind == "grazing"
-        traces.append(
-            Trace(
-                "contact begins" if grazing else "jump speeds", curve.along("clearance") * MM,
-                curve.omega * RPM, colour="gap" if grazing else colour[stiffness],
-                legend=grazing, dash="dot" if grazing else "",
-            )
-        )  # fmt: skip
+        gaps, speeds = curve.along("clearance") * MM, curve.omega * RPM
+        traces.append(Trace("jump speeds", gaps, speeds, colour=colour[stiffness], legend=False))
         cusps += [(point.values[0] * MM, point.omega * RPM) for point in curve.points_of("cusp")]
     if cusps:
         at = np.array(cusps)
@@ -42,7 +39,8 @@ def design_map_figure(found: DesignMap) -> Figure:
             Trace("folds are born (cusp)", at[:, 0], at[:, 1], "point", "jump",
                   symbol="diamond-open")
         )  # fmt: skip
-    speed = Line("y", found.omega * RPM, f"working speed {found.omega * RPM:.4g} rpm", "speed")
+    working = f"working speed {rpm(found.omega)} rpm"
+    speed = Line("y", found.omega * RPM, working, "speed", "dashdot")
     panels = [
         Panel(axis, Axis("shaft speed", "rpm"), traces=tuple(traces), lines=(speed,)),
         Panel(axis, Axis("amplitude (|x2|)", "mm"), _lines(x, found.amplitude * MM, words, True)),
@@ -54,10 +52,28 @@ def design_map_figure(found: DesignMap) -> Figure:
         under = " Below: what is left of it under load."
     caption = (
         "Above: the speeds at which the machine jumps, a line for each stop in the colours of the "
-        "panel below; where both speeds meet, in the cusp, the jump is gone. In the middle: the "
-        f"relative amplitude at working speed as it is reached from below.{under}"
+        "panel below; where both speeds meet, in the cusp, the jump is gone. Dashed: contact "
+        "begins, with unequal gaps on the side touched last. In the middle: the relative amplitude "
+        f"at working speed as it is reached from below.{under}"
     )
     return Figure("Gap and stop stiffness", caption, tuple(panels), height=220 * len(panels))
+
+
+def _contact(found: DesignMap) -> list[Trace]:
+    """Where contact begins: one curve for all stops, or the cells of each."""
+    name, once = "contact begins", [one for one in found.curves if one.kind == "grazing"]
+    if once:
+        return [
+            Trace(name, one.along("clearance") * MM, one.omega * RPM, colour="gap", dash="dash")
+            for one in once
+        ]
+    return [
+        Trace(
+            name, found.clearance * MM, row * RPM, colour=case_colour(j), symbol=case_symbol(j),
+            legend=j == 0, dash="dash",
+        )
+        for j, row in enumerate(found.omega_cs)
+    ]  # fmt: skip
 
 
 def _lines(x: Real, rows: Real, words: Sequence[str], legend: bool) -> tuple[Trace, ...]:

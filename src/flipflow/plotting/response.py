@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
+from flipflow.model.numerals import rpm
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.plotting.curves import Curve, Jump, is_jump
 from flipflow.plotting.figure import Figure
@@ -397,7 +398,7 @@ def _within(curve: Curve, near: tuple[float, float]) -> Curve:
 def _working(omega: float | None, *, text: bool = True) -> tuple[Line, ...]:
     if omega is None:
         return ()
-    return (Line("x", omega * RPM, f"{omega * RPM:.4g} rpm" if text else "", "speed", "dashdot"),)
+    return (Line("x", omega * RPM, f"{rpm(omega)} rpm" if text else "", "speed", "dashdot"),)
 
 
 def _arrows(jumps: Sequence[Jump]) -> tuple[Arrow, ...]:
@@ -408,7 +409,7 @@ def _jump_lines(jumps: Sequence[Jump], *, brief: bool = False) -> tuple[Line, ..
     """The jump speeds, labelled above the panel."""
     words = {True: "" if brief else "jump (rising) ", False: "" if brief else "jump (falling) "}
     return tuple(
-        Line("x", j.omega * RPM, f"{words[j.rising_speed]}{j.omega * RPM:.4g} rpm", "mark")
+        Line("x", j.omega * RPM, f"{words[j.rising_speed]}{rpm(j.omega)} rpm", "mark")
         for j in jumps
     )
 

@@ -36,7 +36,7 @@ def schematic(screen: FlipFlowScreen, values: Mapping[str, str]) -> str:
         An SVG element.
     """
     text = {name: html.escape(word) for name, word in values.items()}
-    lines = [_wall(), _frame(MAIN), _frame(FLOATING), _unbalance()]
+    lines = [_wall(), _frame(MAIN), _frame(FLOATING), _unbalance(screen)]
     lines += [_spring(WALL, MAIN[0], 92), _damper(WALL, MAIN[0], 166)]
     lines += [_spring(MAIN[1], FLOATING[0], 74), _damper(MAIN[1], FLOATING[0], 122)]
     labels = [
@@ -72,15 +72,19 @@ def _frame(span: tuple[int, int]) -> str:
     )
 
 
-def _unbalance() -> str:
+def _unbalance(screen: FlipFlowScreen) -> str:
+    """x1 counts to the right, up the slope: with the flow it turns anticlockwise."""
     x, y, r = 266, 122, 32
-    dx, dy = r * math.cos(0.8), r * math.sin(0.8)
+    sense, sweep = (1, 0) if screen.rotation == "with-flow" else (-1, 1)
+    dx, dy = sense * r * math.cos(0.8), r * math.sin(0.8)
     return (
         f'<circle cx="{x}" cy="{y}" r="{r}" fill="white"/><circle cx="{x}" cy="{y}" r="2.5" '
         f'fill="{INK}"/><path d="M{x} {y}L{x + dx:.1f} {y - dy:.1f}"/>'
         f'<circle cx="{x + 0.8 * dx:.1f}" cy="{y - 0.8 * dy:.1f}" r="7" fill="{INK}"/>'
-        f'<path d="M{x - 16} {y + 6}a17 17 0 0 0 24 8" stroke-width="1.2"/>'
-        f'<path d="M{x + 8} {y + 14}l-7 1m7 -1l-2 6" stroke-width="1.2"/>'
+        f'<path d="M{x - 16 * sense} {y + 6}a17 17 0 0 {sweep} {24 * sense} 8" '
+        'stroke-width="1.2"/>'
+        f'<path d="M{x + 8 * sense} {y + 14}l{-7 * sense} 1m{7 * sense} -1l{-2 * sense} 6" '
+        'stroke-width="1.2"/>'
     )
 
 

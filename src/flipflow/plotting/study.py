@@ -21,7 +21,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace
-from flipflow.plotting.scales import MM, RPM
+from flipflow.plotting.scales import MM
 from flipflow.plotting.sensitivity import SHOWN, tornado_figure
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.study import Study
@@ -36,6 +36,7 @@ from flipflow.studies.tolerance import (
 Real = NDArray[np.float64]
 LEVELS = 7  # contours of a map, about
 MOST_AXES = 10  # of parallel coordinates: the fields, then quantities
+MOST_MAPS = 4  # of one figure
 MOST_LINES = 300  # machines of parallel coordinates
 CLEAR_LINES, LEAST_OPACITY = 30, 0.12  # lines that may be opaque; of very many
 FIELD_SCALES = {"mm": MM, "kN/m": 1e-3, "kN s/m": 1e-3, "kg mm": 1e3}
@@ -60,7 +61,7 @@ def study_figure(study: Study) -> Figure:
     if study.sampling == "grid":
         wide = wide_fields(study)
         if len(wide) >= 2:
-            return map_figure(study)
+            return maps_figure(study)
         if wide:
             return curves_figure(study, wide[0])
     return parallel_figure(study)
@@ -94,11 +95,39 @@ def map_figure(
     MissingExtra
         When contourpy, which comes with matplotlib, is not installed.
     """
-    place = place or Place()
     name = checked_word("quantity", quantity or study.quantities[0], study.quantities)
+    return _maps(study, (name,), limits, place or Place())
+
+
+def maps_figure(study: Study, limits: Limits | None = None) -> Figure:
+    """A map of each of the first quantities; folds are lines of each, and none of their own.
+
+    Parameters and errors as of :func:`map_figure`.
+    """
+    motions = [name for name in study.quantities if name not in FOLDS] or study.quantities
+    return _maps(study, motions[:MOST_MAPS], limits, Place())
+
+
+def _maps(study: Study, names: Sequence[str], limits: Limits | None, place: Place) -> Figure:
     across, up = _two_fields(study)
     grid = _Grid(study, across, up, place)
-    one = quantity_named(name, study.machine)
+    asked = [quantity_named(name, study.machine) for name in names]
+    panels = tuple(_map_panel(grid, one, limits) for one in asked)
+    shaded = "" if limits is None else _shaded_words(study, limits)
+    jumps = (
+        " Dashed: beyond this line the machine has jumped, and no contour leads across. Dotted: "
+        "from this line on two motions are possible."
+        if any(trace.dash for panel in panels for trace in panel.traces)
+        else ""
+    )
+    told = " and ".join(f"the {one.label} in {one.shown_unit or 'plain numbers'}" for one in asked)
+    over = f"over {symbol_of(across)} and {symbol_of(up)}"
+    title = f"{_capital(asked[0].label)} {over}" if len(asked) == 1 else f"Maps {over}"
+    return Figure(title, f"Contours of {told}.{shaded}{jumps}", panels, height=440 * len(panels))
+
+
+def _map_panel(grid: _Grid, one: Quantity, limits: Limits | None) -> Panel:
+    study = grid.study
     traces = list(_contours(grid, one))
     cells: tuple[Cells, ...] = ()
     if limits is not None:
@@ -106,21 +135,17 @@ def map_figure(
         cells = (_met_cells(grid, limits),) if limits_known(study, limits) else ()
     traces += _fold_contours(grid)
     notes = tuple(_level_notes(traces))
-    panel = Panel(
-        _field_axis(study, across, grid.x), _field_axis(study, up, grid.y),
+    unit = f" in {one.shown_unit}" if one.shown_unit else ""
+    where = _where(study, grid.place, one)
+    return Panel(
+        _field_axis(study, grid.across, grid.x), _field_axis(study, grid.up, grid.y),
         tuple(trace for trace in traces if trace.x.size), cells=cells, notes=notes,
-        title=_where(study, place, one),
+        title=", ".join(filter(None, (f"{_capital(one.label)}{unit}", where))),
     )  # fmt: skip
-    shaded = "" if limits is None else _shaded_words(study, limits)
-    jumps = (
-        " Dashed: beyond this line the machine has jumped, and no contour leads across. Dotted: "
-        "from this line on two motions are possible."
-        if any(trace.dash and trace.x.size for trace in traces)
-        else ""
-    )
-    caption = f"Contours of the {one.label} in {one.shown_unit or 'plain numbers'}.{shaded}{jumps}"
-    title = f"{one.label[:1].upper()}{one.label[1:]} over {symbol_of(across)} and {symbol_of(up)}"
-    return Figure(title, caption, (panel,), height=440)
+
+
+def _capital(label: str) -> str:
+    return f"{label[:1].upper()}{label[1:]}"
 
 
 def curves_figure(study: Study, field: str) -> Figure:
@@ -246,6 +271,7 @@ class _Grid:
 
     def __init__(self, study: Study, across: str, up: str, place: Place) -> None:
         self.study, self.place = study, place
+        self.across, self.up = across, up
         self._keep = _others_nearest(study, (across, up))
         first, second = (np.asarray(study.columns[n], float)[self._keep] for n in (across, up))
         x, y = np.unique(first), np.unique(second)
@@ -307,9 +333,7 @@ def _fold_contours(grid: _Grid) -> Iterator[Trace]:
     for name, dash in zip(FOLDS, ("dot", "dash"), strict=True):
         if name in grid.study.values and np.isfinite(omega):
             lines = grid.lines(grid.values(name), omega, parted=False)
-            yield _joined(
-                f"{QUANTITIES[name].label} = {omega * RPM:.4g} rpm", lines, "jump", dash=dash
-            )
+            yield _joined(f"{QUANTITIES[name].label} = {rpm(omega)} rpm", lines, "jump", dash=dash)
 
 
 def _met_cells(grid: _Grid, limits: Limits) -> Cells:
@@ -354,8 +378,10 @@ def _level_notes(traces: Sequence[Trace]) -> Iterator[Note]:
         ends = np.flatnonzero(np.isnan(trace.x))
         begins = np.concatenate([[0], ends[:-1] + 1])
         k = int(np.argmax(ends - begins))
-        middle = (begins[k] + ends[k]) // 2
-        yield Note(float(trace.x[middle]), float(trace.y[middle]), trace.name, "center", "main")
+        # A part of two points has its middle between them, not on the edge.
+        middle = [(begins[k] + ends[k] - 1) // 2, (begins[k] + ends[k]) // 2]
+        x, y = (float(line[middle].mean()) for line in (trace.x, trace.y))
+        yield Note(x, y, trace.name, "center", "main")
 
 
 def _round_levels(low: float, high: float) -> Real:

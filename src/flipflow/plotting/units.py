@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, Literal, get_args
 
 from flipflow.model.arguments import checked_word
+from flipflow.model.numerals import rpm
 from flipflow.model.screen import is_screen
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Line, Panel, Trace, decade_ticks
@@ -51,7 +52,7 @@ def length_of(owner: object, metres: float, digits: int) -> str:
 def speed_of(owner: object, omega: float) -> str:
     """A frequency as a title says it: in rpm for a screen, without a unit for any other machine."""
     if units_for(owner, None) == "engineering":
-        return f"{omega * RPM:.4g} rpm"
+        return f"{rpm(omega)} rpm"
     return f"{omega:.4g}"
 
 

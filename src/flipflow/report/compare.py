@@ -24,13 +24,13 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.first_page import verdict_state
-from flipflow.report.numbers import NOTHING, number, percent, quantity
+from flipflow.report.numbers import NO_JUMP, NOTHING, number, percent, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.compare import EMPTY, Comparison, Given, InputDifference, ResultChange
 
-MARGIN = "margin of "
+MARGIN, JUMP = "margin of ", "jump_margin"
 ONE_NAME = 24  # letters of a name that the head of a column has room for
 BRIEF = ("relative_amplitude",)  # beside margins and speeds, what the terminal shows
 
@@ -144,10 +144,10 @@ def _headline(row: ResultChange) -> str:
 def _value(row: ResultChange, value: float | None) -> str:
     if value is None:
         return NOTHING
+    if row.name.endswith(JUMP) and math.isinf(value):
+        return NO_JUMP
     if row.name.startswith(MARGIN):
         return "no end" if math.isinf(value) else percent(value)
-    if row.name == "jump_margin" and math.isinf(value):
-        return "no jump"
     if row.shown_unit == "rpm":
         return f"{rpm(value)} rpm"
     return quantity(value, row.shown_unit, row.unit)
@@ -161,7 +161,7 @@ def _change(row: ResultChange, k: int) -> str:
         return "0"
     sign = "+" if change > 0.0 else "-"
     if math.isinf(change):
-        return f"{sign}infinite"
+        return NOTHING if row.name.endswith(JUMP) else f"{sign}infinite"
     unit = row.shown_unit
     if row.name.startswith(MARGIN):
         return f"{sign}{number(100.0 * abs(change))} %"

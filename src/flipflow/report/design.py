@@ -30,6 +30,7 @@ from flipflow.studies.assessment import ATTENTION, FAIL, PASS
 from flipflow.studies.candidates import ALONE, BUILT, EVEN, MET, MOTION, label_of
 from flipflow.studies.design import Proposal, Trial
 
+GAPS = ("clearance", "clearance_minus")
 CERTAIN = 0.99  # share of machines as built from which a proposal passes
 NOT_COVERED = (
     "The search judges scatter at its corners and on the drawing. The material moves with the "
@@ -90,6 +91,9 @@ def machine_of_proposal(found: Proposal) -> Iterator[Block]:
         )
         for name in found.fields
     ]
+    for name in _other_gap(found):
+        kept = _field(name, getattr(new, name))
+        rows.append(cells(FIELD[name].key, kept, f"{kept}, unchanged", NOTHING))
     yield Table("Parts", columns, tuple(rows))
     if found.springs is not None:
         one, count = found.springs
@@ -220,6 +224,14 @@ def _free(found: Proposal) -> dict[str, str]:
         one.name: " to ".join(_field(one.name, float(str(end))) for end in one.distribution.ends)
         for one in found.duty.varied
     }
+
+
+def _other_gap(found: Proposal) -> list[str]:
+    """The gap of the other side, where it is one of its own and only one of both was free."""
+    chosen = [name for name in GAPS if name in found.fields]
+    if len(chosen) != 1 or found.screen.clearance_minus is None:
+        return []
+    return [name for name in GAPS if name not in chosen]
 
 
 def _ends(one: Trial) -> list[str]:

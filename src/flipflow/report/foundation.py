@@ -123,7 +123,7 @@ def _running_table(loads: FoundationLoads, shown: Sequence[CaseLoads]) -> Table:
     )
     caption = (
         "Static: weight of machine and load. Then the greatest dynamic load to both sides, peak. "
-        "Least: static less dynamic; below zero a spring lifts off."
+        "Least: static less dynamic; a spring lifts off where one of both is below zero."
     )
     if loads.supports:
         count = len(loads.supports)
@@ -172,16 +172,19 @@ def _runs_table(loads: FoundationLoads) -> Table:
             Column(name.capitalize(), "kN", numeric=True),
             Column("at", "rpm", numeric=True),
         ]
-    columns += [Column("Excited", "rpm"), Column("Least, vertical", "kN", numeric=True)]
+    least = ("vertical", "normal")
+    columns.append(Column("Excited", "rpm"))
+    columns += [Column(f"Least, {name}", "kN", numeric=True) for name in least]
     columns.append(Column("Spring"))
     rows = tuple(
-        (*cells(one.name, *_peaks(loads, one), _excited(one),
-                *_kilo(loads, one.least, ("vertical",))), _state(one.least))
+        (*cells(one.name, *_peaks(loads, one), _excited(one), *_kilo(loads, one.least, least)),
+         _state(one.least))
         for one in loads.runs
     )  # fmt: skip
     caption = (
         "Greatest dynamic load on the way, and the speed at which it comes. Excited: the speeds "
-        "about the greatest load at which it is above 71 % of it."
+        "about the greatest load at which it is above 71 % of it. Least: static less dynamic; a "
+        "spring lifts off where one of both is below zero."
     )
     return Table(f"{_one(loads)}, start and stop", tuple(columns), rows, caption)
 

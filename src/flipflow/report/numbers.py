@@ -8,7 +8,7 @@ from flipflow.io.units import in_unit
 from flipflow.model.numerals import digits, rpm
 from flipflow.model.quantities import QUANTITIES
 
-NOTHING = "-"
+NOTHING, NO_JUMP = "-", "no jump"
 LEAST_KILO = 100.0  # N or W; what is less is shown without kilo
 
 
@@ -40,7 +40,7 @@ def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool
 def named(name: str, value: float | None, *, with_unit: bool = True) -> str:
     """The value of a registered quantity; a margin to a jump that does not exist says so."""
     if name == "jump_margin" and value is not None and math.isinf(value):
-        return "no jump"
+        return NO_JUMP
     one = QUANTITIES[name]
     return quantity(value, one.shown_unit, one.unit, with_unit=with_unit)
 

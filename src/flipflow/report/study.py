@@ -68,6 +68,11 @@ def summary_of_study(found: Study) -> Iterator[Block]:
         rows.append(("Speed", _speeds(found.omega)))
     if found.sample is not None:
         rows.append(("Seed", str(found.sample.seed)))
+        together = "; ".join(_together(found))
+        rows += [("Vary together", together)] if together else []
+    if found.parameters:
+        parameters = f"with respect to {', '.join(found.parameters)}, in the files"
+        rows.append(("Derivatives", parameters))
     yield Values(tuple(rows))
     columns = (Column("Field"), Column("Symbol", brief=False), Column("Varies"))
     shown = [
@@ -76,6 +81,16 @@ def summary_of_study(found: Study) -> Iterator[Block]:
     ]
     yield Table("What varies", columns, tuple(shown))
     yield from (Note(text) for text in found.notes)
+
+
+def _together(found: Study) -> Iterator[str]:
+    """Fields that are correlated, and how much."""
+    if found.sample is None or found.sample.covariance is None:
+        return
+    covariance = np.array(found.sample.covariance)
+    for i, j in zip(*np.nonzero(np.triu(covariance, 1)), strict=True):
+        share = covariance[i, j] / np.sqrt(covariance[i, i] * covariance[j, j])
+        yield f"{found.names[i]} and {found.names[j]}, correlation {share:.3g}"
 
 
 @section(Study, Part.FIRST_PAGE, 20)

@@ -39,7 +39,8 @@ def weight(assessment: Assessment) -> Iterator[Block]:
         yield Text(f"{measured}; both gaps are even in every load case.", LEAD)
         return
     yield Text(f"{measured}.", LEAD)
-    yield _table(sorted(shifted, key=lambda case: -abs(case.gaps.shift))[:MOST_CASES])
+    most = sorted(shifted, key=lambda case: -abs(case.gaps.shift))[:MOST_CASES]
+    yield _table([case for case in shifted if case in most])
     even = len(assessment.cases) - len(shifted)
     if even:
         yield Note(f"In {even} load case{'s' * (even > 1)} both gaps are even.")

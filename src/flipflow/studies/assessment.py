@@ -26,7 +26,7 @@ from flipflow.model.limits import (
 )
 from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
-from flipflow.model.numerals import digits
+from flipflow.model.numerals import digits, rpm
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
@@ -472,7 +472,7 @@ def verdict(
     """One sentence for the top of the report."""
     if omega is None:
         return "No operating speed is given: the allowed speed range stands below."
-    speed = f"{omega * RPM:.4g} rpm"
+    speed = f"{rpm(omega)} rpm"
     unknown = [case for case in cases if case.orbit is None]
     if unknown:
         return f"{speed}: not judged, for {_why_unknown(omega, unknown)}."
@@ -514,7 +514,7 @@ def _outside(omega: float, region: OperatingRegion) -> str:
     below = omega < region.lower
     end, words = (region.lower, region.ends[0]) if below else (region.upper, region.ends[1])
     side = "below" if below else "above"
-    return f", but {side} the operating region: {words} at {end * RPM:.4g} rpm"
+    return f", but {side} the operating region: {words} at {rpm(end)} rpm"
 
 
 def coexisting(cases: tuple[CaseAssessment, ...]) -> tuple[str, ...]:

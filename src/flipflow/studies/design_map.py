@@ -58,8 +58,9 @@ class DesignMap(Frozen, Result):
     steadiness
         The same of the loaded machine as a share of it, (m, n): 1 where the load changes nothing.
     curves
-        Where contact begins over gap and speed, once for all stiffnesses; and for each stiffness
-        that has folds, the folds over gap and speed, through the cusp where they are born.
+        Where contact begins over gap and speed, once for all stiffnesses, unless both gaps differ:
+        the stop touched last then begins at another speed for each. And for each stiffness that has
+        folds, the folds over gap and speed, through the cusp where they are born.
     version
         Version of flipflow.
     """
@@ -144,7 +145,7 @@ def design_map(
             begins = begins or _at(branch.points_of(CONTACT_BEGIN), marks.omega_cs)
         rows.append(row)
         starts += [fold] if fold else []
-    starts = [begins, *starts] if begins else starts
+    starts = [begins, *starts] if begins and _begins_once(screen) else starts
     cs, lb, ub, width, amplitude, steadiness = np.moveaxis(np.array(rows), 2, 0).copy()
     return DesignMap(
         screen, omega, load, gaps, stops, cs, lb, ub, width, amplitude, steadiness,
@@ -159,6 +160,12 @@ def _values(name: str, given: ArrayLike) -> Real:
     if row.size < 2 or row[0] <= 0.0:
         raise InputError(name, given, remedy)
     return row
+
+
+def _begins_once(screen: FlipFlowScreen) -> bool:
+    """Whether contact begins at one speed whatever the stops: both at once, or one alone."""
+    minus = screen.clearance_minus
+    return minus == math.inf or (minus is None and screen.gap_shift == 0.0)
 
 
 def _at(points: tuple[SpecialPoint, ...], omega: float | None) -> SpecialPoint | None:

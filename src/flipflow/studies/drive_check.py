@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.dynamics.normal import normal_amplitude
-from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import Converter
 from flipflow.transient.run_up import AT_SPEED
@@ -167,7 +167,9 @@ def _speed(drive: Drive, demand: Demand) -> Finding | None:
     if settled is None:
         return None
     beyond = _beyond(settled, demand.allowed)
-    if abs(settled / speed - 1.0) <= ELSEWHERE and not beyond:
+    # A working speed that is not allowed is no fault of the drive that keeps it.
+    kept = not beyond or _beyond(speed, demand.allowed)
+    if abs(settled / speed - 1.0) <= ELSEWHERE and kept:
         return None
     told = f"the drive settles at {_rpm(settled)}{beyond}; {_remedy(drive, demand)}"
     return Finding("speed", _state(drive, "speed") if beyond else "attention", f"{told}.")
@@ -199,12 +201,12 @@ def _beyond(speed: float, allowed: tuple[Interval, ...]) -> str:
         return ", and no speed is allowed"
     ends = [end for interval in allowed for end in interval]
     nearest = min(ends, key=lambda end: abs(end - speed))
-    return f", {'above' if speed > nearest else 'below'} the allowed {_rpm(nearest, 4)}"
+    return f", {'above' if speed > nearest else 'below'} the allowed {_rpm(nearest)}"
 
 
 def _at_rest(drive: Drive, demand: Demand) -> Finding | None:
     """The torque at rest against what lifts the unbalance and overcomes friction over a turn."""
-    weight, at_rest = unbalance_weight(demand.screen).torque, drive.torque_at_rest
+    weight, at_rest = abs(unbalance_weight(demand.screen).torque), drive.torque_at_rest
     asked = weight + drive.friction
     if drive.motor is None or at_rest > asked:
         return None
@@ -255,5 +257,5 @@ def _down(ratio: float) -> str:
     return f"{math.floor(ratio / step + 1e-9) * step:.4g}"
 
 
-def _rpm(omega: float, digits: int = 4) -> str:
-    return f"{omega * RPM:.{digits}g} rpm"
+def _rpm(omega: float) -> str:
+    return f"{rpm(omega)} rpm"

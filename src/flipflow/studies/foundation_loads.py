@@ -206,9 +206,12 @@ class FoundationLoads(Result):
         parts = []
         if self.cases:
             heaviest = max(self.cases, key=lambda one: one.static.total or 0.0)
-            uneven = max(self.static_shares, default=1.0) * max(count, 1)
-            parts.append(f"{self._kilo(uneven * (heaviest.static.total or 0.0))} at rest")
             one = max(self.cases, key=lambda one: one.running.total or one.running.along or 0.0)
+            uneven = max(self.static_shares, default=1.0) * max(count, 1)
+            most = "up to " if len(set(self.static_shares)) > 1 else ""
+            weight = self._kilo(uneven * (heaviest.static.total or 0.0))
+            case = "" if heaviest is one else f" ({case_words(heaviest.name)})"
+            parts.append(f"{most}{weight} at rest{case}")
             parts.append(
                 f"running at {digits(one.omega * RPM, 4)} rpm {self._worst(one.running)} "
                 f"({case_words(one.name)})"

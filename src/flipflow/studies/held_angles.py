@@ -20,7 +20,8 @@ WORST_FIRST = ("not started", "captured", "short", "unfinished", "reached")
 def held_angles(screen: FlipFlowScreen, drive: Drive) -> tuple[float, ...]:
     """Angles in rad: hanging first, then the ends of the ranges that friction holds, and the top.
 
-    Friction T_f holds the shaft where gravity's torque m0 r g |cos(phi + alpha)| is no larger.
+    Friction T_f holds the shaft where gravity's torque m0 r g |cos(phi + s alpha)| is no larger,
+    with s = 1 for an unbalance that turns with the flow, else -1.
     Without gravity all angles are alike but for a shift of the frames' phase: 0 stands for them.
     """
     weight = abs(unbalance_weight(screen).torque)

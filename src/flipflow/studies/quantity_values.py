@@ -32,6 +32,7 @@ Complex = NDArray[np.complex128]
 Values = float | Real
 Harmonics = complex | NDArray[Any]
 Frame = Literal["main", "floating"]
+EVEN = 1e-9  # offset over amplitude below which a motion is about the middle but for rounding
 FRAMES = get_args(Frame)  # in the order of the degrees of freedom
 Coordinate = Literal["main", "floating", "relative"]
 
@@ -117,7 +118,7 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     "stroke": lambda m: 2.0 * m.amplitude("relative"),
     "main_amplitude": lambda m: m.amplitude("main"),
     "floating_amplitude": lambda m: m.amplitude("floating"),
-    "relative_offset": lambda m: m.offset(),
+    "relative_offset": lambda m: beyond_rounding(m.offset(), m.amplitude("relative")),
     "relative_phase": lambda m: m.phase("relative"),
     "main_frame_acceleration": lambda m: m.peak_acceleration("main"),
     "floating_frame_acceleration": lambda m: m.peak_acceleration("floating"),
@@ -147,6 +148,12 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
         m.omega**2 * m.normal_amplitude() / (GRAVITY * np.cos(m.field("deck_angle")))
     ),
 }
+
+
+def beyond_rounding(offset: Values, amplitude: Values) -> Values:
+    """An offset; 0 where it is what rounding leaves of a motion about the middle."""
+    beyond = np.greater(offset, EVEN * np.asarray(amplitude))
+    return np.where(beyond, offset, 0.0 * np.asarray(offset))
 
 
 def rated_life(rating: Values, load: Values, exponent: Values, omega: Values) -> Values:

@@ -185,8 +185,8 @@ def sensitivity(
         or a :class:`~flipflow.MechanicalSystem`.
     vary
         Fields of the screen or of the dataclass, or places in the system such as
-        ``"springs[0].clearance"``; each with an interval (low, high), an array that is sampled as
-        it stands, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
+        ``"springs[0].clearance"``; each with an interval as a tuple (low, high), an array or a list
+        that is sampled as it stands, :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
     quantity
         A quantity of a motion, such as ``"relative_amplitude"`` or ``"main_frame_acceleration"``,
         or one of the whole response: ``"peak_amplitude"``, ``"peak_frequency"``, ``"omega_ea"``,

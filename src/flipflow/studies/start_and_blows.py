@@ -8,11 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 from flipflow.errors import Cancelled, IncompleteError, InputError
-from flipflow.model.constants import RPM
 from flipflow.model.drive import Drive
 from flipflow.model.limits import Passage
 from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
+from flipflow.model.numerals import rpm
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.studies.drive_check import (
@@ -309,6 +309,6 @@ def _resonance(
     powers = [power for power in known if power is not None]
     if not powers:
         return ()
-    held = f"{run.near.name} = {run.near.omega * RPM:.4g} rpm ({case_words(found.case)})"
+    held = f"{run.near.name} = {rpm(run.near.omega)} rpm ({case_words(found.case)})"
     sentence = f"{power_words(max(powers))} of rated power pass {held} however slowly."
     return (Finding("resonance", "attention", sentence),)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from flipflow.model.constants import RPM
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 from flipflow.studies.drive_check import Finding
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 
@@ -47,23 +48,29 @@ MOST_NAMED = 3
 def _failure(failed: tuple[CaseRuns, ...], count: int) -> str:
     """What becomes of the starts that fail: those of the first kind in their cases."""
     told = failed[0].start
-    return f"{in_cases([one.case for one in failed], count)} it {told.verdict if told else ''}"
+    verb = "is " if told and told.outcome in {"captured", "unfinished"} else ""
+    verdict = told.verdict if told else ""
+    return f"{in_cases([one.case for one in failed], count)} it {verb}{verdict}"
 
 
 def _success(found: Transients) -> str:
-    times = [one.start.time_to_speed for one in found.cases if one.start]
-    last = [one.start.final_speed for one in found.cases if one.start]
-    run = found.start
-    wanted = "" if run is None else f"{run.speed * RPM:.4g} rpm"
-    known = [time for time in times if time is not None]
-    if len(known) < len(times) or not known:
-        reached = "" if run is None else run.verdict
-    else:
-        reached = f"reaches {wanted} in at most {max(known):.3g} s"
-        low, high = (f"{end * RPM:.0f}" for end in (min(last, default=0.0), max(last, default=0.0)))
-        reached += f", then {low if low == high else f'{low} to {high}'} rpm"
+    """How fast, and at what speeds the load cases then run."""
+    run, told = found.start, [(one.case, one.start) for one in found.cases if one.start]
+    if run is None or not told:
+        return f"it {'starts' if run is None else run.verdict}"
+    times = [start.time_to_speed for _, start in told if start.time_to_speed is not None]
+    if len(told) == 1 and not times:
+        return f"it {run.verdict}"
+    wanted = f"{rpm(run.speed)} rpm"
+    reached = f"comes near {wanted}"
+    if times:
+        short = [name for name, start in told if start.time_to_speed is None]
+        but = f", but not quite {in_cases(short, len(told))}" if short else ""
+        reached = f"reaches {wanted} in at most {max(times):.3g} s{but}"
+    ends = [start.final_speed * RPM for _, start in told]
+    low, high = f"{min(ends):.0f}", f"{max(ends):.0f}"
     cases = " in every load case" if len(found.cases) > 1 else ""
-    return f"it {reached}{cases}"
+    return f"it {reached}, then {low if low == high else f'{low} to {high}'} rpm{cases}"
 
 
 def _remedies(findings: tuple[Finding, ...]) -> str:

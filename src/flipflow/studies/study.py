@@ -192,7 +192,7 @@ def study(
         The machine whose fields vary: a screen, any frozen dataclass with ``.system()``, or a
         :class:`~flipflow.MechanicalSystem`.
     vary
-        Its fields with an interval (low, high), an array of values,
+        Its fields with an interval as a tuple (low, high), an array or a list of values,
         :class:`~flipflow.Normal` or :class:`~flipflow.Choice`; SI.
     quantities
         One or several, as :func:`~flipflow.sensitivity` takes them.

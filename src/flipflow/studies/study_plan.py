@@ -41,7 +41,14 @@ UNLOADED = "empty"
 NOMINAL, LOW, HIGH = "nominal", "low", "high"
 ROWS = "sample", "case", "omega"
 PARAMETER = "parameter"
-RESERVED = (*ROWS, "field", PARAMETER, REASON)  # names that no parameter of a machine can have
+PARAMETER_UNIT = "parameter_unit"
+RESERVED = (
+    *ROWS,
+    "field",
+    PARAMETER,
+    PARAMETER_UNIT,
+    REASON,
+)  # names that no parameter of a machine can have
 # Machines, each under each load, of a chunk: seconds of work, so that little is lost with it.
 CHUNK_MACHINES = 64
 MOST_CHUNKS = 2048  # of a study: each is a file of every quantity
@@ -144,8 +151,11 @@ class Plan:
         }
         if self.derivatives:
             fixed[PARAMETER] = Variable((PARAMETER,), np.array(self.derivatives))
-            for name in self.asked:
-                growing[slope_key(name)] = Variable((*ROWS, PARAMETER), np.array(np.nan))
+            units = units_of_parameters(self.machine, self.derivatives)
+            fixed[PARAMETER_UNIT] = Variable((PARAMETER,), units)
+            for name, one in self.asked.items():
+                told = unit_of_slope(self.machine, one)
+                growing[slope_key(name)] = Variable((*ROWS, PARAMETER), np.array(np.nan), told)
         growing[REASON] = Variable(ROWS, np.array(NOT_COMPUTED, np.int8))
         return Layout(self.manifest, fixed, growing, shape, self.rows)
 
@@ -392,6 +402,18 @@ def unit_of(machine: Machine, name: str) -> str:
     """SI unit of a field of a screen; of any other machine none is known."""
     known = isinstance(machine, FlipFlowScreen) and name in FIELD
     return FIELD[name].unit if known else ""
+
+
+def units_of_parameters(machine: Machine, names: Sequence[str]) -> NDArray[np.str_]:
+    """SI units of what quantities are differentiated with respect to, (P,)."""
+    return np.array([unit_of(machine, name) for name in names], str)
+
+
+def unit_of_slope(machine: Machine, quantity: Quantity) -> str:
+    """Unit of the derivatives of a quantity: so much for one unit of the parameter."""
+    if not isinstance(machine, FlipFlowScreen):
+        return ""
+    return f"{quantity.unit} per {PARAMETER_UNIT}".lstrip()
 
 
 def _plain(column: NDArray[Any]) -> NDArray[Any]:

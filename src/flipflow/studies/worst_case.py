@@ -158,7 +158,7 @@ def worst_case(
         The machine whose parameters vary: a screen, any frozen dataclass with ``.system()``, or
         a :class:`~flipflow.MechanicalSystem`.
     vary
-        Parameters and their intervals (low, high), SI.
+        Parameters and their intervals, tuples (low, high) in SI.
     quantity
         What is read off, as of :func:`~flipflow.sensitivity`.
     omega
@@ -188,8 +188,8 @@ def worst_case(
     """
     question = question_of(machine, quantity, omega, branch)
     for name, given in vary.items() if isinstance(vary, Mapping) else ():
-        if not isinstance(given, (tuple, list, Interval)):
-            remedy = "a worst case needs an interval (low, high), in SI"
+        if not isinstance(given, (tuple, Interval)):
+            remedy = "a worst case needs an interval (low, high), a tuple in SI"
             raise InputError(f"vary {name}", given, remedy)
     varied = variations(vary, machine)
     names = tuple(one.name for one in varied)

@@ -374,7 +374,7 @@ def _notes(machine: Machine, drive: Drive | SpeedProfile) -> list[str]:
 
 def _gravity(machine: Machine, drive: Drive) -> list[str]:
     """What the weight of the unbalance would change, where the equations leave it out."""
-    if unbalance_weight(machine).torque > 0.0:
+    if unbalance_weight(machine).torque != 0.0:
         return []
     forces = machine.system().excitations
     moment = sum(float(np.abs(f.vector).max()) for f in forces if isinstance(f, Unbalance))

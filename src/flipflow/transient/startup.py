@@ -50,10 +50,11 @@ def start_up(
 ) -> RunUp:
     r"""Start a machine from rest.
 
-    With shaft angle phi, inertia J, motor torque T, friction T_f and deck angle alpha,
+    With shaft angle phi, inertia J, motor torque T, friction T_f, deck angle alpha, and s = 1 for
+    an unbalance that turns with the flow, -1 for one that turns counter to it,
 
     .. math:: J \ddot\varphi = T(\dot\varphi) - T_f + m_0 r (\ddot x_1 \sin\varphi
-              - \ddot y_1 \cos\varphi) - m_0 r g \cos(\varphi + \alpha) .
+              - s \ddot y_1 \cos\varphi) - s m_0 r g \cos(\varphi + s \alpha) .
 
     The last term, gravity on the unbalance, is left out for a machine without ``deck_angle``; a
     note says so. Where the ratio of the drive is open, or the end of a converter's ramp, it is
@@ -71,8 +72,8 @@ def start_up(
     duration
         Longest time in s; None: 60 s or the profile's; a run ends when nothing changes any more.
     angle
-        Shaft angle at rest in rad; None: the unbalance hangs, at -pi/2 - alpha, or 0 where gravity
-        is left out.
+        Shaft angle at rest in rad; None: the unbalance hangs, at -s pi/2 - s alpha, or 0 where
+        gravity is left out.
     method
         How it is stepped.
     monitor
