@@ -165,3 +165,14 @@ def test_simulation_is_that_of_dop853_and_keeps_its_energy(dop853, name, omega) 
     given = energy["input"] + energy["impulses"] + energy["loads"]
     size = max(abs(value) for value in energy.values())
     close("energy", given, energy["dissipated"] + energy["stored"], abs=1e-9 * size)
+
+
+def test_a_drift_that_nothing_holds_is_no_loss_of_symmetry() -> None:
+    """A free pair between stops far apart: over half a turn an eigenvalue is -1 all along."""
+    K = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    stop = ff.ClearanceSpring([1.0, 0.0], 5.0, 0.1, 40.0)
+    C = 0.05 * K + 0.02 * np.eye(2)
+    machine = ff.MechanicalSystem(np.eye(2), C, K, [stop], ff.HarmonicForce([1.0, 0.0]))
+    branch = ff.frequency_response(machine, (0.8, 1.2))
+    assert branch.complete
+    assert branch.special_points == ()

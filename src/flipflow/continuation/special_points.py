@@ -30,13 +30,20 @@ from flipflow.errors import IncompleteError
 from flipflow.periodic.balance_solver import BalanceSolver
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Point, Solver, Traced
-from flipflow.periodic.stability import determinant_plus, has_unit_pair, neimark_sacker, saddle_side
+from flipflow.periodic.stability import (
+    LARGEST_LOG,
+    determinant_plus,
+    has_unit_pair,
+    neimark_sacker,
+    saddle_side,
+)
 
 # A dip of |test| is followed to its bottom where any of these three holds.
 DIP = 0.5  # the parabola through it falls below this share of its lowest point
 SHARP_DIP = 0.3  # that point lies below this share of both its neighbours
 LOW = 1e-3  # that point lies below this share of the largest value along the branch
 BOTTOM_STEPS = 15  # evaluations in the search for the bottom of a dip
+ROUNDING = 1e-12  # of det (P + I), as a share of the largest that it could be
 QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a step at which a suspected dip is looked for
 
 FOLD, BRANCH_POINT = "fold", "branch point"
@@ -183,6 +190,9 @@ def _map_tests(
 ) -> list[Test]:
     fold = traced.tangent[:, -1] / traced.course.omega_step
     flips = determinant_plus(maps)
+    # Where nothing holds a drift an eigenvalue is -1 all along, and the determinant is rounding.
+    largest = np.log1p(np.abs(eigenvalues)).sum(axis=1)
+    flips[np.abs(flips) < ROUNDING * np.exp(np.minimum(largest, LARGEST_LOG))] = 0.0
     hidden = partial(_plunges, arc=_arc(traced), signature=traced.signature)
     kind = SYMMETRY if solver.half_turn else DOUBLING
     return [
