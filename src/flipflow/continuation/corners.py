@@ -57,6 +57,25 @@ def begins_to_lean(problem: Any, scratch: Any, work: Corrector, depth: Real, ste
 
 
 @kernel
+def becomes_even(work: Corrector, depth: Real, step: float) -> bool:
+    """Whether a motion that leans to one side is its own mirror image after a step, by its depths.
+
+    Leaning motions pass the even one on their way to their mirror images, but do not become it. The
+    last point has depths (m, 2).
+    """
+    leant = False
+    for j in range(work.depth.shape[0]):
+        if work.uneven[j] != 0.0:
+            continue
+        before = abs(depth[j, 0] - depth[j, 1])
+        after = abs(work.depth[j, 0] - work.depth[j, 1])
+        if after > LEANING * before:
+            return False
+        leant = leant or before > LEANING * step * work.scale[0]
+    return leant
+
+
+@kernel
 def leaning(problem: Any, scratch: Any, work: Corrector, point: Real) -> float:
     """How far a point's motion is from its own mirror image, in steps; what tells it is in work."""
     n, off = work.r.shape[0], 0.0

@@ -15,7 +15,13 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_sign, lu_spread
-from flipflow.continuation.corners import TURN_MOST, begins_to_lean, orient, turn_corner
+from flipflow.continuation.corners import (
+    TURN_MOST,
+    becomes_even,
+    begins_to_lean,
+    orient,
+    turn_corner,
+)
 from flipflow.continuation.correction import (
     TOLERATED,
     Corrector,
@@ -196,8 +202,9 @@ def judge(
     longest = CROSSING_STEP if straight else STRAND_STEP
     may_cross = step <= longest and (changed or lu_spread(work.A) < CROSSING)
     depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
-    leans = changed and begins_to_lean(problem, scratch, work, branch.depth[p], step)
-    if leans or (other_side and not may_cross):
+    depth = branch.depth[p]
+    leans = changed and begins_to_lean(problem, scratch, work, depth, step)
+    if leans or becomes_even(work, depth, step) or (other_side and not may_cross):
         return REASON_STRAND
     if changed and other_side:
         orient(problem, scratch, work, contacts, step)

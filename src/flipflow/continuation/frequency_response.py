@@ -48,6 +48,8 @@ BACK = 0.96  # share of the last frequency without contact down to which its bra
 STEPS_UP = 8  # least steps from there to the frequency asked for
 RATIO_UP = 1.25  # of the frequencies above that are tried for a motion without contact
 RATIOS_UP = 40  # of them at most
+RATIO_SETTLED = 2.0  # of those at which the machine is left to settle
+RATIOS_SETTLED = 6  # of them at most
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -212,7 +214,8 @@ def some_unknowns(solver: Solver, omega: float) -> Real:
     if solver.starts(settled, omega):
         return settled
     exact = _exact(solver, half_turn=solver.half_turn)
-    for z in chain(_followed_down(exact, omega), found_motions(exact, omega)):
+    ways = _followed_down(exact, omega), found_motions(exact, omega), _settled_above(exact, omega)
+    for z in chain(*ways):
         u = _unknowns_of(solver, exact, z, omega)
         if solver.starts(u, omega):
             return u
@@ -226,13 +229,32 @@ def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
             break
     else:
         return
-    start, step = contact_free_unknowns(solver, free), (free - omega) / STEPS_UP
-    for way in WAYS:
-        course = correction.Course(omega, free / BACK, step, way.share, -1.0, way.tolerance)
-        last = solver.end_of_branch(start, free, course, way.points)
+    last = _down(solver, contact_free_unknowns(solver, free), free, omega)
+    if last is not None:
+        yield last
+
+
+def _settled_above(solver: ExactSolver, omega: float) -> Iterator[Real]:
+    """States at ``omega`` on branches of what the machine settles to from rest at higher ones.
+
+    At low frequency a turn on the way to a motion may have more contacts than can be recorded.
+    """
+    for above in (omega * RATIO_SETTLED ** np.arange(1, RATIOS_SETTLED)).tolist():
+        start = settled_unknowns(solver, above)
+        last = _down(solver, start, above, omega) if solver.starts(start, above) else None
         if last is not None:
             yield last
-            return
+
+
+def _down(solver: ExactSolver, start: Real, above: float, omega: float) -> Real | None:
+    """State at ``omega`` on the branch through one at a higher frequency."""
+    step = (above - omega) / STEPS_UP
+    for way in WAYS:
+        course = correction.Course(omega, above / BACK, step, way.share, -1.0, way.tolerance)
+        last = solver.end_of_branch(start, above, course, way.points)
+        if last is not None:
+            return last
+    return None
 
 
 def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
