@@ -177,8 +177,8 @@ DRAWN = 1_690_858_624  # a seed of benchmarks/paths.py, of which these did not r
     ("law", "ratio", "number"),
     [
         ("paper", 0.0, 261),  # a Newton step that shrinks no more was taken for rounding
-        ("paper", 0.0, 303),
         ("paper", 0.05, 360),
+        ("paper", 0.15, 117),  # a short step at a crossing led onto leaning motions
         ("compression-only", 0.05, 7),  # went back at a corner to contacts two points before
         ("compression-only", 1.0, 215),  # leaning motions from a second touch, round and round
         ("compression-only", 1.0, 480),
@@ -199,3 +199,16 @@ def test_crossings_are_passed_with_steps_of_any_length() -> None:
     for points in range(200, 300, 10):
         branch = ff.frequency_response(machine, interval, ff.PiecewiseExact(points=points))
         assert branch.complete, (points, branch.status)
+
+
+@pytest.mark.parametrize("pull", [1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("order", [0, 2])
+def test_machines_that_are_hardly_uneven(pull: float, order: int) -> None:
+    """Equal gaps, and a little constant force or one twice as fast: no motion is even."""
+    stop = ff.ClearanceSpring([1.0], 20.0, 0.2, 3.0)
+    forces = (ff.Unbalance([1.0]), *([ff.HarmonicForce([pull], order=order)] if order else []))
+    machine = ff.MechanicalSystem(
+        [[1.0]], [[0.1]], [[1.0]], [stop], forces, static_force=None if order else [pull]
+    )
+    branch = ff.frequency_response(machine, (0.3, 6.0))
+    assert branch.complete, branch.status

@@ -15,6 +15,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_sign
 from flipflow.continuation.correction import (
+    STALLED,
     TOLERATED,
     Corrector,
     Course,
@@ -28,27 +29,31 @@ from flipflow.continuation.correction import (
 from flipflow.continuation.problem import depths, mirrored, residual, signature
 
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the other side is sought
-LEANING = 1e-3  # distance from the mirror image from which on a motion leans, in steps
+LEANING = 1e-3  # share of a step, or of a difference before it, from which on a motion leans
 EVEN = 0.1  # the same as a share of the tangent
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 
 
 @kernel
-def begins_to_lean(problem: Any, scratch: Any, work: Corrector, depth: Real, step: float) -> bool:
+def begins_to_lean(
+    problem: Any, scratch: Any, work: Corrector, depth: Real, step: float, changed: bool
+) -> bool:
     """Whether the corrected motion leans to one side, though the last point's did not.
 
     Where both sides of a stop begin to graze at once, be it for the second time in a turn, leaning
     motions branch off; the one that is its own mirror image goes on, until a stop is met that is
-    not the same on both sides. The last point has depths (m, 2).
+    not the same on both sides. Where contacts do not change, both depths tell. The last point has
+    depths (m, 2).
     """
-    n, meets = work.r.shape[0], False
+    n, suspect = work.r.shape[0], False
     for j in range(work.depth.shape[0]):
+        size = abs(work.depth[j, 0] - work.depth[j, 1])
         met = max(work.depth[j, 0], work.depth[j, 1]) > 0.0
         evenly = work.uneven[j] == 0.0 and abs(depth[j, 0] - depth[j, 1]) <= LEANING * work.scale[0]
         if met and not evenly:
             return False
-        meets = meets or met
-    if not meets:
+        suspect = suspect or (met and (changed or size > LEANING * step * work.scale[0]))
+    if not suspect:
         return False
     leans = leaning(problem, scratch, work, work.w) > LEANING * step
     leans = leans and stays_even(problem, scratch, work)
@@ -77,7 +82,10 @@ def becomes_even(work: Corrector, depth: Real, step: float) -> bool:
 
 @kernel
 def leaning(problem: Any, scratch: Any, work: Corrector, point: Real) -> float:
-    """How far a point's motion is from its own mirror image, in steps; what tells it is in work."""
+    """How far a point's motion is from its own mirror image, in steps.
+
+    work.r and work.J are then those of the mirrored problem.
+    """
     n, off = work.r.shape[0], 0.0
     if residual(mirrored(problem), scratch, point, float(point[n]), work.r, work.J) != status.OK:
         return math.inf
@@ -181,26 +189,35 @@ def go_round(
         behind = contacts_beside(sought, scratch, work, here, along, -length) == contacts
         if ahead != behind:
             way = length if ahead else -length
-            turned_back = behind and came_through(work, branch, p, contacts, length)
-            if turned_back or not step_round(sought, scratch, work, contacts, way, course):
+            if not step_round(sought, scratch, work, contacts, way, course):
                 return 0.0
-            return length if confirm(problem, scratch, work, branch.depth[p], length) else 0.0
+            if not confirm(problem, scratch, work, branch.depth[p], length):
+                return 0.0
+            met = signature(problem, scratch)
+            return 0.0 if behind and came_through(work, branch, p, met, length) else length
     return 0.0
 
 
 @kernel
 def came_through(work: Corrector, branch: Any, p: int, contacts: int, length: float) -> bool:
     """Whether the branch had such contacts within a length, in steps, before point p."""
-    n, way, q = work.r.shape[0], 0.0, p
+    way, q = 0.0, p
     while q > 0 and way < length:
-        square = ((branch.omega[q] - branch.omega[q - 1]) / work.scale[n]) ** 2
-        for k in range(n):
-            square += ((branch.u[q, k] - branch.u[q - 1, k]) / work.scale[k]) ** 2
-        way += math.sqrt(square)
+        way += distance(work, branch, q, q - 1)
         q -= 1
         if branch.signature[q] == contacts:
             return True
     return False
+
+
+@kernel
+def distance(work: Corrector, branch: Any, p: int, q: int) -> float:
+    """Distance of two points of a branch, in steps."""
+    n = work.r.shape[0]
+    square = ((branch.omega[p] - branch.omega[q]) / work.scale[n]) ** 2
+    for k in range(n):
+        square += ((branch.u[p, k] - branch.u[q, k]) / work.scale[k]) ** 2
+    return math.sqrt(square)
 
 
 @kernel
@@ -212,7 +229,7 @@ def step_round(
     for k in range(n + 1):
         work.guess[k] = work.here[k] + step * work.tangent[k] * work.scale[k]
         work.border[k] = work.before[k] = math.copysign(1.0, step) * work.tangent[k]
-    code, _ = correct(sought, scratch, work, TOLERATED * abs(step))
+    code, _ = correct(sought, scratch, work, TOLERATED * abs(step), STALLED * abs(step))
     if code != status.OK or signature(sought, scratch) != contacts:
         return False
     return in_bounds(work, course) and astray(work) < abs(step)
@@ -223,11 +240,11 @@ def confirm(problem: Any, scratch: Any, work: Corrector, depth: Real, step: floa
     """Correct the point in work as one of the problem; whether it is one, and leads on."""
     for k in range(work.w.shape[0]):
         work.guess[k] = work.w[k]
-    code, _ = correct(problem, scratch, work, TOLERATED * step)
+    code, _ = correct(problem, scratch, work, TOLERATED * step, STALLED * step)
     if code != status.OK or astray(work) > step:
         return False
     depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
-    if begins_to_lean(problem, scratch, work, depth, step):
+    if begins_to_lean(problem, scratch, work, depth, step, True):
         return False
     cosine = new_tangent(work)
     work.side[0] = lu_sign(work.A, work.pivot)

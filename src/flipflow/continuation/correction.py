@@ -27,9 +27,10 @@ from flipflow.continuation.problem import (
 
 # Lengths are measured in steps, as the unknowns are.
 NEWTON_MOST = 8  # iterations after which a correction has failed
-QUICK = 1e-6  # last Newton step where a branch is followed; below it, one that stalls is rounding
+QUICK = 1e-6  # last Newton step where a branch is followed
 SHARP = 1e-10  # last Newton step where a single point is refined
 TOLERATED = 1e-4  # last Newton step, at most this share of the step along the branch
+STALLED = 1e-2  # the same of one that shrinks no more, which QUICK bounds, too
 
 
 class Course(NamedTuple):
@@ -162,7 +163,9 @@ def newton_update(work: Corrector) -> float:
 
 
 @kernel
-def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tuple[int, int]:
+def correct(
+    problem: Any, scratch: Any, work: Corrector, tolerance: float, stalled: float = QUICK
+) -> tuple[int, int]:
     """Newton from work.guess within the plane through it normal to work.border (scaled).
 
     The plane omega = constant has the border (0, ..., 0, 1). Returns status and iterations; the
@@ -186,7 +189,7 @@ def correct(problem: Any, scratch: Any, work: Corrector, tolerance: float) -> tu
             return status.NO_CONVERGENCE, iteration
         # A step that no longer shrinks and is tiny has met the rounding of the residual, unless it
         # goes to and fro over a grazing.
-        if length < tolerance or (same and before <= length < min(QUICK, 100.0 * tolerance)):
+        if length < tolerance or (same and before <= length < min(QUICK, stalled)):
             return status.OK, iteration
         before = length
     return status.NO_CONVERGENCE, NEWTON_MOST

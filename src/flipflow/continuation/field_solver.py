@@ -116,9 +116,11 @@ class FieldSolver(ExactSolver):
 
     @property
     def uneven(self) -> Real:
-        gap = self.problem.series.gap
+        gap, static = self.problem.series.gap, self.problem.series.static
+        pulled = np.any(self.machine.order % 2 == 0) or np.any(static)
         with np.errstate(invalid="ignore"):
-            return np.where((gap[..., 0] == gap[..., 1]).all(axis=(0, 1)), 0.0, 1.0)
+            even = (gap[..., 0] == gap[..., 1]).all(axis=(0, 1))
+        return np.where(even & ~pulled, 0.0, 1.0)
 
     def like(self, *, half_turn: bool, turns: int) -> FieldSolver:
         return FieldSolver(

@@ -6,7 +6,6 @@ end in :mod:`flipflow.continuation.corners`.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,10 +18,12 @@ from flipflow.continuation.corners import (
     TURN_MOST,
     becomes_even,
     begins_to_lean,
+    distance,
     orient,
     turn_corner,
 )
 from flipflow.continuation.correction import (
+    STALLED,
     TOLERATED,
     Corrector,
     Course,
@@ -55,7 +56,7 @@ SHRINK = 0.7  # factor on the step after many iterations
 HALVE = 0.5  # factor on a step that was refused
 LONGEST = 1.0  # length beyond which a step does not grow
 SHORTEST = 1e-10  # length below which the branch is given up
-CREEPING = 1e-3  # length of steps that lead nowhere where many follow each other
+CREEPING = 2e-4  # length of steps that lead nowhere where many follow each other
 CREEPING_MOST = 500  # such steps in a row after which the branch is given up where they begin
 FAR = 2.0  # from this many chords on, the tangent predicts a step, not the cubic
 ASTRAY_MOST = 0.05  # largest distance of the corrected point from the guess, as a share of the step
@@ -65,7 +66,7 @@ BACK = 1.0  # share of a step within which it may then have come back to that po
 MET = 1e-3  # distance from that point of a branch that has
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
 STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
-CROSSING_STEP = 1e-2  # the same where the branch goes straight on: close to a crossing tangents mix
+CROSSING_STEP = 1e-2  # the same where the branch goes straight on
 STRAIGHT = 0.9999  # cosine between the tangents from which on it does
 STRAIGHT_MOST = 1e-3  # largest distance from the guess for that, as a share of the step
 CROSSING = 1e-2  # least pivot of that matrix, as a share of its largest, where others may cross
@@ -197,18 +198,27 @@ def judge(
     if changed and step > CONTACT_STEP:
         return REASON_CONTACT
     other_side = work.side[0] != branch.side[p]
-    # Where another branch crosses the matrix is singular; a mere jump to another strand is not.
-    straight = not changed and cosine > STRAIGHT and astray(work) < STRAIGHT_MOST * step
-    longest = CROSSING_STEP if straight else STRAND_STEP
-    may_cross = step <= longest and (changed or lu_spread(work.A) < CROSSING)
     depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
     depth = branch.depth[p]
-    leans = changed and begins_to_lean(problem, scratch, work, depth, step)
-    if leans or becomes_even(work, depth, step) or (other_side and not may_cross):
+    leans = begins_to_lean(problem, scratch, work, depth, step, changed)
+    other_strand = other_side and not may_cross(work, step, changed, cosine)
+    if leans or other_strand or becomes_even(work, depth, step):
         return REASON_STRAND
     if changed and other_side:
         orient(problem, scratch, work, contacts, step)
     return REASON_NONE
+
+
+@kernel
+def may_cross(work: Corrector, step: float, changed: bool, cosine: float) -> bool:
+    """Whether the sign of det [J; tangent] may change in a step because another branch crosses.
+
+    There the matrix is singular, which it is not where the step leads to another strand; close by
+    tangents mix, so that where the branch goes straight on it is passed in a longer step.
+    """
+    straight = not changed and cosine > STRAIGHT and astray(work) < STRAIGHT_MOST * step
+    longest = CROSSING_STEP if straight else STRAND_STEP
+    return step <= longest and (changed or lu_spread(work.A) < CROSSING)
 
 
 @kernel
@@ -221,16 +231,6 @@ def tangent_ahead(work: Corrector) -> float:
         for k in range(work.tangent.shape[0]):
             work.tangent[k] = -work.tangent[k]
     return abs(cosine)
-
-
-@kernel
-def from_start(work: Corrector, branch: Record, p: int) -> float:
-    """Distance of point p from the first one, in steps."""
-    n = work.r.shape[0]
-    square = ((branch.omega[p] - branch.omega[0]) / work.scale[n]) ** 2
-    for k in range(n):
-        square += ((branch.u[p, k] - branch.u[0, k]) / work.scale[k]) ** 2
-    return math.sqrt(square)
 
 
 @kernel
@@ -335,7 +335,8 @@ def attempt(
     same = p > 1 and branch.signature[p - 1] == branch.signature[p - 2]
     ended = predict(work, step, course, same)
     # A correction as long as the step itself would not tell one strand from the next.
-    code, iterations = correct(problem, scratch, work, min(course.tolerance, TOLERATED * step))
+    tolerance = min(course.tolerance, TOLERATED * step)
+    code, iterations = correct(problem, scratch, work, tolerance, STALLED * step)
     if ended != NOTHING:
         work.w[ended] = work.guess[ended]  # to the last digit
     reason = judge(problem, scratch, work, branch, p - 1, step, code, iterations, course)
@@ -393,7 +394,7 @@ def trace(
             return code, p
         # Counted in steps, for a closed branch may be smaller than the longest one.
         travelled += step
-        near = travelled > AWAY * step and from_start(work, branch, p) < BACK * step
+        near = travelled > AWAY * step and distance(work, branch, p, 0) < BACK * step
         closed = near and passes_start(problem, scratch, work, branch, p, course)
         ended = arrival(branch, course, p, ends, closed)
         p += 1

@@ -32,6 +32,7 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import Point, Solver, Traced
 from flipflow.periodic.stability import (
     LARGEST_LOG,
+    determinant_minus,
     determinant_plus,
     has_unit_pair,
     neimark_sacker,
@@ -104,7 +105,7 @@ def find_special_points(
         return _confirmed(ExactBeside(solver, traced), found, notes, side)
     if isinstance(solver, ExactSolver):
         # The multipliers of a series cross +1 a little beside its folds.
-        found += _branch_points(solver, traced, eigenvalues)
+        found += _branch_points(solver, traced, maps, eigenvalues)
         found.sort(key=lambda one: (one.index, one.share))
     return found, notes
 
@@ -273,12 +274,12 @@ def _plunges(values: Real, arc: Real, signature: NDArray[np.int64]) -> tuple[int
 
 
 def _branch_points(
-    solver: Solver, traced: Traced, eigenvalues: NDArray[np.complex128]
+    solver: Solver, traced: Traced, maps: Real, eigenvalues: NDArray[np.complex128]
 ) -> list[Found]:
     """Where an eigenvalue passes +1 and the branch does not turn: another branch crosses.
 
     So it does where a machine is like itself in more ways than by its mirror image. The loop passes
-    such a point by a tiny step; of its two ends the one nearer to it is taken.
+    such a point by a short step.
     """
     rises = traced.tangent[:, -1] / traced.course.omega_step
     real = eigenvalues.imag == 0.0
@@ -286,14 +287,32 @@ def _branch_points(
     turns = (rises[1:] * rises[:-1] < 0.0) | (np.abs(rises[1:]) < JUMP)
     # At a corner the map jumps.
     smooth = traced.signature[1:] == traced.signature[:-1]
-    away = np.where(real, np.abs(eigenvalues - 1.0), np.inf).min(axis=1)
-    found = []
-    for p in map(int, np.flatnonzero((side[1:] * side[:-1] < 0.0) & ~turns & smooth)):
-        share = int(away[p + 1] < away[p])
-        u, omega = traced.u[p + share].copy(), float(traced.omega[p + share])
-        point = Point(solver.formulation, u, omega, float(rises[p + share]))
-        found.append(Found(BRANCH_POINT, p, float(share), point))
-    return found
+    steps = map(int, np.flatnonzero((side[1:] * side[:-1] < 0.0) & ~turns & smooth))
+    return [_crossing(solver, traced, p, determinant_minus(maps[p : p + 2])) for p in steps]
+
+
+def _crossing(solver: Solver, traced: Traced, p: int, ends: Real) -> Found:
+    """Where det(I - P), (2,) at the ends of step p, is zero: there the branch's matrix is singular.
+
+    So near to it that no motion can be solved for, the nearest one found stands for it.
+    """
+    nearer = int(abs(ends[1]) < abs(ends[0]))
+    u, omega = traced.u[p + nearer].copy(), float(traced.omega[p + nearer])
+    rise = float(traced.tangent[p + nearer, -1] / traced.course.omega_step)
+    known = {float(nearer): Point(solver.formulation, u, omega, rise)}
+
+    def value(share: float) -> float:
+        if share in (0.0, 1.0):
+            return float(ends[int(share)])
+        try:
+            known[share] = solver.between(traced, p, share)
+        except IncompleteError:
+            return 0.0
+        return float(determinant_minus(solver.return_map(known[share])))
+
+    share = brentq(value, 0.0, 1.0, xtol=SHARE_TOLERANCE) if ends[0] * ends[1] < 0.0 else nearer
+    share = min(known, key=lambda one: abs(one - share))
+    return Found(BRANCH_POINT, p, share, known[share])
 
 
 def _arc(traced: Traced) -> Real:

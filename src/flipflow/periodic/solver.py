@@ -323,9 +323,13 @@ class Solver(ABC):
 
     @property
     def uneven(self) -> Real:
-        """1 for each spring whose gaps differ, (m,): 0 where the branch may be even."""
+        """1 for each spring whose gaps differ, (m,): 0 where the branch may be even.
+
+        Under a constant force, or one of an even order, no motion is.
+        """
         gaps = self.machine.stops.gap
-        return np.where(gaps[:, 0] == gaps[:, 1], 0.0, 1.0)
+        pulled = np.any(self.machine.order % 2 == 0) or np.any(self.machine.static)
+        return np.where((gaps[:, 0] == gaps[:, 1]) & ~pulled, 0.0, 1.0)
 
     @cached_property
     def corrector(self) -> correction.Corrector:
