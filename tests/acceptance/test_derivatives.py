@@ -578,8 +578,7 @@ def test_a_summit_just_beyond_a_change_of_contact():
         assert np.abs(np.diff(turns)).min() > 1e-3
         (slope,) = differences(orbit, names, [lambda one: one.amplitude(0)], 1e-6)
         sizes = np.array([size_of(orbit, name) for name in names])
-        got = orbit.sensitivity(("amplitude", 0), names) * sizes
-        assert got == pytest.approx(slope, rel=1e-5)
+        assert orbit.sensitivity(("amplitude", 0), names) * sizes == pytest.approx(slope, rel=1e-5)
 
 
 def test_a_doubling_at_a_corner_has_no_derivative() -> None:
@@ -588,10 +587,8 @@ def test_a_doubling_at_a_corner_has_no_derivative() -> None:
         [1.0], 54.85865544985291, 11.329126241209119, -1.703876198104961, np.inf,
         law="undamped-rebound",
     )  # fmt: skip
-    forces = (
-        ff.Unbalance([0.51045998 - 0.85990151j]),
-        ff.HarmonicForce([0.27177148 - 0.35301084j], order=3),
-    )
+    third = ff.HarmonicForce([0.27177148 - 0.35301084j], order=3)
+    forces = (ff.Unbalance([0.51045998 - 0.85990151j]), third)
     machine = ff.MechanicalSystem([[0.73484506]], [[0.10501086]], [[0.61707898]], [stop], forces)
     points = ff.frequency_response(machine, (0.32, 2.02)).points_of("period doubling")
     smooth = [p for p in points if np.abs(p.orbit.multipliers + 1.0).min() < 1e-6]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -47,14 +48,28 @@ def test_curves_pass_through_the_cells(found) -> None:
         assert len(curve.points_of("cusp")) == 1
 
 
+def begins(found: ff.DesignMap) -> list[object]:
+    """What the figure draws where contact begins."""
+    return [one for one in ff.figure(found).panels[0].traces if one.name == "contact begins"]
+
+
+def test_a_stop_that_is_never_touched_has_no_trace(found) -> None:
+    """Fault: traces of nothing, with an entry of the legend."""
+    nowhere = np.full_like(found.omega_cs, math.nan)
+    bare = dataclasses.replace(found, omega_cs=nowhere, curves=())
+    assert not begins(bare)
+    nowhere[1] = found.omega_cs[1]
+    (one,) = begins(dataclasses.replace(bare, omega_cs=nowhere))
+    assert one.legend
+
+
 def test_unequal_gaps_have_a_contact_speed_for_each_stop(screen) -> None:
     """The side touched last depends on the stop: its figure draws the cells."""
     found = ff.design_map(screen.replace(clearance_minus=7e-3), OMEGA, GAPS, STOPS)
     assert np.ptp(found.omega_cs[:, 0]) > 0.1
+    assert found.curves
     assert all(curve.kind == "fold" for curve in found.curves)
-    traces = ff.figure(found).panels[0].traces
-    begins = [one for one in traces if one.name == "contact begins"]
-    for trace, row in zip(begins, found.omega_cs, strict=True):
+    for trace, row in zip(begins(found), found.omega_cs, strict=True):
         close("drawn", trace.y, row * 30.0 / math.pi, rel=1e-12)
 
 

@@ -60,5 +60,7 @@ def test_one_sentence_for_starts_that_differ(screen):
     head = "it reaches 850 rpm in at most 2.5 s"
     assert said_of(a=run.summary, b=slow, c=near) == f"{head}, but not quite in case c, then {ends}"
     assert said_of(b=slow) == f"{head}, then {0.99 * 850.0:.0f} rpm."
+    part = said_of(a=None, b=slow)
+    assert part == f"{head}, then {0.99 * 850.0:.0f} rpm in case b."
     both = said_of(c=near, d=near)
     assert both == f"it comes near 850 rpm, then {0.98 * 850.0:.0f} rpm in every load case."

@@ -34,10 +34,11 @@ def by_hand(machine, omega, quantity, **changes):
     return branch.orbit_from_below(omega).amplitude(quantity)
 
 
-def test_a_grid_is_every_combination(screen):
+@pytest.mark.parametrize("kind", [ff.Choice, list])
+def test_a_grid_is_every_combination(screen, kind):
     gaps, words = np.array([5e-3, 6e-3, 7e-3]), ("paper", "compression-only")
     found = ff.study(
-        screen, {"clearance": gaps, "stop_law": ff.Choice(words)},
+        screen, {"clearance": gaps, "stop_law": kind(words)},
         ("relative_amplitude", "stop_force"), OMEGA,
     )  # fmt: skip
     assert found.sampling == "grid"
@@ -268,7 +269,8 @@ def test_a_monitor_hears_of_chunks_and_ends_the_work(linear):
     [
         ({"vary": {"gap": (0.0, 1.0)}}, "vary = 'gap'"),
         ({"vary": {}}, "vary"),
-        ({"vary": {"clearance": [6e-3]}}, "a list of at least two numbers"),
+        ({"vary": {"clearance": [6e-3]}}, "= [0.006]: give an array or a list of at least two n"),
+        ({"vary": {"stop_law": ["paper"]}}, "= ['paper']: give a list or ff.Choice of at least tw"),
         ({"vary": {"clearance": [6e-3, "wide"]}}, "a list of at least two numbers"),
         ({"quantities": ()}, "quantities = ()"),
         ({"quantities": ("size",)}, "quantity = 'size'"),

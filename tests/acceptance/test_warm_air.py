@@ -10,6 +10,7 @@ import dataclasses
 import json
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
 import numpy as np
@@ -19,14 +20,16 @@ from scipy.optimize import bisect
 import flipflow as ff
 from flipflow.batch.reasons import UNSETTLED
 from flipflow.batch.side_by_side import processors
+from flipflow.cli.options import WARMING, in_case
 from flipflow.io.check import check_project
 from flipflow.io.machine_text import machine_text
+from flipflow.model.screen import as_cool_as_air
 from flipflow.report.blocks import Values
 from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
-from flipflow.studies import study_values
+from flipflow.studies import design_map, rubber_temperature, study_values
 from flipflow.studies.candidates import Space
-from flipflow.studies.rubber_temperature import settled
+from flipflow.studies.rubber_temperature import WarmedLoad, settled, warmed_load
 from judge import close
 
 pytestmark = [pytest.mark.numerical, pytest.mark.usefixtures("analysed_once")]
@@ -158,11 +161,74 @@ def _here(monkeypatch, tmp_path) -> None:
 def test_a_case_of_air_needs_a_speed(command, project, tmp_path) -> None:
     path = tmp_path / "slow.toml"
     path.write_text(machine_text(dataclasses.replace(project, speed=None), {}))
-    code, _, err = command(
-        "sweep", path, "--case", "air", "--speeds", "700 rpm", "800 rpm", "--steps", "2"
-    )
+    for words in (
+        ("sweep", path, "--speeds", "700 rpm", "800 rpm", "--steps", "2"),
+        ("startup", path, "--profile", "0 s: 0 rpm, 5 s: 850 rpm"),
+    ):
+        code, _, err = command(*words, "--case", "air")
+        assert code == 2
+        assert "operation.speed" in err
+        assert "--speed" not in err
+    ranking = ("sensitivity", path, "--quantity", "omega_cs", "--vary", "clearance=5 mm..6 mm")
+    code, _, err = command(*ranking, "--n", "2", "--case", "air")
     assert code == 2
-    assert "operation.speed" in err
+    assert "or --speed '850 rpm'" in err
+    code, _, err = command(*ranking, "--n", "2", "--case", "air", "--speed", "850 rpm")
+    assert code == 0, err
+    assert "at 850 rpm." in err
+    code, _, err = command(*ranking, "--speed", "850 rpm")
+    assert code == 2
+    assert "belongs to the whole response" in err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("sweep", "--speeds", "800 rpm", "700 rpm"),
+        ("sweep", "--speeds", "700 rpm", "800 rpm", "--rate", "fast"),
+        ("startup", "--duration", "3 kg"),
+        ("startup", "--profile", "0 s: 0 rpm, 5 s: 850 rpm", "--inertia", "1 kg m^2"),
+        ("simulate", "--impulse", "hard"),
+        ("sensitivity", "--vary", "gap=5 mm..6 mm"),
+        ("sensitivity", "--vary", "clearance=5 mm..6 mm", "--quantity", "size"),
+    ],
+)
+def test_options_are_read_before_the_rubber_is_warmed(command, file, monkeypatch, words) -> None:
+    monkeypatch.setattr(rubber_temperature, "warmed_load", lambda *_: pytest.fail("warmed"))
+    name, *others = words
+    code, _, _ = command(name, file, "--case", "air", *others)
+    assert code == 2
+
+
+def test_a_note_on_the_rubber_writes_speeds_without_an_exponent(
+    project, monkeypatch, capsys
+) -> None:
+    monkeypatch.setattr(
+        rubber_temperature,
+        "warmed_load",
+        lambda _, load, __: WarmedLoad(as_cool_as_air(load), 31.0),
+    )
+    in_case(project, "air", "10000 rpm")
+    assert "settles at 31 degC at 10000 rpm." in capsys.readouterr().err
+
+
+def test_check_shows_progress_while_the_rubber_is_warmed(command, file, monkeypatch) -> None:
+    told = []
+
+    @contextmanager
+    def bar(begin: str) -> Iterator[None]:
+        told.append(begin)
+        with monkeypatch.context() as patch:
+            patch.setattr(rubber_temperature, "warmed_load", within)
+            yield
+
+    def within(*args: object) -> WarmedLoad:
+        told.append("warmed")
+        return warmed_load(*args)
+
+    monkeypatch.setattr("flipflow.cli.check.progress", bar)
+    assert command("check", file)[0] == 0
+    assert told == [WARMING, "warmed"]
 
 
 def test_every_machine_of_a_study_is_as_warm_as_its_own_work_keeps_it(project) -> None:
@@ -182,6 +248,19 @@ def test_every_machine_of_a_study_is_as_warm_as_its_own_work_keeps_it(project) -
             rubber, orbit = by_bisection(own, omega)
             got = [found.values[name][k, 0, f] for name in QUANTITIES]
             close(f"machine {k} at {omega}", got, values_of(orbit, rubber), rel=1e-5)
+
+
+def test_stops_of_variants_alone_are_as_warm_as_their_rubber(project) -> None:
+    """Fault: by the temperature of the machine without stops, 20 % off in the force."""
+    screen = project.screen.replace(
+        stop_temperature_factor=((-10.0, 1.5), (50.0, 0.5)), shear_conductance=4.0
+    )
+    gaps = {"clearance": np.array([5.5e-3, 6.5e-3])}
+    nominal, bare = (
+        ff.study(one, gaps, "stop_force", omega=OMEGA, load_cases=[AIR]).values["stop_force"]
+        for one in (screen, screen.replace(clearance=math.inf))
+    )
+    close("force", bare, nominal, rel=1e-5)
 
 
 def test_derivatives_hold_what_a_parameter_does_to_the_rubber(project) -> None:
@@ -303,6 +382,13 @@ def test_margins_of_a_candidate_are_those_of_its_own_rubber(project) -> None:
             assert alone[k, f] == study_values.one_motion_loaded(*args, 1)[0, 0]
 
 
+def test_margins_of_rubber_that_does_not_settle_are_none(project, monkeypatch) -> None:
+    monkeypatch.setattr(study_values, "settled", lambda air, _: np.full(air.size, np.nan))
+    given = project.screen, {"clearance": np.array([6e-3, 7e-3])}, AIR, np.array([OMEGA])
+    assert np.isnan(study_values.jump_distance_loaded(*given, 0.2, 1)).all()
+    assert not study_values.one_motion_loaded(*given, 1).any()
+
+
 def test_temperatures_of_a_duty_are_those_of_the_rubber(project) -> None:
     """Fault: combined with a case of warm air they counted as the air's."""
     loads = duty(project, temperatures=(0.0, 40.0)).loads
@@ -320,6 +406,42 @@ def test_a_design_map_under_warm_air(project) -> None:
     one = project.screen.replace(clearance=gaps[1], stop_stiffness=stops[0])
     share = by_bisection(one)[1].amplitude("relative") / motion(one, OMEGA).amplitude("relative")
     close("steadiness", found.steadiness[0, 1], share, rel=1e-5)
+    assert any("as warm as its own work keeps it" in note for note in found.notes)
+    assert found.notes[0] in ff.figure(found).caption
+
+
+@pytest.mark.parametrize(
+    ("changes", "degrees", "words"),
+    [
+        ({"temperature_factor": ()}, 20.0, "add shear_springs.temperature_factor"),
+        ({}, -40.0, "within the springs' table"),
+    ],
+)
+def test_air_of_which_the_table_says_nothing_is_refused_at_once(
+    project, changes, degrees, words
+) -> None:
+    """Faults: a ValueError after a minute; taken without a word."""
+    screen, load = project.screen.replace(**changes), dataclasses.replace(AIR, temperature=degrees)
+    told = []
+    with pytest.raises(ff.InputError, match=words):
+        ff.design_map(
+            screen, OMEGA, [5e-3, 6e-3], [8e6, 9e6], load=load,
+            monitor=lambda words, _: told.append(words),
+        )  # fmt: skip
+    assert not told
+    with pytest.raises(ff.InputError, match=words):
+        warmed_load(screen, load, OMEGA)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_design_map_whose_rubber_is_not_known(project, monkeypatch, known) -> None:
+    """As cool as the air for want of the conductance, and said; none where it does not settle."""
+    screen = project.screen if known else project.screen.replace(shear_conductance=None)
+    lost = WarmedLoad(as_cool_as_air(AIR), note="lost")
+    monkeypatch.setattr(design_map, "warmed_load", lambda *_: lost)
+    found = ff.design_map(screen, OMEGA, [6e-3, 6.1e-3], [9e6, 9.1e6], load=AIR)
+    assert np.isnan(found.steadiness).all() == known
+    assert any("for want of shear_springs.conductance" in one for one in found.notes) != known
 
 
 def test_check_and_report_show_the_stiffness_at_work(command, project, file, analysed) -> None:

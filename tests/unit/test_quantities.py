@@ -18,7 +18,7 @@ from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.studies.assessment import NOT_CHECKED, assess_case, limit_row
 from flipflow.studies.feasible import case_window
 from flipflow.studies.landmarks import RESPONSE_VALUES
-from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working
+from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working, beyond_rounding
 
 OMEGA = 80.0
 OPTIONAL = tuple(sorted({name for one in QUANTITIES.values() for name in one.needs}))
@@ -149,6 +149,11 @@ def test_the_contact_free_response_solves_its_equation(size, alike):
     np.testing.assert_allclose(
         (Z @ X[..., None])[..., 0], np.broadcast_to(force, X.shape), rtol=1e-12
     )
+
+
+def test_an_offset_that_rounding_leaves_is_none():
+    found = beyond_rounding(np.array([1e-15, 1e-4, np.nan]), np.full(3, 5e-3))
+    np.testing.assert_array_equal(found, [0.0, 1e-4, np.nan])
 
 
 def test_a_force_on_one_mass_of_many_machines_is_its_receptance(project):

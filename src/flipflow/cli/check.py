@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from flipflow.cli.options import File, Force, Json
+from flipflow.cli.options import WARMING, File, Force, Json
 from flipflow.cli.output import console, print_list, printable
+from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,7 +25,8 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
 
     project = load_project(file, force=force)
     with Destination(None, json, [file]) as target:
-        result = check_project(project)
+        with progress(WARMING):
+            result = check_project(project)
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from flipflow.model.screen import Load
 
 RPM = constants.RPM
+OR_SPEED = "give it, or --speed '850 rpm'"
+IN_FILE = "give it: the rubber in warm air is as warm as its work at that speed keeps it"
+WARMING = "warming the rubber; the first run of a version compiles"
 # Slower, a turn takes minutes of calculation; faster, no screen runs.
 SLOWEST, FASTEST = 1.0, 100_000.0
 
@@ -94,11 +97,14 @@ def as_written(option: str, written: str) -> Iterator[None]:
         raise InputError(option, written, error.remedy) from None
 
 
-def in_case(project: Project, name: str | None, speed: str | None = None) -> Project:
+def in_case(
+    project: Project, name: str | None, speed: str | None = None, remedy: str = OR_SPEED
+) -> Project:
     """The project of a machine under one of its load cases; as it is where none is named.
 
     Where the case gives the air's temperature, the rubber is as warm as its work keeps it at the
-    speed asked for, else at that of the machine file; stderr tells how warm.
+    speed asked for, else at that of the machine file; stderr tells how warm. That takes seconds:
+    other options are read before. Without a speed, what is said is the ``remedy``.
     """
     from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
 
@@ -106,28 +112,29 @@ def in_case(project: Project, name: str | None, speed: str | None = None) -> Pro
         return project
     for load in project.load_cases:
         if load.name == name:
-            load = _at_work(project, load, speed)  # noqa: PLW2901
+            load = _at_work(project, load, speed, remedy)  # noqa: PLW2901
             return replace(project, screen=project.screen.loaded(load), load_cases=(load,))
     known = ", ".join(repr(load.name) for load in project.load_cases)
     raise InputError("--case", name, f"there is no such load case, choose one of {known}")
 
 
-def _at_work(project: Project, load: Load, speed: str | None) -> Load:
+def _at_work(project: Project, load: Load, speed: str | None, remedy: str) -> Load:
     """A load case with the temperature of the rubber."""
     from flipflow.cli.progress import progress  # noqa: PLC0415  keeps --help quick
     from flipflow.model.load_case import case_words  # noqa: PLC0415
+    from flipflow.model.numerals import rpm  # noqa: PLC0415
     from flipflow.model.screen import of_air  # noqa: PLC0415
 
     if not of_air(load):
         return load
     from flipflow.studies.rubber_temperature import warmed_load  # noqa: PLC0415  slow to import
 
-    omega = speed_of(project, speed)
-    with progress("warming the rubber; the first run of a version compiles"):
+    omega = speed_of(project, speed, remedy)
+    with progress(WARMING):
         found = warmed_load(project.screen, load, omega)
     told = found.note or (
         f"{case_words(load.name, capital=True)}: the rubber settles at {found.rubber:.3g} degC "
-        f"at {omega * RPM:.4g} rpm."
+        f"at {rpm(omega)} rpm."
     )
     typer.echo(f"Note: {told}", err=True)
     return found.load
@@ -157,7 +164,7 @@ def marked(project: Project, case: str | None) -> str:
     return ", ".join(parts)
 
 
-def speed_of(project: Project, written: str | None) -> float:
+def speed_of(project: Project, written: str | None, remedy: str = OR_SPEED) -> float:
     """Speed in rad/s as asked for, else the working speed of the machine file."""
     from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
     from flipflow.io.layout import SPEED  # noqa: PLC0415
@@ -168,7 +175,7 @@ def speed_of(project: Project, written: str | None) -> float:
         _check_speed("--speed", written, omega)
         return omega
     if project.speed is None:
-        raise InputError("operation.speed", "(left out)", "give it, or --speed '850 rpm'")
+        raise InputError("operation.speed", "(left out)", remedy)
     _check_speed("operation.speed", f"{project.speed * RPM:.6g} rpm", project.speed)
     return project.speed
 

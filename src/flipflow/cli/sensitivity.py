@@ -71,16 +71,19 @@ def sensitivity(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.io.vary import read_vary  # noqa: PLC0415
-    from flipflow.model.screen import of_air  # noqa: PLC0415
+    from flipflow.model.screen import as_cool_as_air, of_air  # noqa: PLC0415
 
-    empty = load_project(file, force=force)
-    project = in_case(empty, case, speed)
+    project = load_project(file, force=force)
+    air = next((one for one in project.load_cases if one.name == case and of_air(one)), None)
+    omega = _omega(project, quantity, speed, speeds, warming=air is not None)
+    if air is not None:
+        read_vary(vary or [], project.screen.loaded(as_cool_as_air(air)))
+    project = in_case(project, case, speed)
     for warning in project.warnings:
         typer.echo(f"Warning: {warning}", err=True)
-    if any(load.name == case and of_air(load) for load in empty.load_cases):
+    if air is not None:
         typer.echo(f"Note: {SAME_RUBBER}", err=True)
     ranges = read_vary(vary or [], project.screen)
-    omega = _omega(project, quantity, speed, speeds)
     options = {"n": n, "rng": seed, "branch": branch}
     with Destination(output, json, [file]) as target:
         result = _analysed((project.screen, ranges, quantity, omega), options)
@@ -88,16 +91,24 @@ def sensitivity(
 
 
 def _omega(
-    project: Project, quantity: str, speed: str | None, speeds: tuple[str, str] | None
+    project: Project,
+    quantity: str,
+    speed: str | None,
+    speeds: tuple[str, str] | None,
+    *,
+    warming: bool,
 ) -> Any:
-    """Where the quantity is meant, rad/s, as the analysis takes it."""
+    """Where the quantity is meant, rad/s, as the analysis takes it.
+
+    The one speed may also be that at which the rubber is warming.
+    """
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
     from flipflow.errors import InputError  # noqa: PLC0415
     from flipflow.model.quantities import quantity_named  # noqa: PLC0415
 
     whole = quantity_named(quantity, project.screen).of == "response"
-    if speed is not None and (speeds is not None or whole):
+    if speed is not None and not warming and (speeds is not None or whole):
         other = f"{quantity} belongs to the whole response" if whole else "--speeds is given, too"
         raise InputError("--speed", speed, f"{other}, leave it out")
     if speeds is not None:

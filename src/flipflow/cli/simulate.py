@@ -62,9 +62,10 @@ def simulate(
     from flipflow.transient.history import thinned  # noqa: PLC0415
     from flipflow.transient.simulate import simulate as run  # noqa: PLC0415  keeps --help quick
 
-    project = in_case(load_project(file, force=force), case, speed)
+    project = load_project(file, force=force)
     omega = speed_of(project, speed)
     blows = _blows(impulse or (), periods * 2.0 * math.pi / omega)
+    project = in_case(project, case, speed)
     with Destination(output, json, [file]) as target:
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flipflow.cli.options import (
+    IN_FILE,
     RPM,
     Case,
     File,
@@ -79,7 +80,7 @@ def startup(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = in_case(load_project(file, force=force), case, speed)
+    project = load_project(file, force=force)
     if profile is not None:
         given = {"--speed": speed, "--motor-power": motor_power, "--inertia": inertia}
         _refuse_beside_profile(given | {"--duration": duration})
@@ -87,6 +88,7 @@ def startup(
         project = replace(project, speed=speed_of(project, speed))
     drive = _drive(project, motor_power, inertia, profile)
     seconds = None if duration is None else _seconds(duration)
+    project = in_case(project, case, remedy=IN_FILE)
     with Destination(output, json, [file]) as target:
         start, coast = _calculated(project, drive, seconds)
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flipflow.cli.options import (
+    IN_FILE,
     RPM,
     Case,
     File,
@@ -86,9 +87,9 @@ def sweep(
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
 
-    project = in_case(load_project(file, force=force), case)
     ends = speeds_of(speeds)
     gliding = None if rate is None else _rate(rate, ends)
+    project = in_case(load_project(file, force=force), case, remedy=IN_FILE)
     with Destination(output, json, [file]) as target:
         found = _passed(project, ends, steps, gliding)
         if json is not None:

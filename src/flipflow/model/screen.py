@@ -347,13 +347,12 @@ def loaded_values(
     """
     if rubber is None:
         refuse_air(load)
-    carried = {"main_mass": load.main_mass, "floating_mass": load.floating_mass}
-    if rubber is None:
         shear = screen.temperature_stiffness_factor(load.temperature)
         stop = screen.stop_temperature_stiffness_factor(load.temperature)
     else:
         shear = _factors_at(screen.temperature_factor, rubber)
         stop = _factors_at(screen.stop_temperature_factor, rubber)
+    carried = {"main_mass": load.main_mass, "floating_mass": load.floating_mass}
     factors = {
         "shear_stiffness": load.stiffness_factor * shear,
         "shear_damping": load.damping_factor,

@@ -37,6 +37,7 @@ REMEDY = (
     "or ff.Choice(values)"
 )
 VALUES = "give an array or a list of at least two numbers, shape (n,)"
+WORDS = "give a list or ff.Choice of at least two words"
 
 
 class Distribution(ABC):
@@ -223,7 +224,13 @@ def _distribution(name: str, given: object) -> Distribution:
     if isinstance(given, Distribution):
         return given
     field = f"vary {name}"
+    if isinstance(given, list) and name == LAW:
+        if len(given) < 2 or not all(isinstance(one, str) for one in given):
+            raise InputError(field, given, WORDS)
+        return Choice(tuple(given))
     if isinstance(given, list):
+        if len(given) < 2:
+            raise InputError(field, given, VALUES)
         numbers = [checked_number(field, value, VALUES) for value in given]
         return _distribution(name, np.array(numbers))
     if isinstance(given, np.ndarray):

@@ -56,6 +56,7 @@ def design_map_figure(found: DesignMap) -> Figure:
         "begins, with unequal gaps on the side touched last. In the middle: the relative amplitude "
         f"at working speed as it is reached from below.{under}"
     )
+    caption = " ".join([caption, *found.notes])
     return Figure("Gap and stop stiffness", caption, tuple(panels), height=220 * len(panels))
 
 
@@ -67,12 +68,13 @@ def _contact(found: DesignMap) -> list[Trace]:
             Trace(name, one.along("clearance") * MM, one.omega * RPM, colour="gap", dash="dash")
             for one in once
         ]
+    touching = np.flatnonzero(np.isfinite(found.omega_cs).any(axis=1)).tolist()
     return [
         Trace(
-            name, found.clearance * MM, row * RPM, colour=case_colour(j), symbol=case_symbol(j),
-            legend=j == 0, dash="dash",
+            name, found.clearance * MM, found.omega_cs[j] * RPM, colour=case_colour(j),
+            symbol=case_symbol(j), legend=j == touching[0], dash="dash",
         )
-        for j, row in enumerate(found.omega_cs)
+        for j in touching
     ]  # fmt: skip
 
 

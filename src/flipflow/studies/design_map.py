@@ -21,12 +21,12 @@ from flipflow.model.arguments import (
     checked_speed,
 )
 from flipflow.model.monitor import Monitor
-from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.screen import FlipFlowScreen, Load, as_cool_as_air, of_air
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, Response, analysed_range, landmarks
 from flipflow.studies.loading import amplitude_from_below
-from flipflow.studies.rubber_temperature import warmed_load
+from flipflow.studies.rubber_temperature import air_notes, warmed_load, warming_known
 
 Real = NDArray[np.float64]
 GAP, STIFFNESS, OMEGA = "clearance", "stop_stiffness", "omega"
@@ -56,13 +56,16 @@ class DesignMap(Frozen, Result):
     amplitude
         Relative amplitude in m at working speed, as the speed rises slowly, (m, n).
     steadiness
-        The same of the loaded machine as a share of it, (m, n): 1 where the load changes nothing.
+        The same of the loaded machine as a share of it, (m, n): 1 where the load changes nothing;
+        NaN, too, where the temperature of its rubber does not settle.
     curves
         Where contact begins over gap and speed, once for all stiffnesses, unless both gaps differ:
         the stop touched last then begins at another speed for each. And for each stiffness that has
         folds, the folds over gap and speed, through the cusp where they are born.
     version
         Version of flipflow.
+    notes
+        How warm the rubber is taken to be, where the load gives the air's temperature.
     """
 
     screen: FlipFlowScreen
@@ -78,6 +81,7 @@ class DesignMap(Frozen, Result):
     steadiness: Real
     curves: tuple[BifurcationCurve, ...]
     version: str
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         m, n = self.omega_cs.shape
@@ -122,12 +126,14 @@ def design_map(
     Raises
     ------
     InputError
-        For values that are not above zero, and a machine without a finite gap.
+        For values that are not above zero, a machine without a finite gap, and a load that the
+        screen has no data for.
     """
     checked_kind("screen", screen, FlipFlowScreen, "give a screen, such as ff.load(...)")
     omega, say = checked_speed(omega), checked_monitor(monitor)
     if load is not None:
         checked_kind("load", load, Load, "give a flipflow.Load, or None")
+        screen.loaded(as_cool_as_air(load))
     gaps, stops = _values(GAP, clearance), _values(STIFFNESS, stop_stiffness)
     rows: list[list[tuple[float, ...]]] = []
     starts: list[SpecialPoint] = []
@@ -150,7 +156,7 @@ def design_map(
     return DesignMap(
         screen, omega, load, gaps, stops, cs, lb, ub, width, amplitude, steadiness,
         curves=tuple(_curve(point, gaps, say, k / len(starts)) for k, point in enumerate(starts)),
-        version=__version__,
+        version=__version__, notes=tuple(air_notes(screen, () if load is None else (load,))),
     )  # fmt: skip
 
 
@@ -177,13 +183,20 @@ def _cell(
     one: FlipFlowScreen, branch: Branch, marks: Landmarks, omega: float, load: Load | None
 ) -> tuple[float, ...]:
     amplitude, share = amplitude_from_below(branch, omega, "relative"), math.nan
-    if load is not None:
-        loaded = one.loaded(warmed_load(one, load, omega).load)
+    loaded = None if load is None else _at_work(one, load, omega)
+    if loaded is not None:
         under = Response(loaded, analysed_range(loaded, omega)).branch
         share = amplitude_from_below(under, omega, "relative") / amplitude
     known = (marks.omega_cs, marks.omega_lb, marks.omega_ub)
     speeds = (math.nan if speed is None else speed for speed in known)
     return (*speeds, marks.upper - marks.lower, amplitude, share)
+
+
+def _at_work(one: FlipFlowScreen, load: Load, omega: float) -> FlipFlowScreen | None:
+    """The screen under the load; None where the temperature of its rubber does not settle."""
+    warmed = warmed_load(one, load, omega)
+    lost = of_air(load) and warming_known(one) and warmed.rubber is None
+    return None if lost else one.loaded(warmed.load)
 
 
 def _curve(point: SpecialPoint, gaps: Real, say: Monitor, share: float) -> BifurcationCurve:

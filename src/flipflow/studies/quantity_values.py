@@ -151,9 +151,11 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
 
 
 def beyond_rounding(offset: Values, amplitude: Values) -> Values:
-    """An offset; 0 where it is what rounding leaves of a motion about the middle."""
-    beyond = np.greater(offset, EVEN * np.asarray(amplitude))
-    return np.where(beyond, offset, 0.0 * np.asarray(offset))
+    """An offset; 0 where it is what rounding leaves of a motion about the middle.
+
+    Such a rest would be another on every processor.
+    """
+    return np.where(np.less_equal(offset, EVEN * np.asarray(amplitude)), 0.0, offset)
 
 
 def rated_life(rating: Values, load: Values, exponent: Values, omega: Values) -> Values:

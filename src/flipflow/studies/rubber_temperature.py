@@ -61,7 +61,6 @@ def warmed_load(
     load: Load,
     omega: float | None,
     method: Method | None = None,
-    span: tuple[float, float] | None = None,
 ) -> WarmedLoad:
     """The load case with the rubber as warm as its work at ``omega`` keeps it.
 
@@ -73,12 +72,18 @@ def warmed_load(
         The empty machine, and what it bears.
     omega
         Working speed in rad/s.
-    method, span
-        How motions are found, and over which speeds in rad/s they are followed.
+    method
+        How motions are found.
+
+    Raises
+    ------
+    InputError
+        For air whose temperature is outside the springs' table, and without such a table.
     """
     if not of_air(load):
         return WarmedLoad(load)
-    return _warmed(screen, load, omega, method, span)
+    screen.loaded(as_cool_as_air(load))
+    return _warmed(screen, load, omega, method)
 
 
 def settled_at_work(
@@ -98,9 +103,8 @@ def _warmed(
     load: Load,
     omega: float | None,
     method: Method | None,
-    span: tuple[float, float] | None,
 ) -> WarmedLoad:
-    """It takes several responses, and every part of a study asks for it."""
+    """Cached: it takes several responses, and every part of a study asks for it."""
     case, cool = case_words(load.name, capital=True), as_cool_as_air(load)
     if omega is None or not warming_known(screen):
         lacking = "the working speed" if omega is None else NEEDED
@@ -111,7 +115,7 @@ def _warmed(
         held = replace(cool, temperature=float(np.clip(rubber[0], low, high)))
         machine = screen.loaded(held)
         try:
-            branch = frequency_response(machine, span or analysed_range(screen, omega), method)
+            branch = frequency_response(machine, analysed_range(screen, omega), method)
         except (InputError, IncompleteError):  # a machine without damping, say
             return np.array([np.nan])
         working = working_motion(machine, branch, omega)
@@ -179,7 +183,7 @@ def settled(air: Real, warmer: Callable[[Real, Int], Real]) -> Real:
         miss = air[left] + warmer(now, left) - now
         change = now - before
         slope = np.divide(miss - miss_before, change, out=np.zeros(left.size), where=change != 0.0)
-        after = now - np.where(slope < 0.0, miss / np.where(slope < 0.0, slope, 1.0), -miss)
+        after = now - miss / np.where(slope < 0.0, slope, -1.0)
         ended = np.abs(miss) < WITHIN
         found[left[ended]] = after[ended]
         before, miss_before, now = now, miss, np.where(ended, np.nan, after)

@@ -9,6 +9,7 @@ from flipflow.model.load_case import case_words
 from flipflow.model.numerals import rpm
 from flipflow.studies.drive_check import Finding
 from flipflow.studies.start_and_blows import CaseRuns, Transients
+from flipflow.transient.run_up import RunUp
 
 NO_SPEED = "not checked, for the machine file gives no working speed."
 ASSUMED = "drive assumed"
@@ -23,7 +24,7 @@ def does_it_start(found: Transients | None) -> str:
     drive = f" ({drive_words(found)})"
     if found.failed:
         return f"no{drive}: {_failure(found.failed, len(found.cases))}.{_remedies(found.findings)}"
-    return f"yes{drive}: {_success(found)}.{_remedies(found.findings)}"
+    return f"yes{drive}: {_success(found.start, found.cases)}.{_remedies(found.findings)}"
 
 
 def drive_words(found: Transients) -> str:
@@ -53,24 +54,22 @@ def _failure(failed: tuple[CaseRuns, ...], count: int) -> str:
     return f"{in_cases([one.case for one in failed], count)} it {verb}{verdict}"
 
 
-def _success(found: Transients) -> str:
+def _success(run: RunUp, cases: tuple[CaseRuns, ...]) -> str:
     """How fast, and at what speeds the load cases then run."""
-    run, told = found.start, [(one.case, one.start) for one in found.cases if one.start]
-    if run is None or not told:
-        return f"it {'starts' if run is None else run.verdict}"
+    told = [(one.case, one.start) for one in cases if one.start]
     times = [start.time_to_speed for _, start in told if start.time_to_speed is not None]
-    if len(told) == 1 and not times:
+    if not told or (len(told) == 1 and not times):
         return f"it {run.verdict}"
     wanted = f"{rpm(run.speed)} rpm"
     reached = f"comes near {wanted}"
     if times:
         short = [name for name, start in told if start.time_to_speed is None]
-        but = f", but not quite {in_cases(short, len(told))}" if short else ""
+        but = f", but not quite {in_cases(short, len(cases))}" if short else ""
         reached = f"reaches {wanted} in at most {max(times):.3g} s{but}"
     ends = [start.final_speed * RPM for _, start in told]
     low, high = f"{min(ends):.0f}", f"{max(ends):.0f}"
-    cases = " in every load case" if len(found.cases) > 1 else ""
-    return f"it {reached}, then {low if low == high else f'{low} to {high}'} rpm{cases}"
+    where = f" {in_cases([name for name, _ in told], len(cases))}" if len(cases) > 1 else ""
+    return f"it {reached}, then {low if low == high else f'{low} to {high}'} rpm{where}"
 
 
 def _remedies(findings: tuple[Finding, ...]) -> str:

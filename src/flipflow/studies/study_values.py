@@ -139,13 +139,10 @@ def evaluate_loaded(
     """
     if load is None or not isinstance(machine, FlipFlowScreen):
         return evaluate(machine, columns, quantities, omega, branch, threads, names)
+    asked = _Asked(tuple(quantities), branch, threads, tuple(names))
     if not of_air(load):
-        under = _Under(machine, load, columns)
-        return _evaluate_under(under, quantities, omega, branch, threads, names)
-    told = [
-        _evaluate_warm(machine, load, columns, quantities, at, branch, threads, names)
-        for at in np.split(omega, omega.size)
-    ]
+        return _evaluate_under(_Under(machine, load, columns), asked, omega)
+    told = [_evaluate_warm(machine, load, columns, asked, at) for at in np.split(omega, omega.size)]
     values = {key: np.concatenate([one[key] for one, _ in told], axis=1) for key in told[0][0]}
     return values, np.concatenate([why for _, why in told], axis=1)
 
@@ -156,9 +153,10 @@ def jump_distance_loaded(
     """Distances (L, F) of :func:`~flipflow.studies.lane_values.jump_distance` under a load."""
     told = []
     for at in np.split(omega, omega.size):
-        under = _at_work(screen, load, columns, at, "from-below", threads)
+        under, lost = _at_work(screen, load, columns, at, _Asked(threads=threads))
         span, speed = _span(under.near, omega), float(at[0])
-        told.append(jump_distance(under.near, under.columns, speed, most, span, threads))
+        far = jump_distance(under.near, under.columns, speed, most, span, threads)
+        told.append(np.where(lost, np.nan, far))
     return np.stack(told, axis=1)
 
 
@@ -168,10 +166,21 @@ def one_motion_loaded(
     """:func:`~flipflow.studies.lane_values.one_motion` under a load."""
     told = []
     for at in np.split(omega, omega.size) if of_air(load) else [omega]:
-        under = _at_work(screen, load, columns, at, "from-below", threads)
+        under, lost = _at_work(screen, load, columns, at, _Asked(threads=threads))
         span = _span(under.near, omega)
-        told.append(one_motion(under.near, under.columns, at, span, threads))
+        alone = one_motion(under.near, under.columns, at, span, threads)
+        told.append(alone & ~lost[:, None])
     return np.concatenate(told, axis=1)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is asked of machines at a frequency: the parameters of :func:`evaluate`."""
+
+    quantities: tuple[str, ...] = ()
+    branch: BranchWord = "from-below"
+    threads: int = 1
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,92 +235,81 @@ class _Under:
 
     def _loaded(self, own: Columns, rubber: NDArray[Any] | None) -> Columns:
         loaded = loaded_columns(self.screen, self.load, own, rubber)
-        if not self.screen.has_stop and not STOP_FIELDS & set(own):
+        if not _with_stops(self.screen, own):
             loaded.pop("measured_shift", None)
         return loaded
 
 
+def _with_stops(screen: FlipFlowScreen, columns: Columns) -> bool:
+    """Whether stops may act in a machine whose parameters the columns replace."""
+    return screen.has_stop or not STOP_FIELDS.isdisjoint(columns)
+
+
 def _at_work(
-    screen: FlipFlowScreen,
-    load: Load,
-    columns: Columns,
-    omega: Real,
-    branch: BranchWord,
-    threads: int,
-) -> _Under:
+    screen: FlipFlowScreen, load: Load, columns: Columns, omega: Real, asked: _Asked
+) -> tuple[_Under, NDArray[np.bool_]]:
     """Screens under a load at a frequency, (1,), the rubber of each as warm as its work keeps it.
 
-    Its temperature is NaN where it does not settle.
+    Also where its temperature does not settle, (L,): there it is that of the air.
     """
     near = warmed_load(screen, load, float(omega[0])).load
+    rows = len(next(iter(columns.values())))
     if not of_air(load) or not warming_known(screen):
-        return _Under(screen, near, columns)
+        return _Under(screen, near, columns), np.zeros(rows, bool)
     warmed = ["shear_stiffness"]
-    if screen.stop_temperature_factor and (screen.has_stop or "stop_stiffness" in columns):
+    if screen.stop_temperature_factor and _with_stops(screen, columns):
         warmed.append("stop_stiffness")
     own = with_own(screen, columns, warmed)
     ends = table_ends(screen)
+    rise = replace(asked, quantities=(RISE,), names=())
 
     def warmer(rubber: Real, left: NDArray[np.int64]) -> Real:
-        rows = {name: column[left] for name, column in own.items()}
-        under = _Under(screen, near, rows, np.clip(rubber, *ends))
-        return _evaluate_under(under, (RISE,), omega, branch, threads)[0][RISE][:, 0]
+        of_left = {name: column[left] for name, column in own.items()}
+        under = _Under(screen, near, of_left, np.clip(rubber, *ends))
+        return _evaluate_under(under, rise, omega)[0][RISE][:, 0]
 
-    air = np.full(len(own["shear_stiffness"]), load.temperature, float)
-    return _Under(screen, near, own, np.clip(settled(air, warmer), *ends))
+    air = np.full(rows, load.temperature, float)
+    rubber = settled(air, warmer)
+    lost = np.isnan(rubber)
+    return _Under(screen, near, own, np.clip(np.where(lost, air, rubber), *ends)), lost
 
 
 def _evaluate_warm(
-    screen: FlipFlowScreen,
-    load: Load,
-    columns: Columns,
-    quantities: Sequence[str],
-    omega: Real,
-    branch: BranchWord,
-    threads: int,
-    names: Sequence[str],
+    screen: FlipFlowScreen, load: Load, columns: Columns, asked: _Asked, omega: Real
 ) -> Values:
     """Quantities at a frequency, (1,), of screens of which the air's temperature is known."""
-    found = _at_work(screen, load, columns, omega, branch, threads)
-    if found.rubber is None:
-        return _evaluate_under(found, quantities, omega, branch, threads, names)
-    lost = np.isnan(found.rubber)
-    found = replace(found, rubber=np.nan_to_num(found.rubber, nan=float(load.temperature or 0.0)))
-    asked = [*quantities, *([RISE] if names and RISE not in quantities else [])]
-    values, reasons = _evaluate_under(found, asked, omega, branch, threads, names)
-    if names:
+    found, lost = _at_work(screen, load, columns, omega, asked)
+    if found.rubber is None or not asked.names:
+        values, reasons = _evaluate_under(found, asked, omega)
+    else:
+        more = replace(asked, quantities=tuple(dict.fromkeys((*asked.quantities, RISE))))
+        values, reasons = _evaluate_under(found, more, omega)
         # T = air + rise(p, T), so that dT/dp = rise_p / (1 - rise_T).
         rise = values[slope_key(RISE)]
         with np.errstate(divide="ignore", invalid="ignore"):
             warming = rise[..., :-1] / (1.0 - rise[..., -1:])
-        for key in map(slope_key, asked):
+        kept = {name: values[name] for name in asked.quantities}
+        for key in map(slope_key, asked.quantities):
             of_rubber = values[key][..., -1:]
-            more = np.where(of_rubber != 0.0, of_rubber * warming, 0.0)
-            values[key] = values[key][..., :-1] + more
-    kept = {*quantities, *map(slope_key, quantities)}
-    values = {key: table for key, table in values.items() if key in kept}
+            through = np.where(of_rubber != 0.0, of_rubber * warming, 0.0)
+            kept[key] = values[key][..., :-1] + through
+        values = kept
     reasons[lost[:, None] & (reasons == FOUND)] = UNSETTLED
     for table in values.values():
         table[lost] = np.nan
     return values, reasons
 
 
-def _evaluate_under(
-    under: _Under,
-    quantities: Sequence[str],
-    omega: Real,
-    branch: BranchWord,
-    threads: int,
-    names: Sequence[str] = (),
-) -> Values:
+def _evaluate_under(under: _Under, asked: _Asked, omega: Real) -> Values:
     """Quantities of screens under a load whose rubber has the temperature that is given.
 
     Derivatives are (L, F, P), or (L, F, P + 1) as :meth:`_Under.moved_by` has them.
     """
+    quantities, names = asked.quantities, asked.names
     under = replace(under, own=with_own(under.screen, under.own, names))
     moved = under.moved_by(names) if names else {}
     values, reasons = evaluate(
-        under.near, under.columns, quantities, omega, branch, threads, tuple(moved)
+        under.near, under.columns, quantities, omega, asked.branch, asked.threads, tuple(moved)
     )
     if names:
         changes = np.stack(list(moved.values()))[:, :, None]  # (loaded fields, rows, 1, P)
