@@ -182,6 +182,7 @@ DRAWN = 1_690_858_624  # a seed of benchmarks/paths.py, of which these did not r
         ("compression-only", 0.05, 7),  # went back at a corner to contacts two points before
         ("compression-only", 1.0, 215),  # leaning motions from a second touch, round and round
         ("compression-only", 1.0, 480),
+        ("compression-only", 0.05, 220),  # what Newton leaves at a crossing is no leaning
         ("undamped-rebound", 0.05, 203),  # a long step from leaning motions onto the even one
     ],
 )

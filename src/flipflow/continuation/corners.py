@@ -30,6 +30,7 @@ from flipflow.continuation.problem import depths, mirrored, residual, signature
 
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the other side is sought
 LEANING = 1e-3  # share of a step, or of a difference before it, from which on a motion leans
+LEANT = 1e-5  # such a difference, in steps, that is more than what Newton leaves at a crossing
 EVEN = 0.1  # the same as a share of the tangent
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 
@@ -76,7 +77,7 @@ def becomes_even(work: Corrector, depth: Real, step: float) -> bool:
         after = abs(work.depth[j, 0] - work.depth[j, 1])
         if after > LEANING * before:
             return False
-        leant = leant or before > LEANING * step * work.scale[0]
+        leant = leant or before > max(LEANING * step, LEANT) * work.scale[0]
     return leant
 
 
