@@ -146,7 +146,7 @@ def test_absurd_states_end_without_a_motion_or_with_the_right_one(screen):
     here = ff.basins(screen, OMEGA, {"relative": [1e300, 1e3, 0.0]})
     assert here.labels[0] == -1
     assert here.labels[1] >= 0
-    assert any("1 cells ended early" in note for note in here.notes)
+    assert any(note.startswith("1 cells") for note in here.notes)
 
 
 @pytest.mark.parametrize(
