@@ -23,13 +23,13 @@ from flipflow.batch.side_by_side import processors
 from flipflow.cli.options import WARMING, in_case
 from flipflow.io.check import check_project
 from flipflow.io.machine_text import machine_text
-from flipflow.model.screen import as_cool_as_air
+from flipflow.model.screen import WarmedLoad, as_cool_as_air
 from flipflow.report.blocks import Values
 from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
 from flipflow.studies import design_map, rubber_temperature, study_values
 from flipflow.studies.candidates import Space
-from flipflow.studies.rubber_temperature import WarmedLoad, settled, warmed_load
+from flipflow.studies.rubber_temperature import settled, warmed_load
 from judge import close
 
 pytestmark = [pytest.mark.numerical, pytest.mark.usefixtures("analysed_once")]

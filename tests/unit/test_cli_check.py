@@ -127,6 +127,17 @@ def test_help_loads_nothing_heavy():
     assert ended.stdout.strip() == "[]"
 
 
+def test_a_check_without_warm_air_calculates_nothing():
+    """What solves for motions, and compiles, is loaded where rubber is to be warmed."""
+    code = (
+        "import sys; from flipflow.io.project import load_project; "
+        "from flipflow.io.check import check_project; check_project(load_project('ffs0827')); "
+        "print('numba' in sys.modules)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip() == "False"
+
+
 def test_values_without_a_source_are_counted_and_grouped(run, tmp_path):
     run("new", "a.toml")
     lines = (tmp_path / "a.toml").read_text(encoding="utf-8").split("[sources]")[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -22,10 +23,11 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
     from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
     from flipflow.io.check import check_project  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.model.screen import of_air  # noqa: PLC0415
 
     project = load_project(file, force=force)
     with Destination(None, json, [file]) as target:
-        with progress(WARMING):
+        with progress(WARMING) if any(map(of_air, project.load_cases)) else nullcontext():
             result = check_project(project)
         if json is not None:
             from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis

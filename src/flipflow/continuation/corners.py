@@ -30,8 +30,8 @@ from flipflow.continuation.problem import depths, mirrored, residual, signature
 
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the other side is sought
 LEANING = 1e-3  # share of a step, or of a difference before it, from which on a motion leans
-LEANT = 1e-5  # such a difference, in steps, that is more than what Newton leaves at a crossing
 EVEN = 0.1  # the same as a share of the tangent
+LEANT = 1e-5  # difference of both depths, in steps, that is more than Newton leaves at a crossing
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 
 

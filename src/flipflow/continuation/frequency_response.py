@@ -229,7 +229,7 @@ def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
             break
     else:
         return
-    last = _down(solver, contact_free_unknowns(solver, free), free, omega)
+    last = _led(solver, contact_free_unknowns(solver, free), free, omega)
     if last is not None:
         yield last
 
@@ -241,20 +241,9 @@ def _settled_above(solver: ExactSolver, omega: float) -> Iterator[Real]:
     """
     for above in (omega * RATIO_SETTLED ** np.arange(1, RATIOS_SETTLED)).tolist():
         start = settled_unknowns(solver, above)
-        last = _down(solver, start, above, omega) if solver.starts(start, above) else None
+        last = _led(solver, start, above, omega) if solver.starts(start, above) else None
         if last is not None:
             yield last
-
-
-def _down(solver: ExactSolver, start: Real, above: float, omega: float) -> Real | None:
-    """State at ``omega`` on the branch through one at a higher frequency."""
-    step = (above - omega) / STEPS_UP
-    for way in WAYS:
-        course = correction.Course(omega, above / BACK, step, way.share, -1.0, way.tolerance)
-        last = solver.end_of_branch(start, above, course, way.points)
-        if last is not None:
-            return last
-    return None
 
 
 def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
@@ -265,10 +254,17 @@ def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
     """
     if isinstance(solver, ExactSolver) and solver.system.symmetric and not solver.half_turn:
         solver = ExactSolver(solver.system, half_turn=True)
-    start, step = contact_free_unknowns(solver, free), (omega - free) / STEPS_UP
+    return _led(solver, contact_free_unknowns(solver, free), free, omega)
+
+
+def _led(solver: Solver, start: Real, begin: float, omega: float) -> Real | None:
+    """Unknowns at ``omega`` on the branch through a motion at another frequency."""
+    up, step = omega > begin, abs(omega - begin) / STEPS_UP
+    low, high = (BACK * begin, omega) if up else (omega, begin / BACK)
     for way in WAYS:
-        course = correction.Course(BACK * free, omega, step, way.share, 1.0, way.tolerance)
-        last = solver.end_of_branch(start, free, course, way.points)
+        direction = 1.0 if up else -1.0
+        course = correction.Course(low, high, step, way.share, direction, way.tolerance)
+        last = solver.end_of_branch(start, begin, course, way.points)
         if last is not None:
             return last
     return None

@@ -277,6 +277,7 @@ def spring_change(
             one = _approach(side * (y - gap), side * v, side * a, second, third, noise, slow, new)
         else:
             h, slope, bend, low2, low3 = switching_state(motion, count, j, gap, alpha, beta)
+            # Its rate has no rounding to wait for: a piece that ends too early has the same force.
             unsure = abs(alpha) * noise + abs(beta) * slow
             one = _approach(side * h, side * slope, side * bend, low2, low3, unsure, 0.0, new)
         found = _sooner(found, one)
@@ -323,7 +324,7 @@ def _approach(
 def quiet_time(
     motion: GapMotion, stops: Stops, regime: int, count: int, j: int, step: float
 ) -> float:
-    """How long, from ``step`` on, spring j stays as it is where it is all but at rest at a gap.
+    """A time, ``step`` or longer, before which spring j, all but at rest at a gap, stays as it is.
 
     There more derivatives than two may vanish, as where only another mass is driven, and safe steps
     would be many.
@@ -345,7 +346,7 @@ def quiet_time(
 def _time_within(
     motion: GapMotion, count: int, j: int, alpha: float, beta: float, reach: float, step: float
 ) -> float:
-    """How long, from ``step`` on, alpha y + beta y' changes by less than its rounding or reach."""
+    """A time, ``step`` or longer, in which alpha y + beta y' changes by less than it may."""
     reach = max(reach, abs(alpha) * motion.noise[j, 0] + abs(beta) * motion.noise[j, 1])
     for _ in range(MOST_FOURFOLD):
         if not _changes_less(motion, count, j, alpha, beta, reach, 4.0 * step):

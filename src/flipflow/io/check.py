@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from flipflow.io.derived import Derived, derive
 from flipflow.io.layout import SECTIONS, SPEED, Entry, unchecked_without
@@ -15,9 +14,7 @@ from flipflow.model.fields import FIELD, FIELDS
 from flipflow.model.limits import LIMIT_FIELDS
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, needing
-
-if TYPE_CHECKING:
-    from flipflow.studies.rubber_temperature import WarmedLoad
+from flipflow.model.screen import WarmedLoad, of_air
 
 
 @dataclass(frozen=True)
@@ -166,6 +163,8 @@ def _speeds(project: Project, derived: Derived) -> Iterator[Speed]:
 
 
 def _warmed(project: Project) -> Sequence[WarmedLoad]:
+    if not any(map(of_air, project.load_cases)):
+        return [WarmedLoad(load) for load in project.load_cases]
     from flipflow.studies.rubber_temperature import warmed_load  # noqa: PLC0415  slow to import
 
     return [warmed_load(project.screen, load, project.speed) for load in project.load_cases]

@@ -90,6 +90,26 @@ class Load:
         checked_text("name", self.name)
 
 
+@dataclass(frozen=True)
+class WarmedLoad:
+    """A load case with the temperature of the rubber.
+
+    Parameters
+    ----------
+    load
+        The load as a screen takes it, its temperature within the springs' table.
+    rubber
+        Where the case gives the air's temperature: that at which the rubber settles, in degrees
+        Celsius; None where that is not known.
+    note
+        A sentence where the temperature is not known, or beyond the table.
+    """
+
+    load: Load
+    rubber: float | None = None
+    note: str = ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class FlipFlowScreen:
     """A flip-flow vibrating screen, SI units. Frozen: :meth:`replace` makes a new one.

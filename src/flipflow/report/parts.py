@@ -8,12 +8,12 @@ from typing import NamedTuple
 from flipflow.model.fields import FIELD
 from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES, missing_words
-from flipflow.model.screen import of_air
+from flipflow.model.screen import WarmedLoad, of_air
 from flipflow.report.blocks import Block, Cell, Column, Note, Table
 from flipflow.report.numbers import NOTHING, named, number
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
-from flipflow.studies.rubber_temperature import RISE, WITHIN, WarmedLoad, settled_at_work
+from flipflow.studies.rubber_temperature import RISE, WITHIN, settled_at_work
 
 EQUATION = "Minerals 2024, 14, 406, Eq. (1)"
 STOP_LAW = "Minerals 2024, 14, 406, Eq. (2), and the law chosen"

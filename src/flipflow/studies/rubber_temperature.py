@@ -12,7 +12,7 @@ springs are taken to be as warm.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -22,7 +22,7 @@ from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.load_case import case_words
 from flipflow.model.quantities import QUANTITIES
-from flipflow.model.screen import FlipFlowScreen, Load, as_cool_as_air, of_air
+from flipflow.model.screen import FlipFlowScreen, Load, WarmedLoad, as_cool_as_air, of_air
 from flipflow.periodic.options import Method
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import analysed_range
@@ -34,26 +34,7 @@ NEEDED = "shear_springs.conductance or pieces"
 AS_AIR = "the rubber is taken to be as warm as the air"
 WITHIN = 0.01  # K within which the temperature repeats itself before the last step
 MOST_STEPS = 30
-
-
-@dataclass(frozen=True)
-class WarmedLoad:
-    """A load case with the temperature of the rubber.
-
-    Parameters
-    ----------
-    load
-        The load as a screen takes it, its temperature within the springs' table.
-    rubber
-        Where the case gives the air's temperature: that at which the rubber settles, in degrees
-        Celsius; None where that is not known.
-    note
-        A sentence where the temperature is not known, or beyond the table.
-    """
-
-    load: Load
-    rubber: float | None = None
-    note: str = ""
+MOST_KEPT = 4096  # cases at speeds of which the temperature is kept, as of one study
 
 
 def warmed_load(
@@ -97,7 +78,7 @@ def settled_at_work(
     return WarmedLoad(found, rubber if known else None)
 
 
-@lru_cache(64)
+@lru_cache(MOST_KEPT)
 def _warmed(
     screen: FlipFlowScreen,
     load: Load,
