@@ -32,6 +32,7 @@ ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the ot
 LEANING = 1e-3  # share of a step, or of a difference before it, from which on a motion leans
 EVEN = 0.1  # the same as a share of the tangent
 LEANT = 1e-5  # difference of both depths, in steps, that is more than Newton leaves at a crossing
+UNTOLD = -1  # in place of contacts that are not known
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
 
 
@@ -143,7 +144,7 @@ def contacts_beside(
     for k in range(n + 1):
         work.guess[k] = point[k] + step * direction[k] * work.scale[k]
     code = residual(problem, scratch, work.guess, float(work.guess[n]), work.r, work.J)
-    return signature(problem, scratch) if code == status.OK else -1
+    return signature(problem, scratch) if code == status.OK else UNTOLD
 
 
 @kernel
@@ -156,11 +157,12 @@ def turn_corner(
     is sought as its own mirror image. The point is left corrected in work.
     """
     recall(problem, work, course)
-    length = go_round(problem, problem, scratch, work, branch, p, step, course)
+    told = branch.signature[p]
+    length = go_round(problem, problem, scratch, work, branch, p, told, step, course)
     if length == 0.0:
         recall(problem, work, course)
         half = mirrored(problem)
-        length = go_round(half, problem, scratch, work, branch, p, step, course)
+        length = go_round(half, problem, scratch, work, branch, p, UNTOLD, step, course)
     if length == 0.0:
         recall(problem, work, course)
     return length
@@ -168,20 +170,22 @@ def turn_corner(
 
 @kernel
 def go_round(
-    sought: Any, problem: Any, scratch: Any, work: Corrector, branch: Any, p: int, step: float,
-    course: Course,
+    sought: Any, problem: Any, scratch: Any, work: Corrector, branch: Any, p: int, told: int,
+    step: float, course: Course,
 ) -> float:  # fmt: skip
     """The same for motions of the problem that solve ``sought`` as well.
 
     A little beyond, the other contacts tell the Jacobian of the other side; its tangent is followed
-    to where those contacts are.
+    to where those contacts are. The last Newton step may have led point p there, from where it had
+    the contacts ``told``.
     """
     here, along = work.here, work.tangent
     before = contacts_beside(sought, scratch, work, here, work.before, 0.0)
     contacts = contacts_beside(sought, scratch, work, here, work.before, step)
     for k in range(work.border.shape[0]):
         work.border[k] = work.before[k]
-    if contacts < 0 or contacts == before or not bordered(work):
+    beyond = told != UNTOLD and contacts != told
+    if contacts == UNTOLD or (contacts == before and not beyond) or not bordered(work):
         return 0.0
     new_tangent(work)
     for multiple in ROUND:

@@ -69,7 +69,7 @@ STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
 CROSSING_STEP = 1e-2  # the same where the branch goes straight on
 STRAIGHT = 0.9999  # cosine between the tangents from which on it does
 STRAIGHT_MOST = 1e-3  # largest distance from the guess for that, as a share of the step
-CROSSING = 1e-2  # least pivot of that matrix, as a share of its largest, where others may cross
+CROSSING = 1e-2  # how near to singular that matrix is where others may cross
 SHORT_STEP = 1e-3  # longest step that may turn a corner or take more than NEWTON_MANY iterations
 CORNER_STEP = 1e-4  # longest refused step after which the branch is sought round a corner
 NOTHING = -1  # in place of an unknown that ends on a bound
@@ -218,7 +218,7 @@ def may_cross(work: Corrector, step: float, changed: bool, cosine: float) -> boo
     """
     straight = not changed and cosine > STRAIGHT and astray(work) < STRAIGHT_MOST * step
     longest = CROSSING_STEP if straight else STRAND_STEP
-    return step <= longest and (changed or lu_spread(work.A) < CROSSING)
+    return step <= longest and (changed or lu_spread(work.A, work.pivot, work.b) < CROSSING)
 
 
 @kernel

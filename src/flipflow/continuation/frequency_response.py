@@ -44,7 +44,7 @@ from flipflow.periodic.stability import (
 )
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
-BACK = 0.96  # share of the last frequency without contact down to which its branch may turn back
+BACK = 0.6  # share of the last frequency without contact down to which its branch may turn back
 STEPS_UP = 8  # least steps from there to the frequency asked for
 RATIO_UP = 1.25  # of the frequencies above that are tried for a motion without contact
 RATIOS_UP = 40  # of them at most
