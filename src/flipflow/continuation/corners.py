@@ -21,6 +21,7 @@ from flipflow.continuation.correction import (
     Course,
     astray,
     bordered,
+    chord_behind,
     correct,
     in_bounds,
     new_tangent,
@@ -30,7 +31,8 @@ from flipflow.continuation.problem import depths, mirrored, residual, signature
 
 ROUND = (2.0, 8.0, 32.0, 128.0)  # multiples of the refused step at which the other side is sought
 LEANING = 1e-3  # share of a step, or of a difference before it, from which on a motion leans
-EVEN = 0.1  # the same as a share of the tangent
+EVEN = 0.1  # share of a tangent from which on it leans
+SHOWN = 1e-5  # difference of both depths, as a share of a step, that lets look for leaning
 LEANT = 1e-5  # difference of both depths, in steps, that is more than Newton leaves at a crossing
 UNTOLD = -1  # in place of contacts that are not known
 TURN_MOST = 0.90  # least cosine between the tangents at both ends of a step
@@ -54,10 +56,16 @@ def begins_to_lean(
         evenly = work.uneven[j] == 0.0 and abs(depth[j, 0] - depth[j, 1]) <= LEANING * work.scale[0]
         if met and not evenly:
             return False
-        suspect = suspect or (met and (changed or size > LEANING * step * work.scale[0]))
+        shows = work.uneven[j] == 0.0 and size > SHOWN * step * work.scale[0]
+        suspect = suspect or shows or (met and changed)
     if not suspect:
         return False
     leans = leaning(problem, scratch, work, work.w) > LEANING * step
+    if changed and not leans:
+        # Right at the corner, rounding may end the contact on one side only.
+        for k in range(n + 1):
+            work.home_tangent[k] = work.tangent[k] * work.scale[k]
+        leans = not keeps_even(work, work.home_tangent)
     leans = leans and stays_even(problem, scratch, work)
     residual(problem, scratch, work.w, float(work.w[n]), work.r, work.J)
     return leans
@@ -100,15 +108,29 @@ def leaning(problem: Any, scratch: Any, work: Corrector, point: Real) -> float:
 def stays_even(problem: Any, scratch: Any, work: Corrector) -> bool:
     """Whether the last point's motion is its own mirror image, and stays so along the branch.
 
-    A branch of leaning motions passes the even one, too, on the way to their mirror images.
+    A branch of leaning motions passes the even one, too, on the way to their mirror images: there
+    the point before tells, for a tangent at a corner may be of either side.
     """
+    near = LEANING
+    chord = chord_behind(work)
+    if chord > 0.0:
+        near *= min(1.0, chord)
+        if leaning(problem, scratch, work, work.behind) > near:
+            return False
     off = leaning(problem, scratch, work, work.here)
+    return off < near and (chord > 0.0 or keeps_even(work, work.here_tangent))
+
+
+@kernel
+def keeps_even(work: Corrector, tangent: Real) -> bool:
+    """Whether a tangent (not scaled) of the point that ``leaning`` was asked of does not lean."""
+    off = 0.0
     for i in range(work.r.shape[0]):
         turn = 0.0
         for k in range(work.w.shape[0]):
-            turn += work.J[i, k] * work.here_tangent[k]
-        off = max(off, LEANING * abs(turn) / (EVEN * work.scale[i]))
-    return off < LEANING
+            turn += work.J[i, k] * tangent[k]
+        off = max(off, abs(turn) / work.scale[i])
+    return off < EVEN
 
 
 @kernel
@@ -184,7 +206,7 @@ def go_round(
     contacts = contacts_beside(sought, scratch, work, here, work.before, step)
     for k in range(work.border.shape[0]):
         work.border[k] = work.before[k]
-    beyond = told != UNTOLD and contacts != told
+    beyond = told not in (UNTOLD, contacts)
     if contacts == UNTOLD or (contacts == before and not beyond) or not bordered(work):
         return 0.0
     new_tangent(work)
@@ -192,10 +214,11 @@ def go_round(
         length = multiple * step
         ahead = contacts_beside(sought, scratch, work, here, along, length) == contacts
         behind = contacts_beside(sought, scratch, work, here, along, -length) == contacts
-        if ahead != behind:
-            way = length if ahead else -length
-            if not step_round(sought, scratch, work, contacts, way, course):
-                return 0.0
+        if ahead == behind:
+            continue
+        # Where the branch turns sharply, only a longer way leads round.
+        way = length if ahead else -length
+        if step_round(sought, scratch, work, contacts, way, course):
             if not confirm(problem, scratch, work, branch.depth[p], length):
                 return 0.0
             met = signature(problem, scratch)

@@ -123,7 +123,8 @@ def followed(machine: Machine, method: Method, solver: Solver, course: correctio
     """The branch over ``course`` with stability and special points."""
     traced = solver.trace(first_unknowns(solver, course.lower), course.lower, course)
     if traced.code == status.REACHED_LOWER and not _begins_free(solver, course.lower):
-        traced = _spanning(solver, course) or traced
+        spanning = (one for one in _others(solver, course) if one.code == status.REACHED_UPPER)
+        traced = next(spanning, traced)
     return described(machine, method, solver, traced)
 
 
@@ -132,8 +133,8 @@ def _begins_free(solver: Solver, omega: float) -> bool:
     return contact_free_up_to(solver.machine, solver.flow.modes, omega) > 0.0
 
 
-def _spanning(solver: Solver, course: correction.Course) -> Traced | None:
-    """The branch through a motion at the upper bound, where it leads down to the lower one.
+def _others(solver: Solver, course: correction.Course) -> Iterator[Traced]:
+    """Other branches: that which leads down from the upper bound, and those of other motions.
 
     A machine that stands on its stops is reached from below by many motions, and that into which
     it happens to settle may lie on a branch that only turns back.
@@ -141,10 +142,10 @@ def _spanning(solver: Solver, course: correction.Course) -> Traced | None:
     down = course._replace(direction=-1.0)
     start = some_unknowns(solver, course.upper)
     last = solver.end_of_branch(start, course.upper, down, POINTS_MOST)
-    if last is None:
-        return None
-    traced = solver.trace(last, course.lower, course)
-    return traced if traced.code == status.REACHED_UPPER else None
+    if last is not None:
+        yield solver.trace(last, course.lower, course)
+    for u in _unreached(solver, course.lower, settled_unknowns(solver, course.lower)):
+        yield solver.trace(u, course.lower, course)
 
 
 def described(machine: Machine, method: Method, solver: Solver, traced: Traced) -> Branch:
@@ -211,15 +212,19 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def some_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of a motion that is not reached from below, or the best guess of one."""
     settled = settled_unknowns(solver, omega)
+    return next(_unreached(solver, omega, settled), settled)
+
+
+def _unreached(solver: Solver, omega: float, settled: Real) -> Iterator[Real]:
+    """Unknowns of motions at ``omega``: what the machine settles into, and where others lead."""
     if solver.starts(settled, omega):
-        return settled
+        yield settled
     exact = _exact(solver, half_turn=solver.half_turn)
     ways = _followed_down(exact, omega), found_motions(exact, omega), _settled_above(exact, omega)
     for z in chain(*ways):
         u = _unknowns_of(solver, exact, z, omega)
         if solver.starts(u, omega):
-            return u
-    return settled
+            yield u
 
 
 def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
