@@ -216,10 +216,10 @@ def may_cross(work: Corrector, step: float, changed: bool, cosine: float) -> boo
     There the matrix is singular, which it is not where the step leads to another strand; close by
     tangents mix, so that where the branch goes straight on it is passed in a longer step.
     """
-    if changed:
-        return step <= STRAND_STEP
-    straight = cosine > STRAIGHT and astray(work) < STRAIGHT_MOST * step
-    return straight and step <= CROSSING_STEP and lu_spread(work.A, work.pivot, work.b) < CROSSING
+    straight = not changed and cosine > STRAIGHT and astray(work) < STRAIGHT_MOST * step
+    if step > (CROSSING_STEP if straight else STRAND_STEP):
+        return False
+    return changed or lu_spread(work.A, work.pivot, work.b) < CROSSING
 
 
 @kernel

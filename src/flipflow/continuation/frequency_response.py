@@ -67,7 +67,7 @@ class Way(NamedTuple):
 # Where long steps end short of the frequency asked for, as at a corner, short ones try again.
 WAYS = (
     Way(2.0, correction.TOLERATED, 1_000),
-    Way(STEP_SHARE, correction.QUICK, POINTS_MOST),
+    Way(STEP_SHARE, correction.QUICK, 3_000),
 )
 
 
@@ -134,7 +134,7 @@ def _begins_free(solver: Solver, omega: float) -> bool:
 
 
 def _others(solver: Solver, course: correction.Course) -> Iterator[Traced]:
-    """Other branches: that which leads down from the upper bound, and those of other motions.
+    """Other branches at the lower bound, to which motions at higher frequencies lead down.
 
     A machine that stands on its stops is reached from below by many motions, and that into which
     it happens to settle may lie on a branch that only turns back.
@@ -144,7 +144,9 @@ def _others(solver: Solver, course: correction.Course) -> Iterator[Traced]:
     last = solver.end_of_branch(start, course.upper, down, POINTS_MOST)
     if last is not None:
         yield solver.trace(last, course.lower, course)
-    for u in _unreached(solver, course.lower, settled_unknowns(solver, course.lower)):
+    exact = _exact(solver, half_turn=solver.half_turn)
+    for z in chain(_followed_down(exact, course.lower), _settled_above(exact, course.lower)):
+        u = _unknowns_of(solver, exact, z, course.lower)
         yield solver.trace(u, course.lower, course)
 
 
@@ -212,19 +214,15 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
 def some_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of a motion that is not reached from below, or the best guess of one."""
     settled = settled_unknowns(solver, omega)
-    return next(_unreached(solver, omega, settled), settled)
-
-
-def _unreached(solver: Solver, omega: float, settled: Real) -> Iterator[Real]:
-    """Unknowns of motions at ``omega``: what the machine settles into, and where others lead."""
     if solver.starts(settled, omega):
-        yield settled
+        return settled
     exact = _exact(solver, half_turn=solver.half_turn)
     ways = _followed_down(exact, omega), found_motions(exact, omega), _settled_above(exact, omega)
     for z in chain(*ways):
         u = _unknowns_of(solver, exact, z, omega)
         if solver.starts(u, omega):
-            yield u
+            return u
+    return settled
 
 
 def _followed_down(solver: ExactSolver, omega: float) -> Iterator[Real]:
