@@ -174,6 +174,32 @@ DRAWN = 1_690_858_624  # a seed of benchmarks/paths.py, of which these did not r
 
 
 @pytest.mark.parametrize(
+    ("law", "ratio", "number", "seed"),
+    [
+        # From the motion without contact the branch leads far down before it leads up.
+        ("paper", 0.0, 10, 726483726),
+        # Sharp turns beside a stop on which the machine rests, and hardly moves.
+        ("paper", 0.0, 258, 726483726),
+        ("paper", 0.0, 356, 726483726),
+        # No pivot told that the matrix is nearly singular where leaning motions branch off.
+        ("paper", 1.0, 489, 726483726),
+        ("undamped-rebound", 0.15, 36, 631589201),
+        # Rounding ended a contact on one side only, and the tangent leaned.
+        ("compression-only", 0.05, 17, 631589201),
+        # What it settles into only turns back; what it does at higher speeds leads down.
+        ("paper", 0.0, 293, 1948909184),
+        ("paper", 1.0, 204, 201260871),
+        ("paper", 0.15, 271, 201260871),
+    ],
+)
+def test_machines_of_other_draws(law: str, ratio: float, number: int, seed: int) -> None:
+    machine, interval = draw()(seed, number, law=law, ratio=ratio)
+    branch = ff.frequency_response(machine, interval)
+    assert branch.complete, branch.status
+    assert (branch.omega[0], branch.omega[-1]) == interval
+
+
+@pytest.mark.parametrize(
     ("law", "ratio", "number"),
     [
         ("paper", 0.0, 261),  # a Newton step that shrinks no more was taken for rounding

@@ -17,6 +17,7 @@ from flipflow.batch.lane_path import (
     contact_free_state,
     follow,
     forget,
+    forget_path,
     is_even,
     largest_multiplier,
     newton,
@@ -32,6 +33,8 @@ from flipflow.dynamics.contact_free_range import contact_free_up_to
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
 from flipflow.periodic.shooting import Shooting
+
+OCTAVES = 3  # away from a frequency at which a machine is let settle where it does not there
 
 
 class Found(NamedTuple):
@@ -73,7 +76,8 @@ def machine_of(batch: MachineArrays, lane: int) -> MachineArrays:
 @kernel
 def problem_of(machine: MachineArrays, half: bool, length: float) -> Shooting:
     """Shooting over half a turn, with sign, or over a whole one."""
-    return Shooting(machine, 0.5 if half else 1.0, -1.0 if half else 1.0, length)
+    # Lanes do not ask from where displacements count: any array of that shape will do.
+    return Shooting(machine, 0.5 if half else 1.0, -1.0 if half else 1.0, length, machine.static)
 
 
 @kernel(entry=True)
@@ -106,8 +110,8 @@ def run_lane(
     half, lost, jumps = even, False, 0
     for f in range(omega.shape[0]):
         begun = not math.isnan(work.omega[0])
+        rising = f + 1 == omega.shape[0] or omega[f + 1] > omega[f]
         if not begun:
-            rising = f + 1 == omega.shape[0] or omega[f + 1] > omega[f]
             half = even and guess_even[f] != 0
             begun = start_from_guess(problem_of(machine, half, length), work, omega[f], guess[f])
             if not begun:
@@ -118,6 +122,8 @@ def run_lane(
         if not reached:
             jumps += 1 if begun and not lost else 0
             reached, half = settled(machine, work, omega[f], length, even)
+            if f == 0 and not reached:
+                reached, half = led(machine, work, omega[f], length, even, rising)
             lost = not reached
         found.jumps[lane, f] = jumps
         if reached:
@@ -173,6 +179,22 @@ def settled(
             return True, True
     set_out(work, PUSH if even else 0.0)
     return settle(problem_of(machine, False, length), work, omega), False
+
+
+@kernel
+def led(
+    machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool, rising: bool
+) -> tuple[bool, bool]:
+    """Begin with what the machine settles into farther off, followed to omega, as ``settled``.
+
+    From rest at omega it may settle into a motion of several turns beside one of a single turn.
+    """
+    for k in range(1, OCTAVES + 1):
+        reached, half = settled(machine, work, omega * 2.0 ** (-k if rising else k), length, even)
+        if reached and follow(problem_of(machine, half, length), work, omega):
+            return True, half
+        forget_path(work, 0)
+    return False, even
 
 
 @kernel

@@ -15,15 +15,13 @@ from flipflow.dynamics.contact_search import (
     GapMotion,
     exponential,
     exponentials,
-    extremes,
     gap_state,
     integral_of_exponential,
     new_gap_motion,
-    prepare_search,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, segment_motion
-from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
+from flipflow.dynamics.flow import Flow, force_peak, segment_motion
+from flipflow.dynamics.law import kind
 from flipflow.dynamics.pieces import longest
 from flipflow.periodic.readings import observe_record
 
@@ -133,24 +131,6 @@ def read_stops(
                 out.share[lane, f, j] += flow.length[e] / turn
                 peak, _ = force_peak(machine, flow, motion, count, e, j)
                 out.force[lane, f, j] = max(out.force[lane, f, j], peak)
-
-
-@kernel
-def force_peak(
-    machine: MachineArrays, flow: Flow, motion: GapMotion, count: int, e: int, j: int
-) -> tuple[float, float]:
-    """Greatest force of stop j during segment e, and when; its row becomes the force."""
-    stops, regime = machine.stops, flow.regimes[e, j]
-    k = stiffness_share(stops, j, regime) * stops.stiffness[j]
-    c = damping_share(stops, j, regime) * stops.damping[j]
-    rest = motion.offset[j] - signed_gap(stops, j, regime)
-    motion.offset[j] = k * rest + c * motion.drift[j]
-    motion.drift[j] *= k
-    for i in range(count):
-        motion.amplitude[j, i] *= k + c * motion.rate[i]
-    prepare_search(motion, count)
-    low, high, at_low, at_high = extremes(motion, count, j, flow.length[e])
-    return (high, at_high) if high > -low else (-low, at_low)
 
 
 @kernel

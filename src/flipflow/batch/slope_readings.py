@@ -18,7 +18,6 @@ from flipflow.batch.lane_path import LaneWork, new_lane_work
 from flipflow.batch.lane_readings import (
     Asked,
     ReadingWork,
-    force_peak,
     new_reading_work,
 )
 from flipflow.compiled.arrays import Complex, Int, Real
@@ -30,7 +29,7 @@ from flipflow.dynamics.contact_search import (
     prepare_search,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, end_segment, segment_motion, segment_state
+from flipflow.dynamics.flow import Flow, end_segment, force_peak, segment_motion, segment_state
 from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
 from flipflow.dynamics.parameter_tangent import (
     Columns,

@@ -108,10 +108,13 @@ def _spans(history: History, blows: Sequence[Impulse]) -> dict[str, slice]:
 
 
 def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) -> None:
-    from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
+    import numpy as np  # noqa: PLC0415  keeps --help quick
+
+    from flipflow.report.terminal import say  # noqa: PLC0415
+    from flipflow.transient.speed_run import turning_points  # noqa: PLC0415
 
     omega = float(history.omega[-1])
-    last = history.t >= history.t[-1] - 2.0 * math.pi / omega
+    begin = history.t[-1] - 2.0 * math.pi / omega
     head = f"{printable(title)} at {rpm(omega)} rpm"
     say(out, f"{head}, {history.t[-1]:.4g} s from rest", "bold")
     if history.distance is None:
@@ -120,17 +123,24 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
         word = "Settled" if history.settled else "Not settled yet"
         out.print(f"{word}: {history.distance * 1e3:.2g} mm from the periodic motion ahead.")
     spans = _spans(history, blows)
+    parts = [history.t[rows] for rows in spans.values()]
     heads = "".join(f"{f'{name}, greatest':>20}" for name in spans)
     out.print(f"{'':<18}{'last turn':>14}{heads}")
     for which in history.system.named:
-        x = history.displacement(which) * 1e3
-        half = (x[last].max() - x[last].min()) / 2.0
-        most = "".join(f"{abs(x[rows]).max():>17.3f} mm" for rows in spans.values())
+        x = history.displacement(which)
+        times, ends = turning_points(history.t, x, history.velocity(which))
+        t, x = np.append(history.t, times), np.append(x, ends)
+        here = x[t >= begin]
+        half = (here.max() - here.min()) / 2e-3
+        reach = (abs(x[(t >= part[0]) & (t <= part[-1])]).max() for part in parts)
+        most = "".join(f"{far * 1e3:>17.3f} mm" for far in reach)
         out.print(f"  {which!s:<16}{half:>11.3f} mm{most}")
     if history.force.shape[1]:
-        force = abs(history.stop_force()) / 1e3
+        force = (abs(history.force) if history.peak is None else history.peak)[:, 0] / 1e3
         most = "".join(f"{force[rows].max():>17.3f} kN" for rows in spans.values())
-        out.print(f"  {'stop force':<16}{force[last].max():>11.3f} kN{most}")
+        # A row's peak is that since the row before.
+        out.print(f"  {'stop force':<16}{force[history.t > begin].max():>11.3f} kN{most}")
+    out.print("Last turn: half the way from end to end; greatest: farthest from where it began.")
     e = history.energy
     names = ("input", "impulses", "loads", "dissipated", "stored")
     say(out, "Energy: " + ", ".join(f"{n} {e[n] / 1e3:.4g} kJ" for n in names if e[n]))

@@ -23,15 +23,19 @@ from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
     GapMotion,
     exponential,
+    extremes,
     new_gap_motion,
     next_change,
+    prepare_search,
     reciprocal,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import (
+    damping_share,
     kind,
     regime_at,
     signed_gap,
+    stiffness_share,
     tangent_kick,
 )
 from flipflow.dynamics.modes import Modes, new_modes, state_number
@@ -450,3 +454,21 @@ def saltation(machine: MachineArrays, spring: int, sign: float, U: Real, size: i
             gap += machine.direction[spring, k] * U[k, c]
         for k in range(n):
             U[n + k, c] += kick * machine.reach[spring, k] * gap
+
+
+@kernel
+def force_peak(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, count: int, e: int, j: int
+) -> tuple[float, float]:
+    """Greatest force of stop j during segment e, and when; its row becomes the force."""
+    stops, regime = machine.stops, flow.regimes[e, j]
+    k = stiffness_share(stops, j, regime) * stops.stiffness[j]
+    c = damping_share(stops, j, regime) * stops.damping[j]
+    rest = motion.offset[j] - signed_gap(stops, j, regime)
+    motion.offset[j] = k * rest + c * motion.drift[j]
+    motion.drift[j] *= k
+    for i in range(count):
+        motion.amplitude[j, i] *= k + c * motion.rate[i]
+    prepare_search(motion, count)
+    low, high, at_low, at_high = extremes(motion, count, j, flow.length[e])
+    return (high, at_high) if high > -low else (-low, at_low)

@@ -18,6 +18,7 @@ from flipflow.model.contact_law import engaged_side
 from flipflow.model.system import MechanicalSystem
 
 TIMES = "give finite times in s"
+ROUNDING = 1e-10  # share of the amplitude up to which a first harmonic is none
 MOST_SAMPLES = 10_000_000  # times in a grid over one period
 
 
@@ -261,3 +262,8 @@ def _joined(
             touches[-1] = ContactInterval(spring, last.side, last.start, period + first.end)
             touches.pop(0)
     return touches
+
+
+def phase_of(first: Complex, amplitude: Real) -> Real:
+    """Phases in rad of first harmonics of motions of given amplitudes; NaN where there is none."""
+    return np.where(np.abs(first) > ROUNDING * amplitude, np.angle(first), np.nan)

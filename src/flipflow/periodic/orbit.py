@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.compiled.arrays import Int, Real
-from flipflow.dynamics.motion import ContactInterval, Motion, longest_on, states_on
+from flipflow.dynamics.motion import ContactInterval, Motion, longest_on, phase_of, states_on
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_index,
@@ -171,9 +171,12 @@ class Orbit(Frozen, Result):
         return (high + low) / 2.0
 
     def phase(self, which: Coordinate) -> float:
-        """Phase of the first harmonic against the exciting force in rad; positive: it leads."""
-        _, _, first = self._extremes(which)
-        return float(np.angle(first))
+        """Phase of the first harmonic against the exciting force in rad; positive: it leads.
+
+        NaN where there is none, as in a motion that nothing excites once a turn.
+        """
+        low, high, first = self._extremes(which)
+        return float(phase_of(np.asarray(first), np.asarray(0.5 * (high - low))))
 
     @property
     def contact_intervals(self) -> tuple[ContactInterval, ...]:

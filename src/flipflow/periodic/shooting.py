@@ -39,6 +39,7 @@ class Shooting(NamedTuple):
     fraction: float
     sign: float
     length: float  # length in m below which displacements count as small
+    rest: Real  # (N,) position in m from which they count
 
 
 class ShootingWork(NamedTuple):
@@ -58,11 +59,17 @@ class ShootingWork(NamedTuple):
 
 
 def new_shooting(
-    machine: MachineArrays, *, half_turn: bool, length: float, turns: int = 1
+    machine: MachineArrays,
+    *,
+    half_turn: bool,
+    length: float,
+    turns: int = 1,
+    rest: Real | None = None,
 ) -> Shooting:
     """The shooting problem over ``turns``, or half of them for a mirror-symmetric motion."""
+    rest = np.zeros(machine.direction.shape[1]) if rest is None else rest
     fraction = 0.5 * turns if half_turn else float(turns)
-    return Shooting(machine, fraction, -1.0 if half_turn else 1.0, length)
+    return Shooting(machine, fraction, -1.0 if half_turn else 1.0, length, rest)
 
 
 def new_shooting_work(machine: MachineArrays) -> ShootingWork:
@@ -88,7 +95,7 @@ def mirrored_shooting(problem: Shooting) -> Shooting:
     """The problem over half the time, for motions that are then their own mirror image."""
     if problem.sign < 0.0:
         return problem
-    return Shooting(problem.machine, 0.5 * problem.fraction, -1.0, problem.length)
+    return Shooting(problem.machine, 0.5 * problem.fraction, -1.0, problem.length, problem.rest)
 
 
 @kernel(inline=True)
@@ -186,11 +193,14 @@ def flow_depths(problem: Shooting, work: ShootingWork, omega: float, depth: Real
 
 @kernel
 def state_scale(problem: Shooting, z: Real, omega: float, scale: Real) -> None:
-    """Size of each unknown: the motion's amplitude (m), that times omega for velocities."""
+    """Size of each unknown: the motion's amplitude (m), that times omega for velocities.
+
+    It counts from where the machine rests: on a stop it may hardly move.
+    """
     n = problem.machine.direction.shape[1]
     amplitude = problem.length
     for k in range(n):
-        amplitude = max(amplitude, math.hypot(z[k], z[n + k] / omega))
+        amplitude = max(amplitude, math.hypot(z[k] - problem.rest[k], z[n + k] / omega))
     for k in range(n):
         scale[k] = amplitude
         scale[n + k] = amplitude * omega

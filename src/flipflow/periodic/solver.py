@@ -22,7 +22,7 @@ from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion
-from flipflow.errors import IncompleteError
+from flipflow.errors import IncompleteError, InputError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.readings import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
@@ -222,7 +222,11 @@ class Solver(ABC):
         self.springs = self.system.springs
         self.half_turn, self.turns = half_turn, turns
         self.machine = machine_arrays(self.system)
-        self.length = characteristic_length(self.system, self.machine)
+        self.rest = resting_position(self.system)
+        self.length = min(
+            characteristic_length(self.system, self.machine),
+            *pressed_depths(self.system, self.rest),
+        )
 
     @property
     def options(self) -> tuple[float, ...]:
@@ -479,12 +483,35 @@ class Solver(ABC):
 
     def shooting(self, *, half_turn: bool) -> Shooting:
         """The shooting problem over the motion's period, or half of it."""
-        return new_shooting(self.machine, half_turn=half_turn, length=self.length, turns=self.turns)
+        return new_shooting(
+            self.machine, half_turn=half_turn, length=self.length, turns=self.turns, rest=self.rest
+        )
 
     @cached_property
     def shooting_work(self) -> ShootingWork:
         """Scratch of the exact flow."""
         return new_shooting_work(self.machine)
+
+
+def resting_position(system: MechanicalSystem) -> Real:
+    """Where the machine rests under its constant force in m, (N,); zero where nothing holds it."""
+    preloaded = any(min(spring.gaps) < 0.0 for spring in system.springs)
+    if not preloaded and not np.any(system.constant_force):
+        return np.zeros(system.size)
+    try:
+        return np.ascontiguousarray(system.static_position())
+    except InputError:
+        return np.zeros(system.size)
+
+
+def pressed_depths(system: MechanicalSystem, rest: Real) -> Iterator[float]:
+    """How deep in m the machine lies in the stops on which it rests; infinity at last."""
+    for spring in system.springs:
+        y = float(spring.direction @ rest)
+        depth = max(y - spring.gaps[0], -y - spring.gaps[1])
+        if spring.acts and depth > 0.0:
+            yield depth
+    yield math.inf
 
 
 def characteristic_length(system: MechanicalSystem, machine: MachineArrays) -> float:

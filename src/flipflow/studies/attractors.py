@@ -108,18 +108,17 @@ class Attractors:
             run = self.lanes.settle(states[wave], starts[wave], self.capture, most, say)
             _write(whole, wave, run)
             while not run.cancelled and self._found_further(run):
-                run = self._again(run, most)
+                run = self._again(run, states[wave], starts[wave], most)
                 _write(whole, wave, run)
             if run.cancelled:
                 return Run(whole.states, whole.label, whole.turns, whole.code, cancelled=True)
             done += wave.size
         return whole
 
-    def _again(self, run: Run, most: int) -> Run:
-        """Lanes that nothing caught, run on from where they ended."""
+    def _again(self, run: Run, states: Real, starts: Real, most: int) -> Run:
+        """Lanes that nothing caught, run anew: a motion found since may catch them early."""
         open_ = np.flatnonzero(_unsettled(run))
-        more = self.lanes.settle(run.states[open_], np.zeros(open_.size), self.capture, most)
-        more.turns[:] += run.turns[open_]
+        more = self.lanes.settle(states[open_], starts[open_], self.capture, most)
         _write(run, open_, more)
         return run
 

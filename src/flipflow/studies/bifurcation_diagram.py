@@ -46,7 +46,7 @@ from flipflow.transient.settling import (
     Settling,
     Word,
 )
-from flipflow.transient.sweep import Step, step_by_step
+from flipflow.transient.sweep import Step, step_at, step_by_step
 
 Real = NDArray[np.float64]
 Direction = Literal["up", "down"]
@@ -274,15 +274,12 @@ class _Passing(ABC):
         self.name, self.values, self.omega = name, values, omega
 
     @abstractmethod
-    def step(self, k: int, before: int) -> Step:
-        """Where the machine settles at value k, coming from another."""
+    def step(self, k: int) -> Step:
+        """Where the machine settles at value k."""
 
     def steps(self, rows: range) -> Iterator[Step]:
         """Steps at these values in this order."""
-        before = rows[0] if rows else 0
-        for k in rows:
-            yield self.step(k, before)
-            before = k
+        return map(self.step, rows)
 
     def passed(
         self, rows: range, settled: Sequence[Settled], jumps: Sequence[int], points: int
@@ -294,7 +291,7 @@ class _Passing(ABC):
         return Pass(
             values=at,
             states=tuple(
-                row.recent if count else _points(self.step(k, k), row, points)
+                row.recent if count else _points(self.step(k), row, points)
                 for k, row, count in zip(rows, settled, periods, strict=True)
             ),
             periods=np.array(periods, np.int64),
@@ -313,10 +310,9 @@ class _OverOmega(_Passing):
             raise InputError("values", values, WITHIN)
         self.settling = Settling(system_of(machine), max_periods)
 
-    def step(self, k: int, before: int) -> Step:  # noqa: ARG002  any two frequencies are joined
+    def step(self, k: int) -> Step:
         """Where the machine settles at value k."""
-        omega = float(self.values[k])
-        return Step(self.settling, omega, partial(self.settling.continued, omega=omega))
+        return step_at(self.settling, float(self.values[k]))
 
 
 class _OverField(_Passing):
@@ -329,14 +325,16 @@ class _OverField(_Passing):
             system_of(parameter.at(value)).with_bonded().require_damping()
         self._solvers: dict[int, FieldSolver | None] = {}
 
-    def step(self, k: int, before: int) -> Step:
-        """Where the machine settles at value k, coming from another."""
+    def step(self, k: int) -> Step:
+        """Where the machine settles at value k."""
         settling = Settling(system_of(self.parameter.at(float(self.values[k]))), self.max_periods)
-        return Step(settling, self.speed, partial(self._continued, settling, before, k))
+        end = float(self.values[k])
+        return Step(settling, self.speed, end, partial(self._continued, settling, end))
 
-    def _continued(self, settling: Settling, before: int, k: int, point: Point) -> Point | None:
-        """The motion followed from one value to the next; None where its branch turns back."""
-        start, end = float(self.values[before]), float(self.values[k])
+    def _continued(
+        self, settling: Settling, end: float, point: Point, start: float
+    ) -> Point | None:
+        """The motion followed from one value to another; None where its branch turns back."""
         if start == end:
             return point
         periods = point.formulation.turns

@@ -15,6 +15,7 @@ from flipflow.batch.lane_readings import Asked, Readings
 from flipflow.batch.slope_readings import SlopesAsked
 from flipflow.batch.solutions import nothing_asked
 from flipflow.batch.variants import Batch
+from flipflow.dynamics.motion import phase_of
 from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.contact_law import NUMBER
 from flipflow.model.quantities import Quantity, leading_coordinate
@@ -215,7 +216,8 @@ class LaneMotions:
         return np.asarray(0.5 * (self.read.high[..., g] - self.read.low[..., g]))
 
     def phase(self, which: Any) -> Real:
-        return np.angle(self.read.first[..., self.plan.place(which)])
+        first = self.read.first[..., self.plan.place(which)]
+        return phase_of(first, self.amplitude(which))
 
     def offset(self) -> Real:
         g = self.plan.place("relative")

@@ -12,15 +12,18 @@ from numpy.typing import NDArray
 from flipflow.batch.lane_columns import lane_columns
 from flipflow.batch.lane_kernels import Found
 from flipflow.batch.lane_readings import Readings
-from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED
+from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED, UNSTABLE
 from flipflow.batch.solutions import nearby_motions, solve_lanes, solve_slopes
 from flipflow.batch.variants import Batch, batches
-from flipflow.model.parameters import value_of
+from flipflow.continuation.frequency_response import formulation_of
+from flipflow.model.parameters import value_of, with_values
 from flipflow.model.quantities import BranchWord, Quantity
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
+from flipflow.periodic.options import PiecewiseExact
+from flipflow.periodic.orbit import Orbit
 from flipflow.studies.lane_quantities import LaneMotions, LanePlan
-from flipflow.studies.quantity_values import fields_of_rows
+from flipflow.studies.quantity_values import Working, fields_of_rows, number_or_nan, plain
 from flipflow.studies.tilted_lanes import TiltedLanes
 
 Real = NDArray[np.float64]
@@ -32,9 +35,14 @@ Tell = Callable[[float], None]
 ABOVE = 1.001  # least factor on the highest frequency at which one that falls begins
 
 
+def of_one_motion(quantity: Quantity) -> bool:
+    """Whether a quantity is that of a motion by itself, whatever other motions there are."""
+    return quantity.of == "motion" and not quantity.of_folds
+
+
 def on_lanes(machine: Machine, quantity: Quantity) -> bool:
-    """Whether lanes tell a quantity of a machine."""
-    if quantity.of != "motion" or quantity.of_folds:
+    """Whether lanes tell a quantity of a machine, and its derivatives."""
+    if not of_one_motion(quantity):
         return False
     return isinstance(machine, FlipFlowScreen) or quantity.name != "dissipated_power"
 
@@ -62,7 +70,8 @@ def lane_values(
     columns
         Values by parameter, SI, (S,) each.
     quantities
-        Quantities for which :func:`on_lanes` holds.
+        Quantities for which :func:`of_one_motion` holds, and :func:`on_lanes` where ``names`` are
+        given. What lanes do not tell is read off each of their motions by itself.
     omega
         Frequencies in rad/s, (K,), in any order.
     span
@@ -115,9 +124,8 @@ def slope_key(name: str) -> str:
 
 
 Answer = tuple[dict[str, Real], Int]
-# Names of the leading amplitude, of the jumps of the path, and of whether an even machine leans,
-# beside those of the quantities.
-SIZE, JUMPS, LEANS = "", "jumps", "leans"
+# Names of the leading amplitude and of the jumps of the path, beside those of the quantities.
+SIZE, JUMPS = "", "jumps"
 RINGS = 8  # parts of a distance within which jumps are looked for
 ONE_MOTION = 1e-6  # share within which two amplitudes are of one motion
 
@@ -132,10 +140,10 @@ def jump_distance(
 ) -> Real:
     """Distance |omega - jump| / jump of S variants from their nearest jump, (S,), at most ``most``.
 
-    Lanes rise and fall through rings around omega. Where they jump, part or meet, where their
-    motion is lost to one of more periods, and where it begins to lean, is a jump. Distances are
-    rounded down to a ring's edge, and 0 where two motions or none stand at omega. A jump and the
-    one back may be missed where they lie within one ring.
+    Lanes rise and fall through rings around omega. Where they jump, part or meet is a jump; where
+    a motion begins to lean, or gives way to one of two periods, it goes on smoothly, and is none.
+    Distances are rounded down to a ring's edge, and 0 where two motions or none stand at omega. A
+    jump and the one back may be missed where they lie within one ring.
 
     Parameters
     ----------
@@ -153,8 +161,8 @@ def jump_distance(
     nearest = np.full(rows, np.nan)
     for batch in batches(machine, columns)[0]:
         question = _Question(machine, columns, (), batch, threads, None)
-        up, down, same = question.both_ways(speeds, span[1])
-        told = (up[JUMPS], down[JUMPS], up[LEANS], down[LEANS], same.astype(float))
+        up, down, same = question.both_ways(speeds, span[1], (FOUND, UNSTABLE))
+        told = (up[JUMPS], down[JUMPS], same.astype(float))
         jumped = np.any([np.diff(one, axis=1) != 0.0 for one in told], axis=0)
         near = np.where(jumped, inner, most).min(axis=1)
         nearest[batch.rows] = np.where(same[:, RINGS], near, 0.0)
@@ -201,12 +209,15 @@ class _Question:
         return _in_order(*solved, 1 + np.argsort(order, kind="stable"))
 
     def both_ways(
-        self, omega: Real, top: float
+        self, omega: Real, top: float, reasons: Sequence[int] = (FOUND,)
     ) -> tuple[dict[str, Real], dict[str, Real], NDArray[np.bool_]]:
-        """Values from below and from above, and where both are of one motion, (L, K)."""
+        """Values from below and from above, and where both are of one motion, (L, K).
+
+        Motions count that have one of ``reasons``.
+        """
         (up, why), (down, why_down) = self.rising(omega), self.falling(omega, top)
         same = np.abs(up[SIZE] - down[SIZE]) <= ONE_MOTION * np.maximum(up[SIZE], down[SIZE])
-        return up, down, same & (why == FOUND) & (why_down == FOUND)
+        return up, down, same & np.isin(why, reasons) & np.isin(why_down, reasons)
 
     def _solved(self, omega: Real) -> Answer:
         nearby = nearby_motions(self.machine.system().with_bonded(), self.batch.system, omega)
@@ -214,18 +225,38 @@ class _Question:
         own = {name: column[rows] for name, column in self.columns.items()}
         of_screen = isinstance(self.machine, FlipFlowScreen)
         fields = fields_of_rows(self.machine, own) if of_screen else {}
-        plan = LanePlan(self.machine, self.batch, fields, omega, self.quantities)
+        told_by_lanes = tuple(one for one in self.quantities if on_lanes(self.machine, one))
+        plan = LanePlan(self.machine, self.batch, fields, omega, told_by_lanes)
         found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
         told = LaneMotions(plan, read)
-        values = {one.name: told.value(one) for one in self.quantities}
+        values = {one.name: told.value(one) for one in told_by_lanes}
+        others = [one for one in self.quantities if one not in told_by_lanes]
+        if others:
+            values |= self._read_singly(found, omega, others)
         if self.names:
             values |= self._slopes(plan, found, read)
         of_path = {
             SIZE: told.amplitude(plan.leading),
             JUMPS: found.jumps.astype(float),
-            LEANS: found.leaning.astype(float),
         }
         return values | of_path, found.reason
+
+    def _read_singly(
+        self, found: Found, omega: Real, quantities: Sequence[Quantity]
+    ) -> dict[str, Real]:
+        """Quantities (L, K) read off the orbit of each motion that was found."""
+        values = {one.name: np.full(found.reason.shape, np.nan) for one in quantities}
+        for lane, k in np.argwhere(found.reason == FOUND).tolist():
+            row = self.batch.rows[lane]
+            own = {name: plain(column[row]) for name, column in self.columns.items()}
+            machine = with_values(self.machine, own)
+            motion = formulation_of(machine.system(), PiecewiseExact(), half_turn=False)
+            point = motion.solver().solve(found.state[lane, k], float(omega[k]))
+            if point is not None:
+                working = Working(machine, Orbit(machine, point))
+                for one in quantities:
+                    values[one.name][lane, k] = number_or_nan(working.value_of(one))
+        return values
 
     def _slopes(self, plan: LanePlan, found: Found, read: Readings) -> dict[str, Real]:
         """Derivatives of the quantities with respect to the parameters asked for, (L, K, P)."""

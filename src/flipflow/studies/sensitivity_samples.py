@@ -35,13 +35,14 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
-from flipflow.studies.lane_values import lane_values, on_lanes
+from flipflow.studies.lane_values import lane_values, of_one_motion, on_lanes
 from flipflow.studies.quantity_values import (
     MOTION_VALUES,
     ContactFree,
     Working,
     fields_of_rows,
     number_or_nan,
+    plain,
 )
 
 Real = NDArray[np.float64]
@@ -158,7 +159,7 @@ def motion_values(
 
     Chunks of samples go to ``threads`` threads; what ``tell`` raises ends the work.
     """
-    if on_lanes(question.machine, question.quantity):
+    if of_one_motion(question.quantity):
         asked = (question.quantity,)
         found, _ = lane_values(
             question.machine, columns, asked, question.omega, question.span, question.branch,
@@ -166,7 +167,7 @@ def motion_values(
         )  # fmt: skip
         return found[question.quantity.name]
     names = tuple(columns)
-    rows = [tuple(map(_plain, row)) for row in zip(*columns.values(), strict=True)]
+    rows = [tuple(map(plain, row)) for row in zip(*columns.values(), strict=True)]
     values = np.full((len(rows), question.omega.size), np.nan)
 
     def chunk(part: slice, stop: NDArray[np.int64]) -> None:
@@ -262,7 +263,3 @@ def _outermost(
     which = leading_coordinate(branch.system)
     orbit = pick(found, key=lambda one: one.amplitude(which))
     return Working(machine, orbit, tuple(fold.omega for fold in branch.folds))
-
-
-def _plain(value: Any) -> object:
-    return value.item() if isinstance(value, np.generic) else value

@@ -28,7 +28,7 @@ from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
 from flipflow.studies.lane_values import (
     jump_distance,
     lane_values,
-    on_lanes,
+    of_one_motion,
     one_motion,
     slope_key,
     with_own,
@@ -106,7 +106,7 @@ def evaluate(
             values[one.name] = closed_form_values(replace(question, quantity=one), columns, omega)
         reasons[~np.all(_fine(columns), axis=0)] = REFUSED
         return values, reasons
-    told = [one for one in asked if on_lanes(machine, one)]
+    told = [one for one in asked if of_one_motion(one)]
     if told:
         found, why = lane_values(machine, columns, told, omega, span, branch, threads, names=names)
         values |= found

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flipflow.batch.lane_readings import Readings
 from flipflow.batch.slope_readings import AGREE, TIED, Slopes
+from flipflow.dynamics.motion import phase_of
 from flipflow.model.quantities import Quantity
 from flipflow.studies.lane_quantities import LanePlan
 from flipflow.studies.quantity_values import MOTION_VALUES, Frame
@@ -72,7 +73,8 @@ class TiltedLanes:
         harmonic, slope = self._first(which)
         with np.errstate(invalid="ignore", divide="ignore"):  # what does not move has no phase
             turned = (slope / harmonic).imag
-        return np.asarray(np.angle(harmonic) + 1j * TILT * turned)
+        phase = phase_of(harmonic, self.amplitude(which).real)
+        return np.asarray(phase + 1j * TILT * turned)
 
     def offset(self) -> Complex:
         low, high = self._extremes("relative")

@@ -364,12 +364,15 @@ class Search:
         tops = self.u[rows]
         for e, k, j, top, a, b in self._beside(step):
             bend = a + b - 2.0 * top
-            if bend < 0.0:
+            if -np.inf < bend < 0.0:
                 tops[e, k, j] += 0.5 * step * (a - b) / bend
         return np.asarray(tops.reshape(-1, self.u.shape[1]))
 
     def _beside(self, step: float) -> Iterator[tuple[int, int, int, float, float, float]]:
-        """Of each end, frequency and parameter within its interval: the height there and beside."""
+        """Of each end, frequency and parameter within its interval: the height there and beside.
+
+        A machine beside without a value is infinitely low.
+        """
         for e, sign in enumerate(SIGNS.values()):
             for k, best in enumerate(self._rows(sign).tolist()):
                 u = self.u[best]
@@ -377,8 +380,8 @@ class Search:
                 for j in range(u.size):
                     beside = [self._row.get(one[j].tobytes(), -1) for one in sides]
                     heights = sign * self.values[[best, *beside], k]
-                    if min(beside) >= 0 and np.isfinite(heights).all():
-                        yield e, k, j, *heights.tolist()
+                    if min(beside) >= 0 and np.isfinite(heights[0]):
+                        yield e, k, j, *np.nan_to_num(heights, nan=-np.inf).tolist()
 
     @property
     def _told(self) -> str:

@@ -73,6 +73,8 @@ class History(Result):
         Version of flipflow.
     works
         Running totals in J of what stands in ``energy``, (n,) each, where they were kept.
+    peak
+        Greatest size of each stop's force since the row before in N, (n, m), where it was sought.
     """
 
     system: MechanicalSystem
@@ -95,9 +97,10 @@ class History(Result):
     counters: Mapping[str, int] = field(default_factory=dict)
     version: str = __version__
     works: Mapping[str, Real] = field(default_factory=dict)
+    peak: Real | None = None
 
     def __post_init__(self) -> None:
-        for name in ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal"):
+        for name in ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal", "peak"):
             values = getattr(self, name)
             if values is not None:
                 # A view, so that the owner of the data keeps an array it can write to.
@@ -178,6 +181,9 @@ def thinned(history: History, most: int) -> History:
         history,
         **thin,
         works={name: values[kept] for name, values in history.works.items()},
+        peak=None
+        if history.peak is None
+        else np.maximum.reduceat(history.peak, np.concatenate([[0], kept[:-1] + 1])),
         notes=(*history.notes, f"Of {rows} calculated times one in {step} is kept."),
     )
 

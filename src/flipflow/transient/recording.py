@@ -53,9 +53,8 @@ class Recording:
 
     def __init__(self, t: Real, size: int, springs: int) -> None:
         k = t.size
-        self.table = Table(
-            t, np.empty((k, size)), np.empty((k, size)), np.empty((k, size)), np.empty((k, springs))
-        )
+        x, v, a = np.empty((3, k, size))
+        self.table = Table(t, x, v, a, np.empty((k, springs)), np.zeros((k, springs)))
         self.row = 0
         self.changes: list[tuple[float, int, int]] = []
         self.work = {"input": 0.0, "dampers": 0.0, "stops": 0.0}

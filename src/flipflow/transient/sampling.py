@@ -9,8 +9,8 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, run_flow, segment_state
-from flipflow.dynamics.law import force
+from flipflow.dynamics.flow import Flow, force_peak, run_flow, segment_motion, segment_state
+from flipflow.dynamics.law import force, kind
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
 PANEL = 2.0  # radians of the fastest mode in a Gauss panel
@@ -25,6 +25,7 @@ class Table(NamedTuple):
     v: Real  # (K, N)
     a: Real  # (K, N)
     force: Real  # (K, m)
+    peak: Real  # (K, m) greatest size of the force since the sample before
 
 
 class Changes(NamedTuple):
@@ -81,6 +82,7 @@ def sample_motion(
             while row < table.t.shape[0] and table.t[row] <= last and table.t[row] <= end:
                 sample(problem, work, e, omega, row, table)
                 row += 1
+            add_peaks(problem.machine, flow, e, omega, row, table)
             add_work(problem, work, e, omega, budget)
             if e > 0:
                 note_change(flow, e, changes)
@@ -115,6 +117,26 @@ def sample(
         table.a[row, k] = work.rate[n + k]
     for j in range(table.force.shape[1]):
         table.force[row, j] = spring_force(problem.machine, flow, e, j)
+        table.peak[row, j] = max(table.peak[row, j], abs(table.force[row, j]))
+
+
+@kernel
+def add_peaks(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, row: int, table: Table
+) -> None:
+    """Greatest forces of the stops over segment e, after which ``row`` is the next one."""
+    count = 0
+    for j in range(table.peak.shape[1]):
+        if kind(machine.stops, j, flow.regimes[e, j]) == 0:
+            continue
+        if count == 0:
+            count = segment_motion(machine, flow, e, omega, machine.direction, flow.motion)
+        peak, at = force_peak(machine, flow, flow.motion, count, e, j)
+        r, when = row, flow.start[e] + at
+        while r > 0 and table.t[r - 1] >= when:
+            r -= 1
+        if r < table.t.shape[0]:
+            table.peak[r, j] = max(table.peak[r, j], peak)
 
 
 @kernel(inline=True)

@@ -106,13 +106,15 @@ def simulate(
     run = _Run(machine, system_of, speed, end, say)
     run.carry(Recording(times, system.size, len(run.kept)), z, blows)
     distance, near = _settled(system_of(run.machine), run.z, speed)
+    forces = run.forces()
     return History(
         system=system,
         t=times,
         x=run.recording.table.x,
         v=run.recording.table.v,
         a=run.recording.table.a,
-        force=run.forces(),
+        force=forces,
+        peak=run.peaks(forces),
         omega=np.full(times.size, speed),
         angle=speed * times,
         normal=_normal(machine, speed, times, initial, blows, end),
@@ -245,6 +247,12 @@ class _Run:
                 of = spring.law, spring.stiffness, spring.damping, spring.gaps
                 forces[:, k] = force_in(*of, np.full(y.shape, WHOLE), y, rate)
         return forces
+
+    def peaks(self, forces: Real) -> Real:
+        """Greatest size of the force of every spring since the time before, (K, m)."""
+        peaks = np.abs(forces)
+        peaks[:, self.kept] = self.recording.table.peak
+        return peaks
 
     def events(self) -> tuple[ContactChange, ...]:
         """Every change of contact."""

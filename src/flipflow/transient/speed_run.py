@@ -207,19 +207,27 @@ def steady_power(
 
 
 def swings(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
-    """Times of the turning points of x(t), and half the way from each to the one before.
+    """Times of the turning points of x(t), and half the way from each to the one before."""
+    times, ends = turning_points(t, x, v)
+    return times[1:], np.abs(np.diff(ends)) / 2.0
+
+
+def turning_points(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
+    """Times of the turning points of x(t), and x there.
 
     A start at rest is a turning point; one in the midst of a motion is none.
     """
-    turning = np.flatnonzero(v[:-1] * v[1:] < 0.0)
-    h = t[turning + 1] - t[turning]
-    share = v[turning] / (v[turning] - v[turning + 1])
+    # A row may stand right on a turning point: a law may change there, whose time is then found.
+    moving = np.flatnonzero(v)
+    before = moving[:-1][v[moving[:-1]] * v[moving[1:]] < 0.0]
+    h = t[before + 1] - t[before]
+    share = v[before] / (v[before] - v[before + 1])
     # The velocity is close to a straight line at a turning point, its area is the way there.
-    ends = x[turning] + 0.5 * share * h * v[turning]
-    times = t[turning] + share * h
+    ends = x[before] + 0.5 * share * h * v[before]
+    times = t[before] + share * h
     if v[0] == 0.0:
         times, ends = np.append(t[0], times), np.append(x[0], ends)
-    return times[1:], np.abs(np.diff(ends)) / 2.0
+    return times, ends
 
 
 def turn_means(history: History, values: Real, turns: int) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -218,9 +218,7 @@ def sweep(
     say = checked_monitor(monitor)
     settling = Settling(system_of(machine), max_periods)
     z = initial_state(settling.solver.system, initial)
-    steps = (
-        Step(settling, speed, partial(settling.continued, omega=speed)) for speed in speeds.tolist()
-    )
+    steps = (step_at(settling, speed) for speed in speeds.tolist())
 
     def tell(done: int) -> None:
         say(f"settled at {speeds[done - 1]:.4g} rad/s", done / speeds.size)
@@ -244,13 +242,21 @@ class Step:
         Runs the machine as it is at this step.
     omega
         Frequency in rad/s.
+    value
+        What the steps differ in: the frequency, or a parameter.
     continued
-        The motion of the step before followed along its branch to this one; None where it ends.
+        A motion at a value followed along its branch to this step; None where it ends.
     """
 
     settling: Settling
     omega: float
-    continued: Callable[[Point], Point | None]
+    value: float
+    continued: Callable[[Point, float], Point | None]
+
+
+def step_at(settling: Settling, omega: float) -> Step:
+    """A step that differs from others in the frequency."""
+    return Step(settling, omega, omega, lambda point, _: settling.continued(point, omega))
 
 
 def step_by_step(
@@ -263,11 +269,13 @@ def step_by_step(
     """
     rows: list[Settled] = []
     jumps: list[int] = []
+    last: Step | None = None
     for step in steps:
         row = with_word(step.settling, step.settling.settle(z, step.omega, most_turns), step.omega)
-        if rows and _jumped(step, rows[-1], row):
+        if last is not None and _jumped(last, rows[-1], step, row):
             jumps.append(len(rows))
         rows.append(_kept(row))
+        last = step
         z = row.state
         try:
             tell(len(rows))
@@ -283,13 +291,22 @@ def _kept(row: Settled) -> Settled:
     return replace(row, recent=row.recent[-row.point.formulation.turns :])
 
 
-def _jumped(step: Step, before: Settled, after: Settled) -> bool:
-    """Whether the motion before cannot be followed to the motion after, or lies far from it."""
+def _jumped(last: Step, before: Settled, step: Step, after: Settled) -> bool:
+    """Whether neither the motion before can be followed to the motion after, nor that one back.
+
+    Where a motion of two periods ends in one of a single period only the latter leads on.
+    """
     if before.point is None or after.point is None:
         return (before.point is None) != (after.point is None)
-    followed, settling, omega = step.continued(before.point), step.settling, step.omega
+    ahead = _leads(step, before.point, last.value, after)
+    return not (ahead or _leads(last, after.point, step.value, before))
+
+
+def _leads(step: Step, point: Point, value: float, to: Settled) -> bool:
+    """Whether a motion at a value, followed to a step, is what the machine settled into there."""
+    followed, settling, omega = step.continued(point, value), step.settling, step.omega
     if followed is None:
-        return True
-    share = JUMP_SHARE * settling.size(after.recent, omega)
+        return False
+    share = JUMP_SHARE * settling.size(to.recent, omega)
     images = settling.phases(followed)
-    return all(settling.distance(image, after.state, omega) > share for image in images)
+    return any(settling.distance(image, to.state, omega) <= share for image in images)

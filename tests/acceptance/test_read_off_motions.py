@@ -1,0 +1,166 @@
+"""What is read off exact motions says the same as the motions themselves, whoever reads it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import flipflow as ff
+from flipflow.studies.lane_values import jump_distance
+from judge import close
+
+ONE_SIDED = ff.MechanicalSystem(
+    [[1.0]], [[0.06]], [[1.0]], [ff.ClearanceSpring([1.0], 30.0, 1.0, 0.4, math.inf)],
+    ff.HarmonicForce([0.5]),
+)  # fmt: skip
+DOUBLING = 0.3017641  # its motion of one period becomes one of two, rad/s
+
+
+def summits(history: ff.History, which: str) -> np.ndarray:
+    """Half the way from each summit to the next, of samples alone."""
+    x = history.displacement(which)
+    x = x[np.concatenate([[True], np.diff(x) != 0.0])]
+    tops = np.flatnonzero(np.diff(np.sign(np.diff(x))) != 0) + 1
+    return np.abs(np.diff(x[tops])) / 2.0
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
+def test_a_start_swings_as_far_as_its_history(law: str) -> None:
+    """The summit in contact is an event of the law of undamped rebound, with velocity exactly 0."""
+    screen = ff.load("ffs0827").replace(
+        stop_law=law, clearance_minus=math.inf, clearance=1e-3, stop_damping=5e3
+    )
+    start = ff.start_up(screen, ff.SpeedProfile(times=(0, 1, 1.3), speeds=(0, 85.0, 85.0)))
+    farthest = summits(start.history, "relative").max()
+    close("peak", start.peaks["relative_amplitude"].value, farthest, rel=2e-3)
+
+
+def test_a_glide_jumps_late_under_undamped_rebound_too() -> None:
+    screen = ff.load("ffs0827").replace(stop_law="undamped-rebound")
+    glide = ff.ramp(screen, (190.0, 240.0), rate=20.0)
+    (jump,) = glide.jumps
+    history = glide.history
+    large = np.abs(history.displacement("relative")) > 0.02
+    last = history.omega[large].max()
+    assert jump.omega - jump.fold > 5.0
+    assert abs(jump.omega - last) < 1.0
+
+
+def test_a_power_asked_for_too_loses_no_machine() -> None:
+    """The even motion is unstable here; those that lean are found whatever is asked."""
+    omega = 1.6
+    stops = [
+        ff.ClearanceSpring([1.0], 10.0, 0.5, 0.3),
+        ff.ClearanceSpring([2.0], 5.0, 0.5, 0.6, law="elasto-gap"),
+    ]
+    system = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], stops, ff.HarmonicForce([2.0]))
+    study = ff.study(
+        system, {"forcing": (0.9, 1.1)}, ("stop_force", "dissipated_power"), omega=omega,
+        sampling=ff.Sample(n=8),
+    )  # fmt: skip
+    assert study.reasons == {}
+    power = ff.sensitivity(system, {"forcing": (0.999, 1.001)}, "dissipated_power", omega, n=8)
+    assert power.failed == 0.0
+    stable = [orbit for orbit in ff.periodic_orbits(system, omega) if orbit.stable]
+    known = {round(orbit.input_power(), 9) for orbit in stable}
+    alone = ff.study(system, {"forcing": np.array([1.0, 1.0])}, "dissipated_power", omega=omega)
+    assert round(float(alone.values["dissipated_power"].ravel()[0]), 9) in known
+
+
+def test_a_motion_is_found_whatever_other_speeds_are_asked() -> None:
+    """From rest this machine settles into a motion of several turns, beside one of a single."""
+    spring = ff.ClearanceSpring
+    machine = ff.MechanicalSystem(
+        [[1.476, 0.141], [0.141, 1.033]],
+        [[0.319, -0.007], [-0.007, 0.468]],
+        [[1.879, -0.058], [-0.058, 3.225]],
+        [
+            spring([-1, 0], 17.53, 0, 0.696, law="elasto-gap"),
+            spring([-0.303, 0.953], 1.83, 0.979, 0.281, 0.399, "undamped-rebound"),
+            spring([-0.941, -0.339], 3.87, 0, 0.683, 0.244, "undamped-rebound"),
+        ],
+        (
+            ff.HarmonicForce([-0.187 + 1.208j, 0.110 + 0.304j], 1),
+            ff.MovingBase(0.662 - 0.071j, [0.336, 0.817], [0.064, 0.027], 2),
+            ff.HarmonicForce([-1.003 - 1.031j, 0.142 + 0.180j], 3),
+        ),
+        static_force=[-0.317, 1.124],
+    )
+    w = 0.8519
+    alone = ff.study(machine, {"forcing": np.array([1.0, 1.0])}, "amplitude[0]", omega=[w])
+    both = ff.study(machine, {"forcing": np.array([1.0, 1.0])}, "amplitude[0]", omega=[0.5 * w, w])
+    one, two = (study.values["amplitude[0]"][0, 0, -1] for study in (alone, both))
+    stable = [o for o in ff.periodic_orbits(machine, w) if o.stable and o.periods == 1]
+    close("amplitude", [one, two], [stable[0].amplitude(0)] * 2, rel=1e-9)
+
+
+def test_a_smooth_change_of_period_is_no_jump() -> None:
+    """Neither on the way in nor on the way out."""
+    speeds = np.linspace(DOUBLING - 5e-4, DOUBLING + 5e-4, 12)
+    up = ff.sweep(ONE_SIDED, speeds)
+    down = ff.sweep(ONE_SIDED, speeds[::-1], initial=up.rows[-1].state)
+    assert set(up.periods) == set(down.periods) == {1, 2}
+    assert up.jumps == down.jumps == ()
+    diagram = ff.bifurcation_diagram(ONE_SIDED, "omega", speeds)
+    assert diagram.up.jumps == diagram.down.jumps == ()
+
+
+def test_a_smooth_change_of_period_is_no_jump_of_a_design() -> None:
+    """The nearest jump is a fold, as the margin to the jump has it."""
+    stop = ff.ClearanceSpring([1.0], 31.0, 0.47, 0.12, math.inf)
+    system = ff.MechanicalSystem([[1.0]], [[0.2742]], [[1.0]], [stop], ff.HarmonicForce([0.5]))
+    branch = ff.frequency_response(system, (0.3, 6.0))
+    doubling = max(one.omega for one in branch.points_of("period doubling"))
+    assert min(abs(doubling / fold.omega - 1.0) for fold in branch.folds) > 0.2
+    for share in (-0.01, 0.01):
+        omega = doubling * (1.0 + share)
+        far = jump_distance(system, {"forcing": np.ones(1)}, omega, 0.05, (0.3, 6.0))
+        close("distance", far, [0.05])
+
+
+def test_a_simulation_tells_the_greatest_force_between_its_times() -> None:
+    """Under the paper's law the force begins with a jump, which times of a grid pass by."""
+    screen = ff.load("ffs0827").replace(stop_damping=1e5)
+    history = ff.simulate(screen, 120.0, 200)
+    last = history.t > history.t[-1] - 2.0 * math.pi / 120.0
+    (orbit,) = (one for one in ff.periodic_orbits(screen, 120.0) if one.stable)
+    close("peak", history.peak[last].max(), orbit.stop_force_peak(), rel=1e-8)
+    assert np.all(history.peak >= np.abs(history.force))
+
+
+def test_a_worst_case_beside_machines_without_a_value_says_what_may_be_missing() -> None:
+    screen = ff.load("ffs0827").replace(
+        main_mass=2018.91, floating_mass=713.58, eccentric_moment=4.78993,
+        isolation_stiffness=287217.0, isolation_damping=4885.46, shear_stiffness=5832098.0,
+        shear_damping=6706.78, stop_stiffness=20711297.0, stop_damping=2147.28,
+        clearance=3.212745e-3, clearance_minus=2.548732e-3, stop_law="compression-only",
+    )  # fmt: skip
+    names = "clearance", "shear_stiffness", "floating_mass", "stop_stiffness"
+    box = {name: (0.9 * getattr(screen, name), 1.1 * getattr(screen, name)) for name in names}
+    worst = ff.worst_case(screen, box, "relative_amplitude", 70.967286)
+    sample = ff.study(
+        screen, box, "relative_amplitude", omega=70.967286, sampling=ff.Sample(n=1024)
+    )
+    assert worst.greatest[0] + worst.error[0] >= np.nanmax(sample.values["relative_amplitude"])
+
+
+def test_turns_of_a_basin_are_those_until_a_state_is_caught() -> None:
+    """The motion of three periods is found only when states have run all their turns."""
+    screen, x = ff.load("ffs0827"), np.linspace(-0.02, 0.02, 9)
+    found = ff.basins(screen, 446.0, {"relative": x}, {"relative": 446.0 * x})
+    assert (found.labels >= 0).all()
+    assert found.turns.max() < 200
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_what_nothing_excites_once_a_turn_has_no_phase(order: int) -> None:
+    stop = ff.ClearanceSpring([1.0], 5.0, 0.2, 0.3)
+    system = ff.MechanicalSystem(
+        [[1.0]], [[0.1]], [[1.0]], [stop], ff.HarmonicForce([0.5], order=order)
+    )
+    orbit = ff.frequency_response(system, (0.2, 0.5)).orbits_at(0.35)[0]
+    assert math.isnan(orbit.phase(0))
+    study = ff.study(system, {"forcing": np.array([1.0, 1.0])}, "phase[0]", omega=0.35)
+    assert np.isnan(study.values["phase[0]"]).all()
