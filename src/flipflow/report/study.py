@@ -14,7 +14,6 @@ from flipflow.model.numerals import rpm
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.vary import Choice, Distribution, Normal
 from flipflow.plotting.study import (
-    Place,
     curves_figure,
     map_figure,
     parallel_figure,
@@ -144,7 +143,7 @@ def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> I
     yield Heading(heading, 1, new_page=False)
     for name in motions[:MOST_FIGURES]:
         if np.isfinite(found.nominal[name]).all():
-            yield FigureBlock(study_tornado(found, name, Place()))
+            yield FigureBlock(study_tornado(found, name))
     if judged is None:
         yield FigureBlock(parallel_figure(found))
         return
