@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flipflow.errors import InputError, MissingExtra
+from flipflow.errors import InputError, required
 from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
 from flipflow.io.load_cases import read_load_cases
 from flipflow.io.project import load_project, read_limits, refuse_other_files
@@ -274,11 +274,7 @@ def _rows(path: Path) -> list[list[Any]]:
 
 
 def _sheet_rows(path: Path) -> list[list[Any]]:
-    try:
-        import openpyxl  # noqa: PLC0415  an extra
-    except ModuleNotFoundError:
-        words = "A catalogue as XLSX needs openpyxl: pip install 'flipflow[report]'."
-        raise MissingExtra(words) from None
+    openpyxl = required("openpyxl", "A catalogue as XLSX needs openpyxl", "report")
     book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
     return [row for row in rows if any(cell is not None for cell in row)]

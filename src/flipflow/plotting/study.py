@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
-from flipflow.errors import InputError, MissingExtra
+from flipflow.errors import InputError, required
 from flipflow.model.arguments import checked_word
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
@@ -265,15 +265,11 @@ class _Grid:
 
     def lines(self, z: Real, level: float, *, parted: bool = True) -> Iterator[tuple[Real, Real]]:
         """Where z takes a level; ``parted`` by the jump for what is of a motion."""
-        try:
-            from contourpy import contour_generator  # noqa: PLC0415  comes with an extra
-        except ImportError as error:
-            told = "Maps need contourpy: pip install 'flipflow[report]'."
-            raise MissingExtra(told) from error
+        contourpy = required("contourpy", "Maps need contourpy", "report")
         for side in self._sides if parted else (np.ones(self._shape, bool),):
             hidden = np.ma.masked_where(~np.isfinite(z) | ~side, z)
             if hidden.count():
-                for line in contour_generator(self.x, self.y, hidden).lines(level):
+                for line in contourpy.contour_generator(self.x, self.y, hidden).lines(level):
                     yield np.asarray(line[:, 0]), np.asarray(line[:, 1])
 
     @cached_property

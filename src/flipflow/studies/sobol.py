@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.errors import MissingExtra
+from flipflow.errors import required
 
 Real = NDArray[np.float64]
 RESAMPLES = 100  # of the bootstrap that gives the confidence intervals
@@ -162,9 +162,4 @@ def _resampled_variance(A: Real, B: Real, weights: Real) -> Real:
 
 
 def _salib(module: str) -> Any:
-    import importlib  # noqa: PLC0415  beside what it is needed for
-
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingExtra("Sobol indices need SALib: pip install 'flipflow[study]'.") from error
+    return required(module, "Sobol indices need SALib", "study")
