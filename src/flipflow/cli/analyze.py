@@ -86,17 +86,13 @@ def _analyze(
 
 def _write(assessment: Assessment, target: Destination, files: ReportFiles) -> None:
     """The report, the numbers behind it, the summary in the terminal."""
-    from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.results import document_of  # noqa: PLC0415
+    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
     from flipflow.report.terminal import summary  # noqa: PLC0415
 
     document = document_of(assessment)
     files.write(assessment, target, document)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        summary(assessment, console())
-    target.tell()
+    target.finish(lambda out: summary(assessment, out))
 
 
 def _written(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, object]:

@@ -18,8 +18,8 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
-from flipflow.cli.progress import progress, stoppable
+from flipflow.cli.output import printable
+from flipflow.cli.progress import compile_first, progress, stoppable
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
@@ -53,14 +53,12 @@ def basins(
 
         from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
-        document = {**_document(found, risk), "name": title_of(project, case)}
+        title = title_of(project, case)
+        document = {**_document(found, risk), "name": title}
         target.picture("basins.html", figure(found), marked(project, case))
         target.data("basins.json", document)
         target.document(document)
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), found, risk, reason, console())
-        target.tell()
+        target.finish(lambda out: _show(title, found, risk, reason, out))
         if not found.complete:
             raise target.stopped(kept=True)
 
@@ -71,11 +69,10 @@ def _computed(
     """Basins, then the jump risk, or why there is none: basins that are found are not lost."""
     from flipflow.errors import IncompleteError  # noqa: PLC0415
     from flipflow.studies.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
     from flipflow.studies.jump_risk import jump_risk  # noqa: PLC0415
 
     with progress("starting") as monitor:
-        compile_ahead(lambda seconds: monitor(f"compiling, once per version: {seconds:.0f} s", 0.0))
+        compile_first(monitor)
         x, v = _window(screen, omega, cells)
         with stoppable(monitor, "cells") as told:
             found = basins_of(screen, omega, {"relative": x}, {"relative": v}, monitor=told)

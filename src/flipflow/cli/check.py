@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING
 
 from flipflow.cli.options import WARMING, File, Force, Json
-from flipflow.cli.output import console, print_list, printable
+from flipflow.cli.output import print_list, printable
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -29,14 +29,8 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
     with Destination(None, json, [file]) as target:
         with progress(WARMING) if any(map(of_air, project.load_cases)) else nullcontext():
             result = check_project(project)
-        if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-            target.document(document_of(result))
-        target.keep()
-        if target.spoken:
-            _show(result, console())
-        target.tell()
+        target.result(result)
+        target.finish(lambda out: _show(result, out))
 
 
 def _show(result: Check, out: Console) -> None:

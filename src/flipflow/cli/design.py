@@ -81,8 +81,7 @@ def _searched(
 ) -> Proposal:  # fmt: skip
     """The machine for a duty, with a bar; Ctrl-C keeps the best so far."""
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
-    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
+    from flipflow.cli.progress import compile_first, progress, stoppable  # noqa: PLC0415
     from flipflow.studies.design import design as analysis  # noqa: PLC0415
 
     with (
@@ -90,13 +89,12 @@ def _searched(
         executor_of(workers, scheduler) as executor,
         stoppable(tell, STAGE) as told,
     ):
-        compile_ahead(lambda s: tell(f"compiling, once per version: {s:.0f} s", 0.0))
+        compile_first(tell)
         return analysis(duty, generations=generations, store=store, executor=executor, monitor=told)
 
 
 def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     """Report, machine file, numbers; the summary in the terminal."""
-    from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.report_files import KEY, PDF, PROPOSAL, REPORT, duty_key  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.plotting.dispatch import figure  # noqa: PLC0415
@@ -119,7 +117,4 @@ def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     target.data(PROPOSAL, {"schema": document["schema"], KEY: key, **document})
     target.picture(FIGURE, figure(found), found.duty.name)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        summary(found, console())
-    target.tell()
+    target.finish(lambda out: summary(found, out))

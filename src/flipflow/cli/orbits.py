@@ -17,7 +17,7 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
 from flipflow.model.numerals import rpm
 
@@ -58,14 +58,9 @@ def orbits(
 
             for k, orbit in enumerate(found, 1):
                 target.picture(f"motion-{k}.html", orbit_figure(orbit), marked(project, case))
-        if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-            target.document(document_of(found) | {"name": title_of(project, case)})
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), omega, found, console())
-        target.tell()
+        title = title_of(project, case)
+        target.result(found, name=title)
+        target.finish(lambda out: _show(title, omega, found, out))
 
 
 def _show(title: str, omega: float, found: tuple[Orbit, ...], out: Console) -> None:

@@ -59,10 +59,7 @@ def reproduce(
         if len(found.figures) == len(wanted):
             # A figure that this machine does not have would be left over from another one.
             target.replaces([name for name in files if not (folder / name).exists()])
-        if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-            target.document(document_of(found))
+        target.result(found)
         target.keep()
         if target.spoken:
             _show(found, console())

@@ -21,10 +21,12 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from flipflow.cli.destination import Destination
     from flipflow.model.project import Project
     from flipflow.studies.sensitivity import Sensitivity
@@ -133,14 +135,15 @@ def _write(result: Sensitivity, target: Destination, title: str, subject: str) -
         target.data("results.json", document)
         _write_figures(result, target, subject)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        from flipflow.report import summary  # noqa: PLC0415
+
+    def show(out: Console) -> None:
+        from flipflow.report import summary  # noqa: PLC0415  keeps --help quick
         from flipflow.report.terminal import say  # noqa: PLC0415
 
-        say(console(), printable(title), "bold")
-        summary(result, console())
-    target.tell()
+        say(out, printable(title), "bold")
+        summary(result, out)
+
+    target.finish(show)
 
 
 def _write_figures(result: Sensitivity, target: Destination, subject: str) -> None:

@@ -20,7 +20,7 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
 from flipflow.model.numerals import rpm
 
@@ -69,22 +69,21 @@ def simulate(
     with Destination(output, json, [file]) as target:
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
-        kept = history
+        title, kept = title_of(project, case), history
         if output is not None:
             from flipflow.plotting.history import history_figure  # noqa: PLC0415  loads plotly
 
             target.picture("motion.html", history_figure(history), marked(project, case))
         if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
             kept = thinned(history, MOST_ROWS)
-            target.document(document_of(kept) | {"name": title_of(project, case)})
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), history, blows, console())
+            target.result(kept, name=title)
+
+        def show(out: Console) -> None:
+            _show(title, history, blows, out)
             if kept is not history:
-                say(console(), f"The document is thinned. {kept.notes[-1]}")
-        target.tell()
+                say(out, f"The document is thinned. {kept.notes[-1]}")
+
+        target.finish(show)
 
 
 def _blows(written: Sequence[str], end: float) -> tuple[Impulse, ...]:

@@ -21,7 +21,7 @@ from flipflow.cli.options import (
     speed_of,
     title_of,
 )
-from flipflow.cli.output import DOES_NOT_START, console, print_list, printable
+from flipflow.cli.output import DOES_NOT_START, print_list, printable
 from flipflow.cli.progress import progress
 from flipflow.model.numerals import digits
 
@@ -91,18 +91,15 @@ def startup(
     project = in_case(project, case, remedy=IN_FILE)
     with Destination(output, json, [file]) as target:
         start, coast = _calculated(project, drive, seconds)
+        title = title_of(project, case)
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
         if output is not None:
             _figures(runs, target, marked(project, case))
         if json is not None:
             from flipflow.io.command_results import Startup  # noqa: PLC0415
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            target.document(document_of(Startup(title_of(project, case), start, coast)))
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), start, coast, console())
-        target.tell()
+            target.result(Startup(title, start, coast))
+        target.finish(lambda out: _show(title, start, coast, out))
     if _fails_as_given(start):
         raise typer.Exit(DOES_NOT_START)
 

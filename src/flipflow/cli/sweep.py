@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,13 +22,14 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress, stoppable
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from flipflow.io.command_results import Sweeps
     from flipflow.model.project import Project
     from flipflow.plotting.figure import Figure
     from flipflow.studies.ramp import Ramp
@@ -92,15 +93,13 @@ def sweep(
     project = in_case(load_project(file, force=force), case, remedy=IN_FILE)
     with Destination(output, json, [file]) as target:
         found = _passed(project, ends, steps, gliding)
+        title = title_of(project, case)
         if json is not None:
-            target.document(_document(title_of(project, case), found))
+            target.result(_sweeps(title, found))
         if output is not None:
             figure = _figure(project, found.sweeps, ends)
             target.picture("sweep.html", figure, marked(project, case))
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), found, steps, console())
-        target.tell()
+        target.finish(lambda out: _show(title, found, steps, out))
         if not found.complete:
             raise target.stopped(kept=True)
 
@@ -165,16 +164,15 @@ def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[R
     return up, down
 
 
-def _document(title: str, found: Passed) -> dict[str, Any]:
-    from flipflow.io.command_results import Glide, Sweeps  # noqa: PLC0415
-    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+def _sweeps(title: str, found: Passed) -> Sweeps:
+    from flipflow.io.command_results import Glide, Sweeps  # noqa: PLC0415  quick --help
 
     late = tuple(jump for glide in found.glides for jump in glide.jumps)
     glides = tuple(
         Glide(glide.rate, float(glide.history.omega[-1]), found.whole(glide))
         for glide in found.glides
     )
-    return document_of(Sweeps(title, found.up, found.down, late, glides, found.complete))
+    return Sweeps(title, found.up, found.down, late, glides, found.complete)
 
 
 def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
