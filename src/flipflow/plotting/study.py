@@ -16,7 +16,7 @@ from flipflow.errors import InputError, required
 from flipflow.model.arguments import checked_word
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -109,7 +109,7 @@ def _maps(study: Study, names: Sequence[str], limits: Limits | None) -> Figure:
     )
     told = " and ".join(f"the {one.label} in {one.shown_unit or 'plain numbers'}" for one in asked)
     over = f"over {symbol_of(across)} and {symbol_of(up)}"
-    title = f"{_capital(asked[0].label)} {over}" if len(asked) == 1 else f"Maps {over}"
+    title = f"{capitalized(asked[0].label)} {over}" if len(asked) == 1 else f"Maps {over}"
     return Figure(title, f"Contours of {told}.{shaded}{jumps}", panels, height=440 * len(panels))
 
 
@@ -127,12 +127,8 @@ def _map_panel(grid: _Grid, one: Quantity, limits: Limits | None) -> Panel:
     return Panel(
         _field_axis(study, grid.across, grid.x), _field_axis(study, grid.up, grid.y),
         tuple(trace for trace in traces if trace.x.size), cells=cells, notes=notes,
-        title=", ".join(filter(None, (f"{_capital(one.label)}{unit}", where))),
+        title=", ".join(filter(None, (f"{capitalized(one.label)}{unit}", where))),
     )  # fmt: skip
-
-
-def _capital(label: str) -> str:
-    return f"{label[:1].upper()}{label[1:]}"
 
 
 def curves_figure(study: Study, field: str) -> Figure:

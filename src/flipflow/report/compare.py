@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit, shown
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.compare import comparison_figure
 from flipflow.report.blocks import (
@@ -28,7 +28,14 @@ from flipflow.report.numbers import NO_JUMP, NOTHING, number, percent, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import Assessment
-from flipflow.studies.compare import EMPTY, Comparison, Given, InputDifference, ResultChange
+from flipflow.studies.compare import (
+    EMPTY,
+    Comparison,
+    Given,
+    InputDifference,
+    ResultChange,
+    letter,
+)
 
 MARGIN, JUMP = "margin of ", "jump_margin"
 ONE_NAME = 24  # letters of a name that the head of a column has room for
@@ -95,11 +102,6 @@ def every_result(found: Comparison) -> Iterator[Block]:
             yield _changes(found, k, rows, f"{_headed(case)}, {letter(k)} against {letter(0)}")
 
 
-def letter(k: int) -> str:
-    """The letter that stands for a machine."""
-    return chr(ord("A") + k) if k < 26 else str(k + 1)
-
-
 def _described(name: str, one: Assessment) -> str:
     revision = one.project.document.revision
     speed = "no speed" if one.omega is None else f"{rpm(one.omega)} rpm"
@@ -138,7 +140,7 @@ def _changes(found: Comparison, k: int, rows: Sequence[ResultChange], title_: st
 
 
 def _headline(row: ResultChange) -> str:
-    return row.label[:1].upper() + row.label[1:]
+    return capitalized(row.label)
 
 
 def _value(row: ResultChange, value: float | None) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from flipflow.model.limits import PASSAGES
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
@@ -331,7 +331,7 @@ def _limit_row(row: LimitRow) -> tuple[Cell, ...]:
     case = row.reason if row.worst is None else row.case
     if row.name == "speed" and row.worst is not None:
         case = "all"
-    label = row.label[:1].upper() + row.label[1:]
+    label = capitalized(row.label)
     return (
         Cell(label),
         Cell(allowed),

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from flipflow.model.fields import FIELD
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.screen import WarmedLoad, of_air
 from flipflow.report.blocks import Block, Cell, Column, Note, Table
@@ -86,7 +87,7 @@ def warmed_loads(assessment: Assessment) -> Iterator[WarmedLoad]:
 
 def _row(assessment: Assessment, cases: list[CaseAssessment], one: PartRow) -> tuple[Cell, ...]:
     quantity = QUANTITIES[one.name]
-    label = quantity.label[:1].upper() + quantity.label[1:]
+    label = capitalized(quantity.label)
     formula = Cell(one.formula, one.source)
     known = [(value, case) for case in cases if (value := case.values.get(one.name)) is not None]
     if not known:

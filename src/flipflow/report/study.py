@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flipflow.batch.reasons import FOUND
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.vary import Choice, Distribution, Normal
 from flipflow.plotting.study import (
@@ -228,7 +228,7 @@ def _spread_words(found: Study) -> Iterator[str]:
             if counted < found.size:
                 of_case = f" in case {case}" if len(found.cases) > 1 else ""
                 yield (
-                    f"{one.label[:1].upper()}{one.label[1:]}{of_case}: {counted} of {found.size} "
+                    f"{capitalized(one.label)}{of_case}: {counted} of {found.size} "
                     "machines are counted, the rest have none."
                 )
 

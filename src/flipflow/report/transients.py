@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.plotting.transient import run_ups_figure
 from flipflow.report.blocks import (
     Block,
@@ -138,7 +138,7 @@ def beyond_running(assessment: Assessment) -> Iterator[str]:
             continue
         worst, limit = (quantity(value, row.shown_unit, row.unit) for value in (row.worst, most))
         yield (
-            f"{row.label[:1].upper()}{row.label[1:]}: {worst} ({case_words(row.case)}) exceeds the "
+            f"{capitalized(row.label)}: {worst} ({case_words(row.case)}) exceeds the "
             f"running limit of {limit}; {row.reason}."
         )
 
@@ -233,5 +233,5 @@ def _limit_row(assessment: Assessment, row: LimitRow) -> tuple[Cell, ...]:
         allowed = "" if most is None else f"running: {quantity(most, row.shown_unit, row.unit)}"
         state = Cell(row.reason)
     worst = quantity(row.worst, row.shown_unit, row.unit)
-    label = Cell(row.label[:1].upper() + row.label[1:])
+    label = Cell(capitalized(row.label))
     return (label, Cell(allowed), Cell(worst), Cell(case), Cell(percent(row.margin)), state)
