@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from flipflow.continuation.branch import Branch
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import FIELD, symbol_of
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.curves import Curve
@@ -57,7 +57,7 @@ def family_figure(
     which
         The only coordinate to draw; None: all.
     """
-    symbol = FIELD[family.field].symbol if family.field in FIELD else family.field
+    symbol = symbol_of(family.field)
     words = list(labels) or [_value(family.field, member.value) for member in family.members]
     panels = tuple(
         _panel(

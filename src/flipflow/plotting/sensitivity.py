@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import symbol_of
 from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
@@ -101,7 +101,7 @@ def _lines(result: Sensitivity, index: Real, width: Real, label: str) -> Panel:
     areas, lines = [], []
     for rank, i in enumerate(index_order(result)):
         y, half = index[order, i], width[order, i]
-        name = _name(result.names[i])
+        name = symbol_of(result.names[i])
         areas.append(
             Trace(f"{name}, 95 %", x, y + half, "case band", "case band", legend=False,
                   lower=y - half)
@@ -169,16 +169,12 @@ def _rows(result: Sensitivity | OneAtATime, order: list[int]) -> Axis:
 
 def _row(result: Sensitivity | OneAtATime, i: int) -> str:
     """The field, and how far its ends lie from the machine's own value."""
-    nominal, name = result.own[i], _name(result.names[i])
+    nominal, name = result.own[i], symbol_of(result.names[i])
     ends = result.ends[i]
     if not isinstance(nominal, float) or not np.isfinite(nominal) or nominal == 0.0:
         return name
     low, high = (100.0 * (float(end) / nominal - 1.0) for end in ends)  # type: ignore[arg-type]
     return f"{name} {low:+.3g} to {high:+.3g} %".replace("-", MINUS)
-
-
-def _name(field: str) -> str:
-    return FIELD[field].symbol if field in FIELD else field
 
 
 def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flipflow.batch.reasons import FOUND
 from flipflow.errors import InputError, required
 from flipflow.model.arguments import checked_word
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import FIELD, symbol_of
 from flipflow.model.limits import Limits, limit_bounds
 from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.parameters import value_of
@@ -438,11 +438,6 @@ def _end_notes(columns: Sequence[tuple[str, Real]]) -> Iterator[Note]:
             yield Note(float(k), 1.06, f"{finite.max():.4g}", "center", "mark")
 
 
-def symbol_of(field: str) -> str:
-    """Symbol of a field of a screen; the name of any other."""
-    return FIELD[field].symbol if field in FIELD else field
-
-
 def _field_scale(study: Study, field: str) -> float:
     return FIELD_SCALES.get(_field_unit(study, field), 1.0)
 
@@ -450,6 +445,11 @@ def _field_scale(study: Study, field: str) -> float:
 def _field_unit(study: Study, field: str) -> str:
     if field not in FIELD or not isinstance(study.machine, FlipFlowScreen):
         return ""
+    return field_unit(field)
+
+
+def field_unit(field: str) -> str:
+    """Unit in which a field of a screen is drawn: that of its file where its scale is known."""
     known = FIELD[field]
     return known.file_unit if known.file_unit in FIELD_SCALES else known.unit
 
