@@ -23,7 +23,6 @@ from flipflow.report.blocks import (
     Verdict,
     cells,
 )
-from flipflow.report.first_page import verdict_state
 from flipflow.report.numbers import NO_JUMP, NOTHING, number, percent, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
@@ -56,7 +55,7 @@ def title(found: Comparison) -> Iterator[Block]:
 def verdicts(found: Comparison) -> Iterator[Block]:
     """Each machine's verdict and allowed range."""
     for k, (name, one) in enumerate(zip(found.names, found.assessments, strict=True)):
-        yield Verdict(f"{letter(k)}, {name}: {one.verdict}", verdict_state(one))
+        yield Verdict(f"{letter(k)}, {name}: {one.verdict}", one.state)
         yield Text(allowed_range(one.region), "Allowed speed range:")
 
 
@@ -192,7 +191,6 @@ def summary_table(names: Sequence[str], found: Sequence[Assessment]) -> Table:
 
 
 def _summary_row(name: str, one: Assessment) -> tuple[Cell, ...]:
-    state = verdict_state(one)
     allowed = "; ".join(f"{rpm(low)} to {rpm(high)}" for low, high in one.region.feasible)
     judged = [row for row in one.limits_table if row.margin is not None]
     tightest = min(judged, key=lambda row: row.margin or 0.0, default=None)
@@ -202,6 +200,6 @@ def _summary_row(name: str, one: Assessment) -> tuple[Cell, ...]:
         label, margin = QUANTITIES[tightest.name].label, percent(tightest.margin)
         case = "" if tightest.name == "speed" else case_words(tightest.case)
     return (
-        Cell(name), Cell(state, state=state), Cell(speed), Cell(allowed or "none"),
+        Cell(name), Cell(one.state, state=one.state), Cell(speed), Cell(allowed or "none"),
         Cell(label, case), Cell(margin),
     )  # fmt: skip
