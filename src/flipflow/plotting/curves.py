@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -76,6 +77,13 @@ class Curve:
             np.append(branch.stability, following)[order],
             frozenset(fold.omega for fold in branch.folds if not is_jump(branch, fold)),
         )
+
+    def part(self, keep: NDArray[np.bool_]) -> Curve:
+        """The points to keep, as a curve of their own."""
+        return dataclasses.replace(
+            self, omega=self.omega[keep], amplitude=self.amplitude[keep], phase=self.phase[keep],
+            stability=self.stability[keep],
+        )  # fmt: skip
 
     def runs(self) -> Iterator[tuple[str, slice]]:
         """Stretches of the same stability; each ends where the next begins."""

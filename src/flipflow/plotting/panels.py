@@ -111,6 +111,14 @@ class Cells:
     colours: tuple[str, ...]
 
 
+def cell_edges(middles: Real) -> Real:
+    """Edges of cells around their middles, (n + 1,) of (n,)."""
+    if middles.size == 1:
+        return np.array([middles[0] - 0.5, middles[0] + 0.5])
+    inner = (middles[1:] + middles[:-1]) / 2.0
+    return np.concatenate([[2.0 * middles[0] - inner[0]], inner, [2.0 * middles[-1] - inner[-1]]])
+
+
 @dataclass(frozen=True)
 class Bar:
     """A horizontal bar from ``low`` to ``high`` at height ``y``; ``thickness`` in units of y."""

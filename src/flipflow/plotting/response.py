@@ -299,6 +299,14 @@ def curve_traces(
         legend = False
 
 
+def underlay(branch: Branch, which: Coordinate) -> Iterator[Trace]:
+    """The periodic motions that what is reached in time is laid over."""
+    curve = Curve.of(branch, which)
+    return curve_traces(
+        "periodic motions", curve, curve.amplitude * MM, colour="relative", symbol=None, bold=False
+    )
+
+
 def stability_key(traces: Sequence[Trace]) -> Iterator[Trace]:
     """Entries of the legend that say what dashed and dotted lines are, where there are any."""
     for role in ("unstable", "undetermined"):
@@ -392,7 +400,7 @@ def _within(curve: Curve, near: tuple[float, float]) -> Curve:
     keep = inside.copy()
     keep[1:] |= inside[:-1]
     keep[:-1] |= inside[1:]
-    return Curve(curve.omega[keep], curve.amplitude[keep], curve.phase[keep], curve.stability[keep])
+    return curve.part(keep)
 
 
 def _working(omega: float | None, *, text: bool = True) -> tuple[Line, ...]:

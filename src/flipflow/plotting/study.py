@@ -22,7 +22,7 @@ from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace
+from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace, cell_edges
 from flipflow.plotting.scales import MM
 from flipflow.plotting.sensitivity import SHOWN, tornado_figure
 from flipflow.studies.sensitivity import OneAtATime
@@ -315,7 +315,7 @@ def _met_cells(grid: _Grid, limits: Limits) -> Cells:
         operation = QUANTITIES[name].of == "operation"
         values = grid.study.omega[0] if operation else grid.values(name)
         met &= (values >= low) & (values <= high)
-    return Cells(_edges(grid.x), _edges(grid.y), met.astype(np.int64), ("none", "case 3"))
+    return Cells(cell_edges(grid.x), cell_edges(grid.y), met.astype(np.int64), ("none", "case 3"))
 
 
 def _shaded_words(study: Study, limits: Limits) -> str:
@@ -361,11 +361,6 @@ def _round_levels(low: float, high: float) -> Real:
     step = 10.0 ** np.floor(np.log10(raw))
     step *= next(m for m in (1.0, 2.0, 5.0, 10.0) if m * step >= raw)
     return np.asarray(step * np.arange(np.floor(low / step) + 1.0, np.ceil(high / step)))
-
-
-def _edges(middles: Real) -> Real:
-    inner = (middles[1:] + middles[:-1]) / 2.0
-    return np.concatenate([[2.0 * middles[0] - inner[0]], inner, [2.0 * middles[-1] - inner[-1]]])
 
 
 def wide_fields(study: Study) -> list[str]:
