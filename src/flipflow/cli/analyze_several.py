@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from flipflow.cli.destination import Destination
 from flipflow.cli.output import OUTPUT, console
+from flipflow.results.store import write_file
 
 if TYPE_CHECKING:
     from flipflow.model.project import Project
@@ -70,7 +71,6 @@ def _folders(projects: Sequence[Project]) -> Iterator[str]:
 def _write(found: Comparison, table: Table, target: Destination) -> None:
     """The table as a page in the folder, and all machines as one JSON document."""
     from flipflow.report.html import page  # noqa: PLC0415
-    from flipflow.results.store import write_file  # noqa: PLC0415
 
     if target.folder is not None:
         words = page(

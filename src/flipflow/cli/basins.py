@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -20,6 +21,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import printable
 from flipflow.cli.progress import compile_first, progress, stoppable
+from flipflow.errors import IncompleteError
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
@@ -43,8 +45,7 @@ def basins(
     force: Force = False,
 ) -> None:
     """Show on which motion a machine settles, and what throws it."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
 
     project = in_case(load_project(file, force=force), case, speed)
     omega = speed_of(project, speed)
@@ -67,7 +68,6 @@ def _computed(
     screen: FlipFlowScreen, omega: float, cells: int
 ) -> tuple[Basins, JumpRisk | None, str]:
     """Basins, then the jump risk, or why there is none: basins that are found are not lost."""
-    from flipflow.errors import IncompleteError  # noqa: PLC0415
     from flipflow.studies.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
     from flipflow.studies.jump_risk import jump_risk  # noqa: PLC0415
 
@@ -88,7 +88,6 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
     """Relative states up to twice the largest motion's displacement and velocity."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.errors import IncompleteError  # noqa: PLC0415
     from flipflow.studies.periodic_orbits import (  # noqa: PLC0415
         MOST_PERIODS,
         periodic_orbits,

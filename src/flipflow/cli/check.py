@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import WARMING, File, Force, Json
 from flipflow.cli.output import print_list, printable
 from flipflow.cli.progress import progress
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 
 def check(file: File, json: Json = None, force: Force = False) -> None:
     """Check a machine file: what it says, assumes and leaves open."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.check import check_project  # noqa: PLC0415
+    from flipflow.io.check import check_project  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.model.screen import of_air  # noqa: PLC0415
 

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from flipflow.errors import InputError, required
+
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
@@ -25,8 +27,6 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
     MissingExtra
         When dask.distributed is not installed.
     """
-    from flipflow.errors import InputError, required  # noqa: PLC0415  keeps --help quick
-
     if workers is None and scheduler is None:
         yield None
         return
@@ -47,8 +47,6 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
 
 
 def _client(distributed: Any, scheduler: str) -> Any:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     try:
         return distributed.Client(scheduler, timeout=PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers, whole
+from flipflow.cli.output import IMPOSSIBLE
+from flipflow.cli.progress import compile_first, progress, stoppable
 
 if TYPE_CHECKING:
-    from flipflow.cli.destination import Destination
     from flipflow.model.duty import Duty
     from flipflow.studies.design import Proposal
 
@@ -49,10 +51,8 @@ def design(
     Stopped, it keeps the best so far; with --store the same command goes on. Ends with code 6 where
     the duty cannot be done; the nearest machine is then shown.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
     from flipflow.cli.report_files import PROPOSAL, duty_key, replaced_files  # noqa: PLC0415
-    from flipflow.io.duty import load_duty  # noqa: PLC0415
+    from flipflow.io.duty import load_duty  # noqa: PLC0415  keeps --help quick
     from flipflow.report.html import require_templates  # noqa: PLC0415
 
     duty = load_duty(file, force=force)
@@ -81,7 +81,6 @@ def _searched(
 ) -> Proposal:  # fmt: skip
     """The machine for a duty, with a bar; Ctrl-C keeps the best so far."""
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.progress import compile_first, progress, stoppable  # noqa: PLC0415
     from flipflow.studies.design import design as analysis  # noqa: PLC0415
 
     with (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -44,7 +45,6 @@ def orbits(
 
     A motion is one that repeats itself after one or more turns of the shaft.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.studies.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -23,11 +24,11 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
+from flipflow.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.cli.destination import Destination
     from flipflow.model.project import Project
     from flipflow.studies.sensitivity import Sensitivity
 
@@ -70,8 +71,7 @@ def sensitivity(
 
     By Sobol indices: the share of the variance that each field explains.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
     from flipflow.io.vary import read_vary  # noqa: PLC0415
     from flipflow.model.screen import as_cool_as_air, of_air  # noqa: PLC0415
 
@@ -106,7 +106,6 @@ def _omega(
     """
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.errors import InputError  # noqa: PLC0415
     from flipflow.model.quantities import quantity_named  # noqa: PLC0415
 
     whole = quantity_named(quantity, project.screen).of == "response"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -22,6 +23,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
+from flipflow.errors import InputError
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
@@ -56,7 +58,6 @@ def simulate(
 
     Shows the motion, the stop force, the energies, and whether the machine has settled.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.report.terminal import say  # noqa: PLC0415
     from flipflow.transient.history import thinned  # noqa: PLC0415
@@ -87,8 +88,7 @@ def simulate(
 
 
 def _blows(written: Sequence[str], end: float) -> tuple[Impulse, ...]:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.blows import parse_blow  # noqa: PLC0415
+    from flipflow.io.blows import parse_blow  # noqa: PLC0415  keeps --help quick
 
     blows = tuple(parse_blow(one, IMPULSE) for one in written)
     for one, blow in zip(written, blows, strict=True):

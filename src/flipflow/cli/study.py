@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.destination import NOTHING, STOPPED, Destination
 from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers
 from flipflow.cli.output import printable
 from flipflow.cli.progress import compile_first, progress
+from flipflow.errors import Cancelled, InputError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from rich.console import Console
 
-    from flipflow.cli.destination import Destination
     from flipflow.io.study_file import StudyFile
     from flipflow.model.limits import Limits
     from flipflow.model.monitor import Monitor
@@ -54,7 +55,6 @@ def study(
     Stopped, it keeps the finished chunks, and --resume goes on.
     """
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.report.html import require_templates  # noqa: PLC0415
 
     asked = _asked(file, store, resume, force=force)
@@ -110,8 +110,6 @@ class _Asked:
 
     def judged(self, found: Study) -> Tolerance | None:
         """The share that meets the limits of the machine file, where it can be told."""
-        from dataclasses import replace  # noqa: PLC0415  keeps --help quick
-
         from flipflow.studies.tolerance import limits_known, tolerance  # noqa: PLC0415
 
         if self.file is None or found.sampling == "grid":
@@ -127,8 +125,7 @@ class _Asked:
 
 
 def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: bool) -> _Asked:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.study_file import read_study_file  # noqa: PLC0415
+    from flipflow.io.study_file import read_study_file  # noqa: PLC0415  keeps --help quick
 
     if store is not None and resume is not None:
         raise InputError(STORE, str(store), f"{RESUME} names the folder, leave one of the two out")
@@ -157,8 +154,6 @@ def _stopped(file: str | None, store: Path) -> Exception:
     import shlex  # noqa: PLC0415  keeps --help quick
 
     from flipflow.batch.chunk_store import FINISHED, ChunkStore  # noqa: PLC0415  quick --help
-    from flipflow.cli.destination import NOTHING, STOPPED  # noqa: PLC0415
-    from flipflow.errors import Cancelled  # noqa: PLC0415
 
     if not store.exists():
         return Cancelled(f"{STOPPED}; {NOTHING}.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     IN_FILE,
     RPM,
@@ -24,6 +25,7 @@ from flipflow.cli.options import (
 )
 from flipflow.cli.output import printable
 from flipflow.cli.progress import progress, stoppable
+from flipflow.errors import InputError
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
@@ -85,8 +87,7 @@ def sweep(
 
     At each speed the machine settles from where the one before ended.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
 
     ends = speeds_of(speeds)
     gliding = None if rate is None else _rate(rate, ends)
@@ -106,8 +107,6 @@ def sweep(
 
 def _rate(written: str, ends: tuple[float, float]) -> float:
     """Rate in rad/s^2, such that a glide takes no longer than can be carried."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     least = (ends[1] - ends[0]) * RPM / LONGEST_GLIDE
     try:
         rate = float(written)
@@ -121,8 +120,6 @@ def _rate(written: str, ends: tuple[float, float]) -> float:
 
 def _passed(project: Project, ends: tuple[float, float], steps: int, rate: float | None) -> Passed:
     """Sweep up and down, then glide; Ctrl-C ends it and keeps what is finished."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     up, down = _swept(project, ends, steps)
     if down is None or not down.complete:
         return Passed(up, down)
