@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
 from flipflow.io.project import load_project, refuse_other_files
@@ -26,7 +26,6 @@ from flipflow.model.screen import Load
 from flipflow.model.vary import LAW, Choice, Normal
 from flipflow.studies.tolerance import FOLDS
 
-Real = NDArray[np.float64]
 SECTIONS = ("format", "machine", "vary", "study")
 STUDY = (
     "quantities", "speed", "speeds", "load_cases", "sampling", "samples", "seed", "branch",

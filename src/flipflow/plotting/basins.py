@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.quantities import leading_coordinate
 from flipflow.periodic.orbit import Orbit
@@ -18,7 +19,6 @@ from flipflow.plotting.scales import MM
 from flipflow.plotting.units import length_of, speed_of
 from flipflow.studies.basins import Basins, GridAxis
 
-Real = NDArray[np.float64]
 NOT_SETTLED = "none"
 SYMBOLS = ("circle", "square", "triangle", "diamond")
 READING = (

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch
@@ -17,7 +18,6 @@ from flipflow.errors import IncompleteError
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 
-Real = NDArray[np.float64]
 OF_FOLD = 0.05  # from 1 the multiplier of a fold, that of a truncated series, too
 AT_ONE = 1e-3  # several multipliers stand at 1 in some folds, the square root of rounding apart
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.fields import FIELD
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
@@ -15,7 +15,6 @@ from flipflow.plotting.study import FIELD_SCALES, field_unit
 from flipflow.studies.candidates import quantity_of
 from flipflow.studies.design import Proposal
 
-Real = NDArray[np.float64]
 COLUMNS, ROW = 2, 230
 
 

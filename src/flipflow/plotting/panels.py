@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from flipflow.compiled.arrays import Real
+
 PAGE_WIDTH = 690.0  # of an A4 page within its margins, 96 pixels an inch
 Role = Literal[
     "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -22,7 +22,6 @@ from flipflow.plotting.panels import Arrow, Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, MINUS, MM, RPM, SPEEDS
 from flipflow.studies.assessment import Assessment
 
-Real = NDArray[np.float64]
 LABELS = {"main": "main frame (x1)", "floating": "floating frame (xf)", "relative": "relative (x2)"}
 SYMBOLS = {"main": "square", "floating": "triangle"}
 KIND_WORDS = {

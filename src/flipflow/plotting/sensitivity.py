@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import symbol_of
@@ -18,7 +18,6 @@ from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
 from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
-Real = NDArray[np.float64]
 SHOWN: Mapping[str, float] = {
     "mm": MM, "rpm": RPM, "kN": KN, "kW": 1e-3, "deg": DEGREES, "g": 1.0 / GRAVITY, "%": 100.0,
     "h": 1.0 / 3600.0, **dict.fromkeys(("", "N", "W", "K", "m/s", "rad"), 1.0),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError, required
 from flipflow.model.arguments import checked_word
 from flipflow.model.fields import FIELD, symbol_of
@@ -35,7 +36,6 @@ from flipflow.studies.tolerance import (
     limits_left_out,
 )
 
-Real = NDArray[np.float64]
 LEVELS = 7  # contours of a map, about
 MOST_AXES = 10  # of parallel coordinates: the fields, then quantities
 MOST_MAPS = 4  # of one figure

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch
 from flipflow.errors import InputError
@@ -24,7 +23,6 @@ NOT_SETTLED = {
     "chaotic": "chaotic",
     "undecided": "not settled",
 }
-Real = NDArray[np.float64]
 
 
 def sweep_figure(

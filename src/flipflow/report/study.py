@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
+from flipflow.compiled.arrays import Real
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
 from flipflow.model.numerals import capitalized, rpm
@@ -44,7 +44,6 @@ from flipflow.studies.tolerance import (
     limits_left_out,
 )
 
-Real = NDArray[np.float64]
 QUANTILES = (0.025, 0.5, 0.975)
 WORDS = {
     "grid": "every combination",

@@ -26,11 +26,11 @@ from scipy.optimize import minimize, nnls
 
 from flipflow.batch.chunk_store import ChunkStore
 from flipflow.batch.run_chunks import run_chunks
+from flipflow.compiled.arrays import Real
 from flipflow.errors import Cancelled, required
 from flipflow.studies.candidates import MET, TARGET, Judged, Space
 from flipflow.studies.design_store import SHARES, keep, looked_at
 
-Real = NDArray[np.float64]
 Tell = Callable[[float], None]
 POPULATION = 64
 GENERATIONS = 60

@@ -15,6 +15,7 @@ from flipflow.batch.lane_readings import Readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED
 from flipflow.batch.solutions import nearby_motions, solve_lanes, solve_slopes
 from flipflow.batch.variants import Batch, batches
+from flipflow.compiled.arrays import Int, Real
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord, Quantity
 from flipflow.model.screen import FlipFlowScreen
@@ -23,9 +24,6 @@ from flipflow.studies.lane_quantities import LaneMotions, LanePlan
 from flipflow.studies.quantity_values import fields_of_rows
 from flipflow.studies.tilted_lanes import TiltedLanes
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Int = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
 Tell = Callable[[float], None]
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import required
 
-Real = NDArray[np.float64]
 RESAMPLES = 100  # of the bootstrap that gives the confidence intervals
 NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %
 # Spread below this share of the largest value is rounding, not variance.
