@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import numbers
 import reprlib
 from collections.abc import Iterable
@@ -83,6 +84,29 @@ class MissingExtra(FlipflowError, ImportError):  # noqa: N818  fixed by the publ
     """An optional dependency is not installed; the sentence says which extra to install."""
 
     exit_code = 2
+
+
+def required(module: str, told: str, extra: str) -> Any:
+    """An optional dependency, imported when it is needed.
+
+    Parameters
+    ----------
+    module
+        What is imported.
+    told
+        What needs it, in words that stand before "pip install".
+    extra
+        Which extra of flipflow brings it.
+
+    Raises
+    ------
+    MissingExtra
+        When it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingExtra(f"{told}: pip install 'flipflow[{extra}]'.") from error
 
 
 class SampledContactWarning(UserWarning):

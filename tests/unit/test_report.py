@@ -140,7 +140,7 @@ def test_a_stop_that_is_not_reached_is_said(assessment):
 def test_a_machine_without_stops_says_so(analysed):
     linear = analysed("ffs0827-linear")
     assert first_page.stop_sentence(linear) == "the machine has none."
-    assert first_page.verdict_state(linear) == "fail"
+    assert linear.state == "fail"
     assert "none; no speed meets all limits" in allowed_range(linear.region)
     assert "fail" in printed(linear)
 
@@ -151,7 +151,7 @@ def test_what_cannot_be_checked_names_what_is_missing(project):
     rows = {row[0].text: row for row in table.rows}
     assert rows["Shear strain"][-1].text == "not checked"
     assert "shear_springs.height" in rows["Shear strain"][3].text
-    assert first_page.verdict_state(bare) == "not checked"
+    assert bare.state == "not checked"
     notes = [b.text for b in blocks_of(bare) if isinstance(b, Note)]
     assert any("Orbits are not drawn" in note for note in notes)
 

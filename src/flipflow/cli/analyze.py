@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import Files, Folder, Force, Json, Speeds, speed_of, speeds_of, whole
+from flipflow.cli.output import DOES_NOT_START
+from flipflow.cli.progress import with_progress
 
 if TYPE_CHECKING:
-    from flipflow.cli.destination import Destination
     from flipflow.cli.report_files import ReportFiles
     from flipflow.model.project import Project
     from flipflow.studies.assessment import Assessment
@@ -61,8 +63,6 @@ def analyze(
         folder = output or Path(f"{projects[0].name}-flipflow")
         found = [one(files[0], projects[0], folder, json)]
     if any(assessment.start_fails for assessment in found):
-        from flipflow.cli.output import DOES_NOT_START  # noqa: PLC0415
-
         raise typer.Exit(DOES_NOT_START)
 
 
@@ -71,12 +71,9 @@ def _analyze(
     written: ReportFiles, quiet: bool = False,
 ) -> Assessment:  # fmt: skip
     """One machine: its report in a folder, its summary in the terminal unless ``quiet``."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-
     old = written.replaced(folder, project)
     with Destination(folder, json, [file], quiet=quiet) as target:
         target.replaces(old)
-        from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.studies.assessment import assess  # noqa: PLC0415
 
         assessment = with_progress(lambda monitor: assess(project, monitor=monitor, **options))
@@ -86,17 +83,13 @@ def _analyze(
 
 def _write(assessment: Assessment, target: Destination, files: ReportFiles) -> None:
     """The report, the numbers behind it, the summary in the terminal."""
-    from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.results import document_of  # noqa: PLC0415
+    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
     from flipflow.report.terminal import summary  # noqa: PLC0415
 
     document = document_of(assessment)
     files.write(assessment, target, document)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        summary(assessment, console())
-    target.tell()
+    target.finish(lambda out: summary(assessment, out))
 
 
 def _written(speeds: tuple[str, str] | None, harmonics: int | None) -> dict[str, object]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from flipflow.cli.destination import Destination
 from flipflow.cli.output import OUTPUT, console
+from flipflow.results.store import write_file
 
 if TYPE_CHECKING:
     from flipflow.model.project import Project
@@ -69,9 +70,7 @@ def _folders(projects: Sequence[Project]) -> Iterator[str]:
 
 def _write(found: Comparison, table: Table, target: Destination) -> None:
     """The table as a page in the folder, and all machines as one JSON document."""
-    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
     from flipflow.report.html import page  # noqa: PLC0415
-    from flipflow.results.store import write_file  # noqa: PLC0415
 
     if target.folder is not None:
         words = page(
@@ -80,5 +79,4 @@ def _write(found: Comparison, table: Table, target: Destination) -> None:
         )  # fmt: skip
         write_file(target.path(SUMMARY), words, OUTPUT)
         target.wrote(SUMMARY)
-    if target.json is not None:
-        target.document(document_of(found))
+    target.result(found)

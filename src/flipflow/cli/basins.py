@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -18,8 +19,9 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
-from flipflow.cli.progress import progress, stoppable
+from flipflow.cli.output import printable
+from flipflow.cli.progress import compile_first, progress, stoppable
+from flipflow.errors import IncompleteError
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
@@ -43,8 +45,7 @@ def basins(
     force: Force = False,
 ) -> None:
     """Show on which motion a machine settles, and what throws it."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
 
     project = in_case(load_project(file, force=force), case, speed)
     omega = speed_of(project, speed)
@@ -53,14 +54,12 @@ def basins(
 
         from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
-        document = {**_document(found, risk), "name": title_of(project, case)}
+        title = title_of(project, case)
+        document = {**_document(found, risk), "name": title}
         target.picture("basins.html", figure(found), marked(project, case))
         target.data("basins.json", document)
         target.document(document)
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), found, risk, reason, console())
-        target.tell()
+        target.finish(lambda out: _show(title, found, risk, reason, out))
         if not found.complete:
             raise target.stopped(kept=True)
 
@@ -69,13 +68,11 @@ def _computed(
     screen: FlipFlowScreen, omega: float, cells: int
 ) -> tuple[Basins, JumpRisk | None, str]:
     """Basins, then the jump risk, or why there is none: basins that are found are not lost."""
-    from flipflow.errors import IncompleteError  # noqa: PLC0415
     from flipflow.studies.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
     from flipflow.studies.jump_risk import jump_risk  # noqa: PLC0415
 
     with progress("starting") as monitor:
-        compile_ahead(lambda seconds: monitor(f"compiling, once per version: {seconds:.0f} s", 0.0))
+        compile_first(monitor)
         x, v = _window(screen, omega, cells)
         with stoppable(monitor, "cells") as told:
             found = basins_of(screen, omega, {"relative": x}, {"relative": v}, monitor=told)
@@ -91,7 +88,6 @@ def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]
     """Relative states up to twice the largest motion's displacement and velocity."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.errors import IncompleteError  # noqa: PLC0415
     from flipflow.studies.periodic_orbits import (  # noqa: PLC0415
         MOST_PERIODS,
         periodic_orbits,

@@ -7,8 +7,9 @@ from contextlib import nullcontext
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import WARMING, File, Force, Json
-from flipflow.cli.output import console, print_list, printable
+from flipflow.cli.output import print_list, printable
 from flipflow.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 
 def check(file: File, json: Json = None, force: Force = False) -> None:
     """Check a machine file: what it says, assumes and leaves open."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.check import check_project  # noqa: PLC0415
+    from flipflow.io.check import check_project  # noqa: PLC0415  keeps --help quick
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.model.screen import of_air  # noqa: PLC0415
 
@@ -29,14 +29,8 @@ def check(file: File, json: Json = None, force: Force = False) -> None:
     with Destination(None, json, [file]) as target:
         with progress(WARMING) if any(map(of_air, project.load_cases)) else nullcontext():
             result = check_project(project)
-        if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-            target.document(document_of(result))
-        target.keep()
-        if target.spoken:
-            _show(result, console())
-        target.tell()
+        target.result(result)
+        target.finish(lambda out: _show(result, out))
 
 
 def _show(result: Check, out: Console) -> None:

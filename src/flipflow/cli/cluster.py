@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from flipflow.errors import InputError, required
+
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
@@ -25,15 +27,13 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
     MissingExtra
         When dask.distributed is not installed.
     """
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     if workers is None and scheduler is None:
         yield None
         return
     if workers is not None and scheduler is not None:
         remedy = f"{SCHEDULER} has workers of its own, leave one of the two out"
         raise InputError(WORKERS, workers, remedy)
-    distributed = _distributed()
+    distributed = required("distributed", "Worker processes need dask.distributed", "study")
     if scheduler is not None:
         with _client(distributed, scheduler) as client:
             yield client.get_executor()
@@ -47,22 +47,9 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
 
 
 def _client(distributed: Any, scheduler: str) -> Any:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     try:
         return distributed.Client(scheduler, timeout=PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         remedy = f"no scheduler answers there ({reason}), give the address that dask shows"
         raise InputError(SCHEDULER, scheduler, remedy) from None
-
-
-def _distributed() -> Any:
-    from flipflow.errors import MissingExtra  # noqa: PLC0415  keeps --help quick
-
-    try:
-        import distributed  # noqa: PLC0415  an extra
-    except ImportError as error:
-        told = "Worker processes need dask.distributed: pip install 'flipflow[study]'."
-        raise MissingExtra(told) from error
-    return distributed

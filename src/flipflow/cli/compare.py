@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import Files, Force, Json, Output, Speed, speed_of
+from flipflow.cli.output import OUTPUT, console
+from flipflow.cli.progress import with_progress
+from flipflow.errors import InputError
+from flipflow.results.store import write_file
 
 if TYPE_CHECKING:
-    from flipflow.cli.destination import Destination
     from flipflow.model.project import Project
     from flipflow.studies.compare import Comparison
 
@@ -25,11 +31,7 @@ def compare(
 
     Each is looked at at its own working speed, or all at --speed; B, C, ... against A.
     """
-    from dataclasses import replace  # noqa: PLC0415  keeps --help quick
-
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
-    from flipflow.errors import InputError  # noqa: PLC0415
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
 
     if len(files) < 2:
         raise InputError("FILE...", files[0], "name at least two machine files to compare")
@@ -45,20 +47,17 @@ def compare(
 
 
 def _compared(projects: list[Project]) -> Comparison:
-    from flipflow.cli.progress import with_progress  # noqa: PLC0415  keeps --help quick
-    from flipflow.studies.compare import compare as comparison  # noqa: PLC0415
+    from flipflow.studies.compare import compare as comparison  # noqa: PLC0415  keeps --help quick
 
     return with_progress(lambda monitor: comparison(projects, monitor=monitor))
 
 
 def _write(found: Comparison, target: Destination) -> None:
     """The page, the curves and the numbers; the main changes in the terminal."""
-    from flipflow.cli.output import OUTPUT, console  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.results import document_of  # noqa: PLC0415
+    from flipflow.io.results import document_of  # noqa: PLC0415  keeps --help quick
     from flipflow.plotting.compare import comparison_figure  # noqa: PLC0415
     from flipflow.report import summary  # noqa: PLC0415
     from flipflow.report.html import comparison_html  # noqa: PLC0415
-    from flipflow.results.store import write_file  # noqa: PLC0415
 
     if target.folder is not None or target.json is not None:
         document = document_of(found)
@@ -75,8 +74,6 @@ def _write(found: Comparison, target: Destination) -> None:
 
 def subject_of(found: Comparison) -> str:
     """What a figure of a comparison carries: machines, revisions, date."""
-    from datetime import UTC, datetime  # noqa: PLC0415  keeps --help quick
-
     parts = []
     for name, one in zip(found.names, found.assessments, strict=True):
         revision = one.project.document.revision

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers, whole
+from flipflow.cli.output import IMPOSSIBLE
+from flipflow.cli.progress import compile_first, progress, stoppable
 
 if TYPE_CHECKING:
-    from flipflow.cli.destination import Destination
     from flipflow.model.duty import Duty
     from flipflow.studies.design import Proposal
 
@@ -49,10 +51,8 @@ def design(
     Stopped, it keeps the best so far; with --store the same command goes on. Ends with code 6 where
     the duty cannot be done; the nearest machine is then shown.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.output import IMPOSSIBLE  # noqa: PLC0415
     from flipflow.cli.report_files import PROPOSAL, duty_key, replaced_files  # noqa: PLC0415
-    from flipflow.io.duty import load_duty  # noqa: PLC0415
+    from flipflow.io.duty import load_duty  # noqa: PLC0415  keeps --help quick
     from flipflow.report.html import require_templates  # noqa: PLC0415
 
     duty = load_duty(file, force=force)
@@ -81,8 +81,6 @@ def _searched(
 ) -> Proposal:  # fmt: skip
     """The machine for a duty, with a bar; Ctrl-C keeps the best so far."""
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.progress import progress, stoppable  # noqa: PLC0415
-    from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
     from flipflow.studies.design import design as analysis  # noqa: PLC0415
 
     with (
@@ -90,13 +88,12 @@ def _searched(
         executor_of(workers, scheduler) as executor,
         stoppable(tell, STAGE) as told,
     ):
-        compile_ahead(lambda s: tell(f"compiling, once per version: {s:.0f} s", 0.0))
+        compile_first(tell)
         return analysis(duty, generations=generations, store=store, executor=executor, monitor=told)
 
 
 def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     """Report, machine file, numbers; the summary in the terminal."""
-    from flipflow.cli.output import console  # noqa: PLC0415  keeps --help quick
     from flipflow.cli.report_files import KEY, PDF, PROPOSAL, REPORT, duty_key  # noqa: PLC0415
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.plotting.dispatch import figure  # noqa: PLC0415
@@ -119,7 +116,4 @@ def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     target.data(PROPOSAL, {"schema": document["schema"], KEY: key, **document})
     target.picture(FIGURE, figure(found), found.duty.name)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        summary(found, console())
-    target.tell()
+    target.finish(lambda out: summary(found, out))

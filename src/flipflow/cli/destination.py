@@ -24,7 +24,9 @@ from flipflow.results.store import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
+
+    from rich.console import Console
 
     from flipflow.plotting.figure import Figure
 
@@ -129,6 +131,13 @@ class Destination:
             self._stage.hold(self.json, text, JSON)
             self._places.append(self.json)
 
+    def result(self, found: object, **more: object) -> None:
+        """Write a result, and what else is said of it, where ``--json`` asks for it."""
+        if self.json is not None:
+            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+
+            self.document({**document_of(found), **more})
+
     def path(self, name: str) -> Path:
         """Where to write a file of the folder; a file that is read is refused."""
         place = Path(self.folder or "") / name
@@ -171,6 +180,13 @@ class Destination:
         for line in self._lines() if self.spoken else ():
             # A path stays on one line, so that it can be copied.
             console().print(line, soft_wrap=True)
+
+    def finish(self, show: Callable[[Console], None]) -> None:
+        """Keep what is written, show the result where the terminal is for words, tell the rest."""
+        self.keep()
+        if self.spoken:
+            show(console())
+        self.tell()
 
     def stopped(self, *, kept: bool = False) -> Cancelled:
         """The error that ends a command after Ctrl-C; ``kept``: what was finished is shown."""

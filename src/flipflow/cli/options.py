@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.progress import progress
+from flipflow.errors import InputError
 from flipflow.model import constants
+from flipflow.model.load_case import case_words
+from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from flipflow.model.project import Project
@@ -77,8 +82,6 @@ def _read_whole(least: int, most: int) -> Callable[[typer.CallbackParam, Any], A
         except ValueError:
             number = least - 1
         if not least <= number <= most:
-            from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
             remedy = f"give a whole number from {least} to {most}"
             raise InputError(param.opts[0], written, remedy)
         return number
@@ -89,8 +92,6 @@ def _read_whole(least: int, most: int) -> Callable[[typer.CallbackParam, Any], A
 @contextmanager
 def as_written(option: str, written: str) -> Iterator[None]:
     """Let errors of what is made from an option name the option and what was written."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     try:
         yield
     except InputError as error:
@@ -106,8 +107,6 @@ def in_case(
     speed asked for, else at that of the machine file; stderr tells how warm. That takes seconds:
     other options are read before. Without a speed, what is said is the ``remedy``.
     """
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     if name is None:
         return project
     for load in project.load_cases:
@@ -120,10 +119,7 @@ def in_case(
 
 def _at_work(project: Project, load: Load, speed: str | None, remedy: str) -> Load:
     """A load case with the temperature of the rubber."""
-    from flipflow.cli.progress import progress  # noqa: PLC0415  keeps --help quick
-    from flipflow.model.load_case import case_words  # noqa: PLC0415
-    from flipflow.model.numerals import rpm  # noqa: PLC0415
-    from flipflow.model.screen import of_air  # noqa: PLC0415
+    from flipflow.model.screen import of_air  # noqa: PLC0415  keeps --help quick
 
     if not of_air(load):
         return load
@@ -142,18 +138,12 @@ def _at_work(project: Project, load: Load, speed: str | None, remedy: str) -> Lo
 
 def title_of(project: Project, case: str | None) -> str:
     """Name of the machine, and of the load case where one was asked for."""
-    from flipflow.model.load_case import case_words  # noqa: PLC0415  keeps --help quick
-
     name = project.document.name or project.name
     return name if case is None else f"{name}, {case_words(case)}"
 
 
 def marked(project: Project, case: str | None) -> str:
     """What a figure carries: machine, load case, revision, date."""
-    from datetime import UTC, datetime  # noqa: PLC0415  keeps --help quick
-
-    from flipflow.model.load_case import case_words  # noqa: PLC0415
-
     revision = project.document.revision
     parts = [
         project.document.name or project.name,
@@ -166,8 +156,7 @@ def marked(project: Project, case: str | None) -> str:
 
 def speed_of(project: Project, written: str | None, remedy: str = OR_SPEED) -> float:
     """Speed in rad/s as asked for, else the working speed of the machine file."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.layout import SPEED  # noqa: PLC0415
+    from flipflow.io.layout import SPEED  # noqa: PLC0415  keeps --help quick
     from flipflow.io.values import read_number  # noqa: PLC0415
 
     if written is not None:
@@ -195,8 +184,6 @@ def speeds_of(written: tuple[str, str]) -> tuple[float, float]:
 
 
 def _check_speed(option: str, written: str, omega: float) -> None:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     if not SLOWEST <= round(omega * RPM, 6) <= FASTEST:
         remedy = f"give a speed from {SLOWEST:.0f} rpm to {FASTEST:.0f} rpm"
         raise InputError(option, written, remedy)

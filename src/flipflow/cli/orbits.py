@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -17,7 +18,7 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
 from flipflow.model.numerals import rpm
 
@@ -44,7 +45,6 @@ def orbits(
 
     A motion is one that repeats itself after one or more turns of the shaft.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.studies.periodic_orbits import periodic_orbits  # noqa: PLC0415  quick --help
 
@@ -58,14 +58,9 @@ def orbits(
 
             for k, orbit in enumerate(found, 1):
                 target.picture(f"motion-{k}.html", orbit_figure(orbit), marked(project, case))
-        if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-            target.document(document_of(found) | {"name": title_of(project, case)})
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), omega, found, console())
-        target.tell()
+        title = title_of(project, case)
+        target.result(found, name=title)
+        target.finish(lambda out: _show(title, omega, found, out))
 
 
 def _show(title: str, omega: float, found: tuple[Orbit, ...], out: Console) -> None:

@@ -39,11 +39,16 @@ def progress(begin: str) -> Iterator[Monitor]:
 
 def with_progress(run: Callable[[Monitor], Result]) -> Result:
     """Run with a bar, the kernels compiled ahead."""
+    with progress("starting") as tell:
+        compile_first(tell)
+        return run(tell)
+
+
+def compile_first(tell: Monitor) -> None:
+    """Compile the kernels of an analysis, once per version, and tell how long it has taken."""
     from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415  keeps --help quick
 
-    with progress("starting") as tell:
-        compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
-        return run(tell)
+    compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
 
 
 @contextmanager

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import Json, Output
 from flipflow.cli.output import console
+from flipflow.cli.progress import with_progress
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -35,8 +37,7 @@ def reproduce(
     ] = "ffs0827",
 ) -> None:
     """Reproduce the paper: its figures, a verdict on each claim."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load  # noqa: PLC0415
+    from flipflow.io.project import load  # noqa: PLC0415  keeps --help quick
     from flipflow.paper.registry import chosen  # noqa: PLC0415
 
     names = tuple(figures or ())
@@ -44,7 +45,6 @@ def reproduce(
     screen = load(machine)
     folder = output or FOLDER
     with Destination(folder, json, [machine]) as target:
-        from flipflow.cli.progress import with_progress  # noqa: PLC0415
         from flipflow.paper.page import ENDINGS, PAGE, write_page  # noqa: PLC0415
         from flipflow.report.html import require_templates  # noqa: PLC0415
 
@@ -59,10 +59,7 @@ def reproduce(
         if len(found.figures) == len(wanted):
             # A figure that this machine does not have would be left over from another one.
             target.replaces([name for name in files if not (folder / name).exists()])
-        if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
-            target.document(document_of(found))
+        target.result(found)
         target.keep()
         if target.spoken:
             _show(found, console())

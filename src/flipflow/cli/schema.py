@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
+
 
 def schema(
     json: Annotated[
@@ -13,8 +15,7 @@ def schema(
     ] = "-",
 ) -> None:
     """Print the JSON schema of the machine file, for editors."""
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.schema import machine_schema  # noqa: PLC0415
+    from flipflow.io.schema import machine_schema  # noqa: PLC0415  keeps --help quick
 
     with Destination(None, json) as target:
         target.document(machine_schema())

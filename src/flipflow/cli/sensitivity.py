@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -21,11 +22,13 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
+from flipflow.errors import InputError
 
 if TYPE_CHECKING:
-    from flipflow.cli.destination import Destination
+    from rich.console import Console
+
     from flipflow.model.project import Project
     from flipflow.studies.sensitivity import Sensitivity
 
@@ -68,8 +71,7 @@ def sensitivity(
 
     By Sobol indices: the share of the variance that each field explains.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
     from flipflow.io.vary import read_vary  # noqa: PLC0415
     from flipflow.model.screen import as_cool_as_air, of_air  # noqa: PLC0415
 
@@ -104,7 +106,6 @@ def _omega(
     """
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
-    from flipflow.errors import InputError  # noqa: PLC0415
     from flipflow.model.quantities import quantity_named  # noqa: PLC0415
 
     whole = quantity_named(quantity, project.screen).of == "response"
@@ -133,14 +134,15 @@ def _write(result: Sensitivity, target: Destination, title: str, subject: str) -
         target.data("results.json", document)
         _write_figures(result, target, subject)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        from flipflow.report import summary  # noqa: PLC0415
+
+    def show(out: Console) -> None:
+        from flipflow.report import summary  # noqa: PLC0415  keeps --help quick
         from flipflow.report.terminal import say  # noqa: PLC0415
 
-        say(console(), printable(title), "bold")
-        summary(result, console())
-    target.tell()
+        say(out, printable(title), "bold")
+        summary(result, out)
+
+    target.finish(show)
 
 
 def _write_figures(result: Sensitivity, target: Destination, subject: str) -> None:

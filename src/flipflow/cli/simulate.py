@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     Case,
     File,
@@ -20,8 +21,9 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress
+from flipflow.errors import InputError
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
@@ -56,7 +58,6 @@ def simulate(
 
     Shows the motion, the stop force, the energies, and whether the machine has settled.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.io.project import load_project  # noqa: PLC0415
     from flipflow.report.terminal import say  # noqa: PLC0415
     from flipflow.transient.history import thinned  # noqa: PLC0415
@@ -69,27 +70,25 @@ def simulate(
     with Destination(output, json, [file]) as target:
         with progress("simulating; the first run of a version compiles") as tell:
             history = run(project.screen, omega, periods, disturbances=blows, monitor=tell)
-        kept = history
+        title, kept = title_of(project, case), history
         if output is not None:
             from flipflow.plotting.history import history_figure  # noqa: PLC0415  loads plotly
 
             target.picture("motion.html", history_figure(history), marked(project, case))
         if json is not None:
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
-
             kept = thinned(history, MOST_ROWS)
-            target.document(document_of(kept) | {"name": title_of(project, case)})
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), history, blows, console())
+            target.result(kept, name=title)
+
+        def show(out: Console) -> None:
+            _show(title, history, blows, out)
             if kept is not history:
-                say(console(), f"The document is thinned. {kept.notes[-1]}")
-        target.tell()
+                say(out, f"The document is thinned. {kept.notes[-1]}")
+
+        target.finish(show)
 
 
 def _blows(written: Sequence[str], end: float) -> tuple[Impulse, ...]:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.blows import parse_blow  # noqa: PLC0415
+    from flipflow.io.blows import parse_blow  # noqa: PLC0415  keeps --help quick
 
     blows = tuple(parse_blow(one, IMPULSE) for one in written)
     for one, blow in zip(written, blows, strict=True):

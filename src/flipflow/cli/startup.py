@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     IN_FILE,
     RPM,
@@ -21,14 +22,14 @@ from flipflow.cli.options import (
     speed_of,
     title_of,
 )
-from flipflow.cli.output import DOES_NOT_START, console, print_list, printable
+from flipflow.cli.output import DOES_NOT_START, print_list, printable
 from flipflow.cli.progress import progress
+from flipflow.errors import InputError
 from flipflow.model.numerals import digits
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from flipflow.cli.destination import Destination
     from flipflow.model.drive import Drive, SpeedProfile
     from flipflow.model.monitor import Monitor
     from flipflow.model.project import Project
@@ -77,8 +78,7 @@ def startup(
     start is the worst one from hanging and from every angle at which friction holds the shaft. Ends
     with code 5 where it fails on a drive of which nothing is assumed.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
 
     project = load_project(file, force=force)
     if profile is not None:
@@ -91,18 +91,15 @@ def startup(
     project = in_case(project, case, remedy=IN_FILE)
     with Destination(output, json, [file]) as target:
         start, coast = _calculated(project, drive, seconds)
+        title = title_of(project, case)
         runs = {"start": start} | ({} if coast is None else {"coast_down": coast})
         if output is not None:
             _figures(runs, target, marked(project, case))
         if json is not None:
             from flipflow.io.command_results import Startup  # noqa: PLC0415
-            from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
 
-            target.document(document_of(Startup(title_of(project, case), start, coast)))
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), start, coast, console())
-        target.tell()
+            target.result(Startup(title, start, coast))
+        target.finish(lambda out: _show(title, start, coast, out))
     if _fails_as_given(start):
         raise typer.Exit(DOES_NOT_START)
 
@@ -117,8 +114,6 @@ def _fails_as_given(start: RunUp) -> bool:
 
 
 def _refuse_beside_profile(given: dict[str, str | None]) -> None:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     for option, written in given.items():
         if written is not None:
             remedy = "--profile lays the speed down, leave one of them out"
@@ -126,8 +121,7 @@ def _refuse_beside_profile(given: dict[str, str | None]) -> None:
 
 
 def _seconds(written: str) -> float:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.units import parse_quantity  # noqa: PLC0415
+    from flipflow.io.units import parse_quantity  # noqa: PLC0415  keeps --help quick
 
     seconds = parse_quantity(written, "s", field="--duration", example="120 s")
     if not 0.0 < seconds <= LONGEST:
@@ -139,8 +133,7 @@ def _drive(
     project: Project, power: str | None, inertia: str | None, profile: str | None
 ) -> Drive | SpeedProfile | None:
     """The drive the options ask for: a profile, the file's with changes, or one to be assumed."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.drive import parse_profile  # noqa: PLC0415
+    from flipflow.io.drive import parse_profile  # noqa: PLC0415  keeps --help quick
     from flipflow.io.values import read_number  # noqa: PLC0415
     from flipflow.model.drive import DRIVE_FIELDS, assumed_drive  # noqa: PLC0415
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flipflow.cli.output import console, print_list, printable
+from flipflow.errors import InputError, StoreError
+from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from flipflow.batch.chunk_store import ChunkState, ChunkStore
@@ -25,7 +27,6 @@ def info(
     Ends with exit code 4 where something is damaged.
     """
     from flipflow.batch.chunk_store import DAMAGED, META, ChunkStore  # noqa: PLC0415  quick --help
-    from flipflow.errors import InputError, StoreError  # noqa: PLC0415
     from flipflow.report.terminal import show  # noqa: PLC0415
 
     if not store.is_dir():
@@ -46,7 +47,6 @@ def info(
 
 def _contents(kept: ChunkStore, states: list[ChunkState]) -> Block:
     from flipflow.batch.chunk_store import FINISHED, MISSING  # noqa: PLC0415  keeps --help quick
-    from flipflow.model.numerals import rpm  # noqa: PLC0415
     from flipflow.report.blocks import Values  # noqa: PLC0415
     from flipflow.studies.study_plan import plan_from  # noqa: PLC0415
 

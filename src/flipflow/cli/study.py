@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flipflow.cli.destination import NOTHING, STOPPED, Destination
 from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers
-from flipflow.cli.output import console, printable
-from flipflow.cli.progress import progress
+from flipflow.cli.output import printable
+from flipflow.cli.progress import compile_first, progress
+from flipflow.errors import Cancelled, InputError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from flipflow.cli.destination import Destination
+    from rich.console import Console
+
     from flipflow.io.study_file import StudyFile
     from flipflow.model.limits import Limits
     from flipflow.model.monitor import Monitor
@@ -52,7 +55,6 @@ def study(
     Stopped, it keeps the finished chunks, and --resume goes on.
     """
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
-    from flipflow.cli.destination import Destination  # noqa: PLC0415
     from flipflow.report.html import require_templates  # noqa: PLC0415
 
     asked = _asked(file, store, resume, force=force)
@@ -93,11 +95,10 @@ class _Asked:
 
     def run(self, executor: Executor | None, tell: Monitor) -> Study:
         """Run, or go on."""
-        from flipflow.studies.compile_ahead import compile_ahead  # noqa: PLC0415
         from flipflow.studies.study import go_on  # noqa: PLC0415  keeps --help quick
         from flipflow.studies.study import study as analysis  # noqa: PLC0415
 
-        compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
+        compile_first(tell)
         if self.file is None:
             return go_on(self.store, executor=executor, monitor=tell)
         one = self.file
@@ -109,8 +110,6 @@ class _Asked:
 
     def judged(self, found: Study) -> Tolerance | None:
         """The share that meets the limits of the machine file, where it can be told."""
-        from dataclasses import replace  # noqa: PLC0415  keeps --help quick
-
         from flipflow.studies.tolerance import limits_known, tolerance  # noqa: PLC0415
 
         if self.file is None or found.sampling == "grid":
@@ -126,8 +125,7 @@ class _Asked:
 
 
 def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: bool) -> _Asked:
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.study_file import read_study_file  # noqa: PLC0415
+    from flipflow.io.study_file import read_study_file  # noqa: PLC0415  keeps --help quick
 
     if store is not None and resume is not None:
         raise InputError(STORE, str(store), f"{RESUME} names the folder, leave one of the two out")
@@ -156,8 +154,6 @@ def _stopped(file: str | None, store: Path) -> Exception:
     import shlex  # noqa: PLC0415  keeps --help quick
 
     from flipflow.batch.chunk_store import FINISHED, ChunkStore  # noqa: PLC0415  quick --help
-    from flipflow.cli.destination import NOTHING, STOPPED  # noqa: PLC0415
-    from flipflow.errors import Cancelled  # noqa: PLC0415
 
     if not store.exists():
         return Cancelled(f"{STOPPED}; {NOTHING}.")
@@ -175,10 +171,8 @@ def _write(found: Study, judged: Tolerance | None, asked: _Asked, target: Destin
     from flipflow.io.arrays import arrays_of  # noqa: PLC0415  loads every analysis
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.io.tables import csv_text  # noqa: PLC0415
-    from flipflow.report import summary  # noqa: PLC0415
     from flipflow.report.html import study_html  # noqa: PLC0415
-    from flipflow.report.study import spread_table, study_blocks  # noqa: PLC0415
-    from flipflow.report.terminal import say, show  # noqa: PLC0415
+    from flipflow.report.study import study_blocks  # noqa: PLC0415
 
     blocks = study_blocks(found, judged, asked.limits)
     target.content(REPORT, study_html(found, blocks, asked.title, asked.name))
@@ -188,24 +182,29 @@ def _write(found: Study, judged: Tolerance | None, asked: _Asked, target: Destin
     target.data(DATA, document)
     _write_figures(found, judged, asked, target)
     target.document(document)
-    target.keep()
-    if target.spoken:
-        say(console(), printable(asked.title), "bold")
-        for result in (found, judged):
-            if result is not None:
-                summary(result, console())
-        if judged is None:
-            table = spread_table(found)
-            console().print()
-            say(console(), f"{table.title}:")
-            show(table, console())
-            if table.caption:
-                say(console(), table.caption)
-        if asked.file is None:
-            told = f"limits and title are in the study file, flipflow study FILE {RESUME}"
-            say(console(), f"Note: no limit is judged; {told} {asked.store} reads them.", "yellow")
-        console().print(f"Store: {asked.store}", soft_wrap=True)
-    target.tell()
+    target.finish(lambda out: _show(found, judged, asked, out))
+
+
+def _show(found: Study, judged: Tolerance | None, asked: _Asked, out: Console) -> None:
+    from flipflow.report import summary  # noqa: PLC0415  keeps --help quick
+    from flipflow.report.study import spread_table  # noqa: PLC0415
+    from flipflow.report.terminal import say, show  # noqa: PLC0415
+
+    say(out, printable(asked.title), "bold")
+    for result in (found, judged):
+        if result is not None:
+            summary(result, out)
+    if judged is None:
+        table = spread_table(found)
+        out.print()
+        say(out, f"{table.title}:")
+        show(table, out)
+        if table.caption:
+            say(out, table.caption)
+    if asked.file is None:
+        told = f"limits and title are in the study file, flipflow study FILE {RESUME}"
+        say(out, f"Note: no limit is judged; {told} {asked.store} reads them.", "yellow")
+    out.print(f"Store: {asked.store}", soft_wrap=True)
 
 
 def _write_figures(

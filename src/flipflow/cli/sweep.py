@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     IN_FILE,
     RPM,
@@ -22,13 +23,15 @@ from flipflow.cli.options import (
     title_of,
     whole,
 )
-from flipflow.cli.output import console, printable
+from flipflow.cli.output import printable
 from flipflow.cli.progress import progress, stoppable
+from flipflow.errors import InputError
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from flipflow.io.command_results import Sweeps
     from flipflow.model.project import Project
     from flipflow.plotting.figure import Figure
     from flipflow.studies.ramp import Ramp
@@ -84,31 +87,26 @@ def sweep(
 
     At each speed the machine settles from where the one before ended.
     """
-    from flipflow.cli.destination import Destination  # noqa: PLC0415  keeps --help quick
-    from flipflow.io.project import load_project  # noqa: PLC0415
+    from flipflow.io.project import load_project  # noqa: PLC0415  keeps --help quick
 
     ends = speeds_of(speeds)
     gliding = None if rate is None else _rate(rate, ends)
     project = in_case(load_project(file, force=force), case, remedy=IN_FILE)
     with Destination(output, json, [file]) as target:
         found = _passed(project, ends, steps, gliding)
+        title = title_of(project, case)
         if json is not None:
-            target.document(_document(title_of(project, case), found))
+            target.result(_sweeps(title, found))
         if output is not None:
             figure = _figure(project, found.sweeps, ends)
             target.picture("sweep.html", figure, marked(project, case))
-        target.keep()
-        if target.spoken:
-            _show(title_of(project, case), found, steps, console())
-        target.tell()
+        target.finish(lambda out: _show(title, found, steps, out))
         if not found.complete:
             raise target.stopped(kept=True)
 
 
 def _rate(written: str, ends: tuple[float, float]) -> float:
     """Rate in rad/s^2, such that a glide takes no longer than can be carried."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     least = (ends[1] - ends[0]) * RPM / LONGEST_GLIDE
     try:
         rate = float(written)
@@ -122,8 +120,6 @@ def _rate(written: str, ends: tuple[float, float]) -> float:
 
 def _passed(project: Project, ends: tuple[float, float], steps: int, rate: float | None) -> Passed:
     """Sweep up and down, then glide; Ctrl-C ends it and keeps what is finished."""
-    from flipflow.errors import InputError  # noqa: PLC0415  keeps --help quick
-
     up, down = _swept(project, ends, steps)
     if down is None or not down.complete:
         return Passed(up, down)
@@ -165,16 +161,15 @@ def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[R
     return up, down
 
 
-def _document(title: str, found: Passed) -> dict[str, Any]:
-    from flipflow.io.command_results import Glide, Sweeps  # noqa: PLC0415
-    from flipflow.io.results import document_of  # noqa: PLC0415  loads every analysis
+def _sweeps(title: str, found: Passed) -> Sweeps:
+    from flipflow.io.command_results import Glide, Sweeps  # noqa: PLC0415  quick --help
 
     late = tuple(jump for glide in found.glides for jump in glide.jumps)
     glides = tuple(
         Glide(glide.rate, float(glide.history.omega[-1]), found.whole(glide))
         for glide in found.glides
     )
-    return document_of(Sweeps(title, found.up, found.down, late, glides, found.complete))
+    return Sweeps(title, found.up, found.down, late, glides, found.complete)
 
 
 def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
 from flipflow.continuation.refinement import SHARE_TOLERANCE
 from flipflow.continuation.special_points import FOLD
@@ -35,7 +36,6 @@ from flipflow.periodic.stability import STABLE, stability_words
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result, above
 
-Real = NDArray[np.float64]
 Node = tuple[float, float]  # position along the branch, and omega there
 
 

@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.orbit_row import OrbitRow
@@ -16,8 +16,6 @@ from flipflow.model.arguments import checked_text
 from flipflow.model.screen import unit_in
 from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

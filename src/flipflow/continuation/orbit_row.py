@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.model.arguments import checked_index
 from flipflow.model.system import Coordinate
@@ -14,8 +15,6 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
-
-Real = NDArray[np.float64]
 
 
 class OrbitRow(Frozen, Result):

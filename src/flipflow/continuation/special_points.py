@@ -14,7 +14,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,18 +50,6 @@ FOLD, BRANCH_POINT = "fold", "branch point"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
 SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Neimark-Sacker"
 STABILITY_CHANGES = (FOLD, BRANCH_POINT, SYMMETRY, DOUBLING, NEIMARK_SACKER)
-
-
-class Follower(Protocol):
-    """Whatever can solve for a point between two of the branch it has followed."""
-
-    def between(self, traced: Any, p: int, share: float) -> Point:
-        """The branch's point at ``share`` of the way from point p to point p + 1."""
-        ...
-
-    def return_map(self, point: Point) -> Real:
-        """The return map of such a point."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +97,7 @@ def find_special_points(
     return found, notes
 
 
-def zeros_of(tests: list[Test], solver: Follower, traced: Any) -> tuple[list[Found], list[str]]:
+def zeros_of(tests: list[Test], solver: Solver, traced: Traced) -> tuple[list[Found], list[str]]:
     """Zeros of test functions in branch order, and a sentence for each that was not refined."""
     found: list[Found] = []
     notes: list[str] = []
@@ -234,7 +221,7 @@ def _contact_tests(solver: Solver, traced: Traced) -> list[Test]:
 
 
 def _brackets(
-    solver: Follower, traced: Any, test: Test, notes: list[str]
+    solver: Solver, traced: Traced, test: Test, notes: list[str]
 ) -> list[tuple[int, float, float]]:
     """Steps (p, low share, high share) within which the test changes sign."""
     values = test.values
@@ -340,7 +327,7 @@ def _dips(values: Real) -> list[int]:
     return [int(p) + 1 for p in np.flatnonzero(least & deep)]
 
 
-def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool) -> float | None:
+def _bottom(solver: Solver, traced: Traced, test: Test, p: int, *, plunges: bool) -> float | None:
     """Share in step p where the test has the other sign, None when it never has.
 
     With ``plunges`` three points within the step are tried first: where none is lower than both
@@ -365,7 +352,7 @@ def _bottom(solver: Follower, traced: Any, test: Test, p: int, *, plunges: bool)
     return float(best.x) if best.fun < 0.0 else None
 
 
-def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high: float) -> Found:
+def _refine(solver: Solver, traced: Traced, test: Test, p: int, low: float, high: float) -> Found:
     """Root of the test on corrected points between two shares of step p."""
     if test.zero is not None:
         share, point = _known_zero(solver, traced, test.kind, partial(test.zero, p, low, high), p)
@@ -379,7 +366,7 @@ def _refine(solver: Follower, traced: Any, test: Test, p: int, low: float, high:
 
 
 def _known_zero(
-    solver: Follower, traced: Any, kind: str, zero: Callable[[], tuple[float, Point]], p: int
+    solver: Solver, traced: Traced, kind: str, zero: Callable[[], tuple[float, Point]], p: int
 ) -> tuple[float, Point]:
     """Root by the kernels; of a fold of several ranks, which they cannot pass, by least steps."""
     try:
@@ -391,7 +378,7 @@ def _known_zero(
 
 
 def _zero_between(
-    solver: Follower, traced: Any, test: Test, p: int, low: float, high: float
+    solver: Solver, traced: Traced, test: Test, p: int, low: float, high: float
 ) -> tuple[float, Point]:
     """Share and point of the root, by a test that only Python can evaluate."""
     last: dict[float, Point] = {}
@@ -406,7 +393,7 @@ def _zero_between(
     return share, last[share] if share in last else solver.between(traced, p, share)
 
 
-def _is_real(solver: Follower, found: Found) -> bool:
+def _is_real(solver: Solver, found: Found) -> bool:
     """False where two real eigenvalues of product 1, not a complex pair, make the test zero."""
     if found.kind != NEIMARK_SACKER:
         return True

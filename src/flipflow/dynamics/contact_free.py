@@ -10,12 +10,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.model.system import MechanicalSystem
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def contact_free(M: Real, C: Real, K: Real, force: Real | Complex, omega: Real) -> Complex:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.contact_free import complex_amplitudes, span
 from flipflow.model.arguments import checked_speeds, refuse_pair
 from flipflow.model.screen import FlipFlowScreen, unit_in
@@ -16,7 +17,6 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 
-Real = NDArray[np.float64]
 SCAN_POINTS = 4000  # frequencies up to twice the highest natural one, to find peaks between
 
 

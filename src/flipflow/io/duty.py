@@ -11,15 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flipflow.errors import InputError, MissingExtra
-from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
+from flipflow.errors import InputError, required
+from flipflow.io.layout import SPEED, refuse_unknown
 from flipflow.io.load_cases import read_load_cases
-from flipflow.io.project import load_project, read_limits, refuse_other_files
-from flipflow.io.source import read_source
+from flipflow.io.project import read_limits
 from flipflow.io.study_file import (
     chosen_cases,
     flat_keys,
-    machine_file,
+    read_with_machine,
     section_of,
     varied_field,
     whole_number,
@@ -71,14 +70,8 @@ def load_duty(path: str | os.PathLike[str], *, force: bool = False) -> Duty:
     InputError
         For a file that cannot be read, and a value in it that is wrong or missing.
     """
-    source = read_source(path)
+    source, project = read_with_machine(path, "duty", SECTIONS, force=force)
     tables = source.tables
-    refuse_other_files(tables, "duty")
-    refuse_unknown(tables, SECTIONS, place="")
-    if tables.get("format", FORMAT) != FORMAT:
-        remedy = f"this version of flipflow reads format = {FORMAT}"
-        raise InputError("format", tables["format"], remedy)
-    project = load_project(machine_file(tables, source.path), force=force)
     table = section_of(tables, "duty")
     refuse_unknown(table, DUTY, place="duty.")
     springs, pieces = _catalogue(section_of(tables, "catalogue"), source.path)
@@ -274,11 +267,7 @@ def _rows(path: Path) -> list[list[Any]]:
 
 
 def _sheet_rows(path: Path) -> list[list[Any]]:
-    try:
-        import openpyxl  # noqa: PLC0415  an extra
-    except ModuleNotFoundError:
-        words = "A catalogue as XLSX needs openpyxl: pip install 'flipflow[report]'."
-        raise MissingExtra(words) from None
+    openpyxl = required("openpyxl", "A catalogue as XLSX needs openpyxl", "report")
     book = openpyxl.load_workbook(path, read_only=True, data_only=True)
     rows = [list(row) for row in book.worksheets[0].iter_rows(values_only=True)]
     return [row for row in rows if any(cell is not None for cell in row)]

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from flipflow.errors import MissingExtra
+from flipflow.errors import required
 
 Value = float | int | str | None
 # A text that begins so is taken for a formula by programs that open a CSV file.
@@ -90,10 +90,7 @@ def require_openpyxl() -> None:
     MissingExtra
         When openpyxl is not installed.
     """
-    try:
-        import openpyxl  # noqa: F401, PLC0415  an extra
-    except ImportError as error:
-        raise MissingExtra("Tables need openpyxl: pip install 'flipflow[report]'.") from error
+    required("openpyxl", "Tables need openpyxl", "report")
 
 
 def _csv_cell(value: Value) -> Value:

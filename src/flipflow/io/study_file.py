@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
 from flipflow.io.project import load_project, refuse_other_files
-from flipflow.io.source import bundled_names, read_source
+from flipflow.io.source import Source, bundled_names, read_source
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Table, read_number
 from flipflow.io.vary import EXAMPLE, field_named, read_vary
@@ -26,7 +26,6 @@ from flipflow.model.screen import Load
 from flipflow.model.vary import LAW, Choice, Normal
 from flipflow.studies.tolerance import FOLDS
 
-Real = NDArray[np.float64]
 SECTIONS = ("format", "machine", "vary", "study")
 STUDY = (
     "quantities", "speed", "speeds", "load_cases", "sampling", "samples", "seed", "branch",
@@ -86,13 +85,7 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
     InputError
         For a file that cannot be read, and a value in it that is wrong or missing.
     """
-    source = read_source(path)
-    refuse_other_files(source.tables, "study")
-    refuse_unknown(source.tables, SECTIONS, place="")
-    if source.tables.get("format", FORMAT) != FORMAT:
-        remedy = f"this version of flipflow reads format = {FORMAT}"
-        raise InputError("format", source.tables["format"], remedy)
-    project = load_project(machine_file(source.tables, source.path), force=force)
+    source, project = read_with_machine(path, "study", SECTIONS, force=force)
     table = section_of(source.tables, "study")
     refuse_unknown(table, STUDY, place="study.")
     vary = {
@@ -115,7 +108,20 @@ def read_study_file(path: str | os.PathLike[str], *, force: bool = False) -> Stu
     )
 
 
-def machine_file(tables: Table, path: Path | None) -> str | Path:
+def read_with_machine(
+    path: str | os.PathLike[str], kind: str, sections: Iterable[str], *, force: bool
+) -> tuple[Source, Project]:
+    """Read a file of a kind, "study" or "duty", and the machine file that it names."""
+    source = read_source(path)
+    refuse_other_files(source.tables, kind)
+    refuse_unknown(source.tables, sections, place="")
+    if source.tables.get("format", FORMAT) != FORMAT:
+        remedy = f"this version of flipflow reads format = {FORMAT}"
+        raise InputError("format", source.tables["format"], remedy)
+    return source, load_project(_machine_file(source.tables, source.path), force=force)
+
+
+def _machine_file(tables: Table, path: Path | None) -> str | Path:
     """The machine's bundled name, or its file beside the study's."""
     written = tables.get("machine", LEFT_OUT)
     if not isinstance(written, str):

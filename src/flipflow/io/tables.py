@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.errors import MissingExtra
+from flipflow.errors import required
 from flipflow.io import spreadsheet
 from flipflow.io.labelled import Arrays, Variable
 from flipflow.model.constants import RPM
@@ -31,20 +31,17 @@ def dataset(arrays: Arrays) -> xr.Dataset:
     MissingExtra
         Where xarray is not installed.
     """
-    try:
-        import xarray as xr  # noqa: PLC0415  slow to import
-    except ImportError as error:
-        told = "Labelled arrays need xarray: pip install 'flipflow[data]'."
-        raise MissingExtra(told) from error
+    xarray = required("xarray", "Labelled arrays need xarray", "data")
 
     def part(one: Variable) -> tuple[Any, ...]:
         return one.dims, one.data, {"units": one.units} if one.units else {}
 
-    return xr.Dataset(
+    made: xr.Dataset = xarray.Dataset(
         {name: part(one) for name, one in arrays.variables.items()},
         {name: part(one) for name, one in arrays.coordinates.items()},
         {"title": arrays.title, **arrays.attributes},
     )
+    return made
 
 
 def dataframe(arrays: Arrays) -> pd.DataFrame:
@@ -55,12 +52,9 @@ def dataframe(arrays: Arrays) -> pd.DataFrame:
     MissingExtra
         Where pandas is not installed.
     """
-    try:
-        import pandas as pd  # noqa: PLC0415  slow to import
-    except ImportError as error:
-        raise MissingExtra("Tables need pandas: pip install 'flipflow[data]'.") from error
+    pandas = required("pandas", "Tables need pandas", "data")
     columns = dict(table_columns(arrays))
-    frame = pd.DataFrame({name: one.data for name, one in columns.items()})
+    frame: pd.DataFrame = pandas.DataFrame({name: one.data for name, one in columns.items()})
     frame.attrs = {
         "title": arrays.title,
         "units": {name: one.units for name, one in columns.items() if one.units},

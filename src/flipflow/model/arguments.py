@@ -20,11 +20,10 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.errors import InputError
 from flipflow.model.monitor import Monitor, silent
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Kind = TypeVar("Kind")
 OMEGA_LEAST, OMEGA_MOST = 1e-9, 1e6
 WITHIN = (

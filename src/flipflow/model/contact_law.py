@@ -33,8 +33,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Real = NDArray[np.float64]
-Int = NDArray[np.int64]
+from flipflow.compiled.arrays import Int, Real
+
 ContactLaw = Literal["paper", "compression-only", "undamped-rebound", "elasto-gap"]
 OPEN, WHOLE, NO_EXIT = 0, 1, -1  # piece 1 of every law carries all of k p + c p'
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_all,
@@ -31,7 +31,6 @@ from flipflow.model.project import Project
 from flipflow.model.screen import Load
 from flipflow.model.vary import LAW, Choice, Distribution, Interval, Variation, variations
 
-Real = NDArray[np.float64]
 Objective = Literal["steadiness", "acceleration", "stop force", "foundation force", "power"]
 OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 LEAST_GAP = 1e-3  # m: beneath it rubber that creeps or grows in the heat closes a gap by itself

@@ -283,6 +283,13 @@ FIELDS: tuple[Field, ...] = (
 # fmt: on
 
 FIELD: Mapping[str, Field] = {field.name: field for field in FIELDS}
+
+
+def symbol_of(name: str) -> str:
+    """Symbol of a field of a screen; the name of anything else."""
+    return FIELD[name].symbol if name in FIELD else name
+
+
 # Fields in the equations of motion along the surface.
 MOTION_FIELDS = (
     "main_mass", "floating_mass", "eccentric_moment", "isolation_stiffness", "isolation_damping",

@@ -7,7 +7,7 @@ Unit and direction of each stand in :mod:`flipflow.model.quantities`, its evalua
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import NoneType
 from typing import Literal
@@ -15,7 +15,7 @@ from typing import Literal
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind
 from flipflow.model.fields import Field
-from flipflow.model.quantities import QUANTITIES, Direction
+from flipflow.model.quantities import QUANTITIES, Direction, Limit
 
 Interval = tuple[float, float]
 
@@ -38,42 +38,29 @@ class LimitField(Field):
         return self.direction == "between"
 
 
-def _fields() -> Iterator[LimitField]:
-    """A field for each quantity that may be limited, in the order of the table."""
-    for quantity in QUANTITIES.values():
-        limit = quantity.limit
-        if limit is not None:
-            yield LimitField(
-                quantity.name, quantity.symbol, quantity.unit, quantity.shown_unit,
-                f"limits.{quantity.name}", limit.sentence, upper=limit.upper,
-                lower_open=limit.direction == "at most", plausible=limit.plausible, default=None,
-                example=limit.example, direction=limit.direction,
-            )  # fmt: skip
-
-
-LIMIT_FIELDS: tuple[LimitField, ...] = tuple(_fields())
-LIMIT_FIELD: Mapping[str, LimitField] = {field.name: field for field in LIMIT_FIELDS}
-
-
 Passage = Literal["start", "stop"]
 PASSAGES: tuple[Passage, ...] = ("start", "stop")
 
 
-def _passing_fields(passage: Passage) -> Iterator[LimitField]:
-    """The same for each quantity that may be limited while the machine starts, or stops."""
-    for quantity in QUANTITIES.values():
-        limit = quantity.passing
-        if limit is not None:
-            yield LimitField(
-                quantity.name, quantity.symbol, quantity.unit, quantity.shown_unit,
-                f"limits.{passage}.{quantity.name}", limit.sentence, lower_open=True,
-                plausible=limit.plausible, default=None, example=limit.example,
-                direction=limit.direction,
-            )  # fmt: skip
+def _fields(section: str, limits: Mapping[str, Limit | None]) -> tuple[LimitField, ...]:
+    """A field of a section for each quantity that may be limited there, in the table's order."""
+    return tuple(
+        LimitField(
+            one.name, one.symbol, one.unit, one.shown_unit, f"{section}.{one.name}",
+            limit.sentence, upper=limit.upper, lower_open=limit.direction == "at most",
+            plausible=limit.plausible, default=None, example=limit.example,
+            direction=limit.direction,
+        )
+        for one in QUANTITIES.values()
+        if (limit := limits[one.name]) is not None
+    )  # fmt: skip
 
 
+LIMIT_FIELDS = _fields("limits", {one.name: one.limit for one in QUANTITIES.values()})
+LIMIT_FIELD: Mapping[str, LimitField] = {field.name: field for field in LIMIT_FIELDS}
 PASSING_FIELDS: Mapping[Passage, tuple[LimitField, ...]] = {
-    passage: tuple(_passing_fields(passage)) for passage in PASSAGES
+    passage: _fields(f"limits.{passage}", {one.name: one.passing for one in QUANTITIES.values()})
+    for passage in PASSAGES
 }
 
 

@@ -7,6 +7,11 @@ import math
 from flipflow.model.constants import RPM
 
 
+def capitalized(words: str) -> str:
+    """Words as a sentence begins: the first letter large, all others as they are."""
+    return words[:1].upper() + words[1:]
+
+
 def digits(value: float, count: int = 3) -> str:
     """``count`` significant digits without zeros at the end; large numbers are whole.
 

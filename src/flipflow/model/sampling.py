@@ -14,12 +14,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_numbers, checked_word
 from flipflow.model.system import Machine
 from flipflow.model.vary import Choice, Normal, Variation, Vary, variations
 
-Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
 Drawn = Literal["sobol", "latin-hypercube", "monte-carlo"]
 Listed = Literal["grid", "list"]

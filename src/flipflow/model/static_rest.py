@@ -6,13 +6,12 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, islice, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.contact_law import OPEN, WHOLE, shares
 from flipflow.model.elements import ClearanceSpring
 
-Real = NDArray[np.float64]
 MOST_STATES = 4096  # contact states that are tried, those with few stops engaged first
 NEWTON_STEPS = 100
 ROUNDING = 1e-9  # share of the machine's size by which a stop may miss its gap

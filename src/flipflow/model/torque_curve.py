@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from flipflow.compiled.arrays import Real
+
 PULL_UP_SPEED = 0.25  # of the speed at breakdown: where the torque is least on the way up
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_number,
@@ -27,7 +28,6 @@ from flipflow.model.parameters import named_parameter, with_values
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 
-Real = NDArray[np.float64]
 Values = NDArray[np.float64] | NDArray[np.str_]
 Vary = Mapping[str, object]
 LAW = "stop_law"

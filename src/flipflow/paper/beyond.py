@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.continue_orbit import switch_branch
 from flipflow.continuation.frequency_response import frequency_response
@@ -44,8 +44,6 @@ CAPTION = (
     "weight on the inclined deck, towards the side that is then farther away; between the period "
     "doublings every other turn reaches farther."
 )
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.paper.claims import Claim
-from flipflow.paper.figure import PaperFigure
 from flipflow.paper.trends import FamilyPair
 from flipflow.periodic.options import HarmonicBalance
 from flipflow.plotting.family import family_figure
@@ -74,20 +71,6 @@ class FamilyPlan:
         if self.base is None:
             return f"{factor:g} mm"
         return f"{factor:g} {FIELD[self.base].symbol}"
-
-
-def family_paper_figure(
-    name: str,
-    title: str,
-    plan: FamilyPlan,
-    claims: Sequence[Claim[FamilyPair]],
-) -> PaperFigure[FamilyPair]:
-    """A figure of amplitudes over frequency for several values of one field."""
-
-    def drawn(pair: FamilyPair) -> Figure:
-        return draw_family(pair, title, plan.note)
-
-    return PaperFigure(name, title, plan.compute, drawn, tuple(claims), family_tables)
 
 
 def draw_family(pair: FamilyPair, title: str, note: str = "") -> Figure:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
@@ -47,8 +48,6 @@ CAPTION = (
     f"side; {GROUPS} groups of samples at each of {FREQUENCIES} frequencies. Shaded: 95 % "
     "confidence. Two parameters whose shaded intervals overlap are tied: neither leads."
 )
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.dynamics.linear_response import linear_response
@@ -36,7 +37,6 @@ from flipflow.plotting.scales import MM
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.transient.sweep import Jump, Sweep, sweep
 
-Real = NDArray[np.float64]
 TITLE = "Amplitude over frequency of the machine with stop"
 SAMPLES = 60
 SAME = 1e-6

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError
 from flipflow.model.disturbance import Impulse
@@ -45,8 +43,6 @@ CAPTION = (
     "print the speed of point a: it is taken where the lower motion has 1.25 mm, so "
     "that one number is left to judge."
 )
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

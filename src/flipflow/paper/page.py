@@ -12,6 +12,7 @@ from flipflow import __version__
 from flipflow.io.project import load
 from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.monitor import Monitor, silent
+from flipflow.model.numerals import capitalized
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.claims import DecidedClaim, Evaluation, Number, Numbers, Verdict
 from flipflow.paper.reproduce import MACHINE, PAPER, ReproducedFigure, Reproduction
@@ -314,4 +315,4 @@ def _shown(value: Number, *, with_unit: bool) -> str:
 
 def _sentence(text: str) -> str:
     symbol = not text.split(maxsplit=1)[0].rstrip(",").replace("-", "").isalpha()
-    return f"{text if symbol else text[:1].upper() + text[1:]}."
+    return f"{text if symbol else capitalized(text)}."

@@ -1,4 +1,7 @@
-"""The figures of the paper that can be reproduced, by name. A new one is a module and a line."""
+"""The figures of the paper that can be reproduced, by name.
+
+A new one is a module and a line here; one that varies a field is an entry of ``FAMILIES``.
+"""
 
 from __future__ import annotations
 
@@ -19,25 +22,17 @@ from flipflow.paper import (
     figure_09,
     figure_10,
     figure_11,
-    figure_12,
-    figure_13,
-    figure_14,
-    figure_15,
-    figure_16,
-    figure_17,
-    figure_18,
-    figure_19,
-    figure_20,
-    figure_21,
 )
+from flipflow.paper.family_figures import FAMILIES
 from flipflow.paper.figure import PaperFigure
 
 MODULES = (
     figure_01, figure_02c, figure_03, figure_04, figure_05, figure_06, figure_07, figure_08,
-    figure_09, figure_10, figure_11, figure_12, figure_13, figure_14, figure_15, figure_16,
-    figure_17, figure_18, figure_19, figure_20, figure_21, beyond,
+    figure_09, figure_10, figure_11,
 )  # fmt: skip
-FIGURES: Mapping[str, PaperFigure[Any]] = {m.FIGURE.name: m.FIGURE for m in MODULES}
+FIGURES: Mapping[str, PaperFigure[Any]] = {
+    one.name: one for one in (*(m.FIGURE for m in MODULES), *FAMILIES, beyond.FIGURE)
+}
 
 
 def chosen(names: tuple[str, ...]) -> tuple[PaperFigure[Any], ...]:

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.transient.history import History
 from flipflow.transient.speed_run import Start, run_history
 from flipflow.transient.time_stepping import RungeKutta
 
-Real = NDArray[np.float64]
 METHOD = RungeKutta("rk4")
 MOST_TURNS, SETTLED = 1000, 1e-6
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.paper.claims import (
     Claim,
@@ -23,7 +23,6 @@ from flipflow.paper.claims import (
 from flipflow.plotting.scales import MM
 from flipflow.studies.response_family import Member, ResponseFamily
 
-Real = NDArray[np.float64]
 NOTHING_NEW = 1e-9
 SLIGHT, LITTLE = 0.10, 0.05
 UP, DOWN = 1, -1

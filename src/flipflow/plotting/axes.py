@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flipflow.errors import InputError, MissingExtra
+from flipflow.errors import InputError, required
 from flipflow.model.system import Coordinate
 from flipflow.plotting.dispatch import figure
 from flipflow.plotting.layout import MARKS, mark_size
@@ -28,11 +28,10 @@ def draw_on(
     result: object, ax: Axes | None, coordinate: Coordinate | None, units: str | None
 ) -> Axes:
     """Draw the first panel of a result's figure on Axes: see :meth:`Result.plot`."""
-    try:
-        import matplotlib.pyplot as plt  # noqa: PLC0415  slow to import
-        from matplotlib.axes import Axes as Kind  # noqa: PLC0415
-    except ImportError as error:
-        raise MissingExtra("Plots need matplotlib: pip install 'flipflow[report]'.") from error
+    required("matplotlib.pyplot", "Plots need matplotlib", "report")
+    import matplotlib.pyplot as plt  # noqa: PLC0415  slow to import
+    from matplotlib.axes import Axes as Kind  # noqa: PLC0415
+
     if ax is not None and not isinstance(ax, Kind):
         raise InputError("ax", type(ax).__name__, "give matplotlib Axes, or None for new ones")
     panel = figure(result, coordinate=coordinate, units=units).panels[0]

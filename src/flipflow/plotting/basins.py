@@ -7,18 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.quantities import leading_coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
-from flipflow.plotting.panels import Axis, Cells, Panel, Trace
+from flipflow.plotting.panels import Axis, Cells, Panel, Trace, cell_edges
 from flipflow.plotting.response import label
 from flipflow.plotting.scales import MM
 from flipflow.plotting.units import length_of, speed_of
 from flipflow.studies.basins import Basins, GridAxis
 
-Real = NDArray[np.float64]
 NOT_SETTLED = "none"
 SYMBOLS = ("circle", "square", "triangle", "diamond")
 READING = (
@@ -73,15 +73,9 @@ def _cells(
     y = np.zeros(1) if upwards is None else _shown(upwards, upwards.values)
     columns, rows = np.argsort(x, kind="stable"), np.argsort(y, kind="stable")
     colours = (NOT_SETTLED, *(case_colour(k) for k in range(motions)))
-    return Cells(_edges(x[columns]), _edges(y[rows]), grid[np.ix_(rows, columns)] + 1, colours)
-
-
-def _edges(middles: Real) -> Real:
-    """Edges of cells around their middles."""
-    if middles.size == 1:
-        return np.array([middles[0] - 0.5, middles[0] + 0.5])
-    inner = (middles[1:] + middles[:-1]) / 2.0
-    return np.concatenate([[2.0 * middles[0] - inner[0]], inner, [2.0 * middles[-1] - inner[-1]]])
+    return Cells(
+        cell_edges(x[columns]), cell_edges(y[rows]), grid[np.ix_(rows, columns)] + 1, colours
+    )
 
 
 def _shown(axis: GridAxis, values: Real) -> Real:
@@ -90,7 +84,7 @@ def _shown(axis: GridAxis, values: Real) -> Real:
 
 
 def _axis(axis: GridAxis) -> Axis:
-    edges = _edges(np.sort(_shown(axis, axis.values)))
+    edges = cell_edges(np.sort(_shown(axis, axis.values)))
     unit = "mm" if axis.kind == "displacement" else "m/s"
     return Axis(f"{label(axis.which)} {axis.kind}", unit, (float(edges[0]), float(edges[-1])))
 

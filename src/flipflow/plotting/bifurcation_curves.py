@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.errors import InputError
 from flipflow.plotting.branches import field_axis
@@ -15,7 +15,6 @@ from flipflow.plotting.panels import Axis, Panel, Trace
 from flipflow.plotting.response import KIND_SYMBOLS, KIND_WORDS, UNSTABLE_FOLD
 from flipflow.plotting.scales import RPM
 
-Real = NDArray[np.float64]
 DASHES = {"grazing": "dot", "period doubling": "dash", "symmetry breaking": "dash",
           "Neimark-Sacker": "dashdot"}  # fmt: skip
 OMEGA = "omega"

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch
@@ -31,7 +31,6 @@ from flipflow.plotting.response import (
 from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.units import speed_of
 
-Real = NDArray[np.float64]
 Read = Callable[[FieldBranch], tuple[Real, Real]]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch
@@ -16,7 +18,6 @@ from flipflow.errors import IncompleteError
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 
-Real = NDArray[np.float64]
 OF_FOLD = 0.05  # from 1 the multiplier of a fold, that of a truncated series, too
 AT_ONE = 1e-3  # several multipliers stand at 1 in some folds, the square root of rounding apart
 
@@ -76,6 +77,13 @@ class Curve:
             np.append(branch.stability, following)[order],
             frozenset(fold.omega for fold in branch.folds if not is_jump(branch, fold)),
         )
+
+    def part(self, keep: NDArray[np.bool_]) -> Curve:
+        """The points to keep, as a curve of their own."""
+        return dataclasses.replace(
+            self, omega=self.omega[keep], amplitude=self.amplitude[keep], phase=self.phase[keep],
+            stability=self.stability[keep],
+        )  # fmt: skip
 
     def runs(self) -> Iterator[tuple[str, slice]]:
         """Stretches of the same stability; each ends where the next begins."""

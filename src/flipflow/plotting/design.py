@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.fields import FIELD
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.plotting.sensitivity import SHOWN
-from flipflow.plotting.study import FIELD_SCALES
+from flipflow.plotting.study import FIELD_SCALES, field_unit
 from flipflow.studies.candidates import quantity_of
 from flipflow.studies.design import Proposal
 
-Real = NDArray[np.float64]
 COLUMNS, ROW = 2, 230
 
 
@@ -36,8 +35,8 @@ def proposal_figure(found: Proposal) -> Figure:
         ways = [
             (
                 name,
-                Axis(FIELD[name].symbol, _unit(name)),
-                values * FIELD_SCALES.get(_unit(name), 1.0),
+                Axis(FIELD[name].symbol, field_unit(name)),
+                values * FIELD_SCALES.get(field_unit(name), 1.0),
             )
             for name, values in found.fields.items()
         ]
@@ -108,8 +107,3 @@ def _axis(name: str) -> Axis:
 
 def _shown(found: Proposal, name: str) -> Real:
     return np.asarray(found.objectives[name] * SHOWN[quantity_of(name).shown_unit])
-
-
-def _unit(name: str) -> str:
-    one = FIELD[name]
-    return one.file_unit if one.file_unit in FIELD_SCALES else one.unit

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.numerals import rpm
 from flipflow.plotting.branches import field_axis
 from flipflow.plotting.figure import Figure
@@ -15,7 +15,6 @@ from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.scales import MM, RPM
 from flipflow.studies.design_map import DesignMap
 
-Real = NDArray[np.float64]
 MN = 1e-6
 
 

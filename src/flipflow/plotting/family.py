@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from flipflow.continuation.branch import Branch
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import FIELD, symbol_of
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.curves import Curve
@@ -57,7 +57,7 @@ def family_figure(
     which
         The only coordinate to draw; None: all.
     """
-    symbol = FIELD[family.field].symbol if family.field in FIELD else family.field
+    symbol = symbol_of(family.field)
     words = list(labels) or [_value(family.field, member.value) for member in family.members]
     panels = tuple(
         _panel(
@@ -127,7 +127,7 @@ def leaning_panel(branch: Branch, windows: Sequence[Sequence[Orbit]], title: str
     near = (curve.omega > low - reach) & (curve.omega < high + reach)
     traces = list(
         curve_traces(
-            "symmetric motion", _cut(curve, near), curve.amplitude[near] * MM,
+            "symmetric motion", curve.part(near), curve.amplitude[near] * MM,
             colour="case 0", symbol=None, bold=True, unit="rad/s",
         )
     )  # fmt: skip
@@ -146,10 +146,6 @@ def leaning_panel(branch: Branch, windows: Sequence[Sequence[Orbit]], title: str
         speed_axis_in_radians(low - reach, high + reach), Axis("excursion |x2|", "mm"),
         tuple(traces), lines=(Line("y", gap, "gap (e)", "gap", text_at=1.0),), title=title,
     )  # fmt: skip
-
-
-def _cut(curve: Curve, keep: np.ndarray) -> Curve:
-    return Curve(curve.omega[keep], curve.amplitude[keep], curve.phase[keep], curve.stability[keep])
 
 
 def _panel(

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flipflow.errors import MissingExtra
+from flipflow.errors import required
 from flipflow.plotting.layout import FONT
 
 if TYPE_CHECKING:
@@ -27,12 +27,7 @@ def require_matplotlib() -> None:
     MissingExtra
         When matplotlib is not installed.
     """
-    try:
-        import matplotlib  # noqa: F401, ICN001, PLC0415  slow to import
-    except ImportError as error:
-        raise MissingExtra(
-            "Figures for print need matplotlib: pip install 'flipflow[report]'."
-        ) from error
+    required("matplotlib", "Figures for print need matplotlib", "report")
 
 
 def font_folder() -> Path:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
@@ -17,7 +17,6 @@ from flipflow.plotting.scales import KN, MM
 from flipflow.plotting.units import speed_of
 from flipflow.transient.history import History
 
-Real = NDArray[np.float64]
 SPANS = 400
 LAST_TURNS = 3
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.load_case import case_words
@@ -21,7 +20,6 @@ from flipflow.plotting.scales import MM
 from flipflow.plotting.units import length_of, speed_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
 
-Real = NDArray[np.float64]
 Found = Sequence[tuple[int, CaseAssessment, Orbit]]
 TURNS = 2
 POINTS = 181

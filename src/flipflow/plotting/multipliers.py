@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from flipflow.compiled.arrays import Complex
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.plotting.branches import field_axis
@@ -15,7 +15,6 @@ from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import speed_axis
 from flipflow.plotting.scales import RPM
 
-Complex = NDArray[np.complex128]
 MOST_SHOWN = 6
 WIDEST = 1.6  # of the plane around the unit circle
 CIRCLE = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))

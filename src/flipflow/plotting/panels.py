@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from flipflow.compiled.arrays import Real
+
 PAGE_WIDTH = 690.0  # of an A4 page within its margins, 96 pixels an inch
 Role = Literal[
     "stable", "unstable", "undetermined", "case band", "limit", "motion", "point", "beneath"
@@ -109,6 +110,14 @@ class Cells:
     y: Real
     kind: NDArray[np.int64]
     colours: tuple[str, ...]
+
+
+def cell_edges(middles: Real) -> Real:
+    """Edges of cells around their middles, (n + 1,) of (n,)."""
+    if middles.size == 1:
+        return np.array([middles[0] - 0.5, middles[0] + 0.5])
+    inner = (middles[1:] + middles[:-1]) / 2.0
+    return np.concatenate([[2.0 * middles[0] - inner[0]], inner, [2.0 * middles[-1] - inner[-1]]])
 
 
 @dataclass(frozen=True)

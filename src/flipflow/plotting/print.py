@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Callable
 from typing import Any
 
-from flipflow.errors import MissingExtra
+from flipflow.errors import required
 from flipflow.plotting.font import DESCENT, LINE_HEIGHT, font_folder, require_matplotlib
 from flipflow.plotting.layout import CHARACTER, LABEL_ROW
 from flipflow.plotting.palette import COLOURS
@@ -107,10 +107,7 @@ def require_typst(what: str = "A PDF") -> Callable[..., Any]:
     MissingExtra
         When typst or matplotlib is not installed.
     """
-    try:
-        import typst  # noqa: PLC0415  an extra
-    except ImportError as error:
-        raise MissingExtra(f"{what} needs typst: pip install 'flipflow[report]'.") from error
+    typst = required("typst", f"{what} needs typst", "report")
     require_matplotlib()
     compiled: Callable[..., Any] = typst.compile
     return compiled

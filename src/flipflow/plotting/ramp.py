@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from flipflow.model.system import Coordinate
-from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Line, Panel, Trace
-from flipflow.plotting.response import coordinates, curve_traces, label, speed_axis
+from flipflow.plotting.response import coordinates, label, speed_axis, underlay
 from flipflow.plotting.scales import MM, RPM
 from flipflow.studies.ramp import Ramp
 
@@ -25,11 +24,7 @@ def ramp_figure(ramp: Ramp, which: Coordinate | None = None) -> Figure:
     omega, size = ramp.amplitude(chosen)
     traces = [Trace("gliding speed", omega * RPM, size * MM, colour="main", bold=True)]
     if ramp.branch.omega.size:
-        curve = Curve.of(ramp.branch, chosen)
-        traces += curve_traces(
-            "periodic motions", curve, curve.amplitude * MM, colour="relative", symbol=None,
-            bold=False,
-        )  # fmt: skip
+        traces += underlay(ramp.branch, chosen)
     top = 1.08 * max(float(trace.y.max()) for trace in traces)
     lines = tuple(Line("x", jump.omega * RPM, "jumps", "jump", "dash") for jump in ramp.jumps)
     panel = Panel(

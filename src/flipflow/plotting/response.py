@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.dynamics.linear_response import LinearResponse
@@ -22,7 +22,6 @@ from flipflow.plotting.panels import Arrow, Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, MINUS, MM, RPM, SPEEDS
 from flipflow.studies.assessment import Assessment
 
-Real = NDArray[np.float64]
 LABELS = {"main": "main frame (x1)", "floating": "floating frame (xf)", "relative": "relative (x2)"}
 SYMBOLS = {"main": "square", "floating": "triangle"}
 KIND_WORDS = {
@@ -299,6 +298,14 @@ def curve_traces(
         legend = False
 
 
+def underlay(branch: Branch, which: Coordinate) -> Iterator[Trace]:
+    """The periodic motions that what is reached in time is laid over."""
+    curve = Curve.of(branch, which)
+    return curve_traces(
+        "periodic motions", curve, curve.amplitude * MM, colour="relative", symbol=None, bold=False
+    )
+
+
 def stability_key(traces: Sequence[Trace]) -> Iterator[Trace]:
     """Entries of the legend that say what dashed and dotted lines are, where there are any."""
     for role in ("unstable", "undetermined"):
@@ -392,7 +399,7 @@ def _within(curve: Curve, near: tuple[float, float]) -> Curve:
     keep = inside.copy()
     keep[1:] |= inside[:-1]
     keep[:-1] |= inside[1:]
-    return Curve(curve.omega[keep], curve.amplitude[keep], curve.phase[keep], curve.stability[keep])
+    return curve.part(keep)
 
 
 def _working(omega: float | None, *, text: bool = True) -> tuple[Line, ...]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Line, Panel, Trace, decade_ticks
@@ -12,7 +12,6 @@ from flipflow.plotting.response import coordinates, label
 from flipflow.plotting.scales import HZ, MM
 from flipflow.studies.poincare import Section, Spectrum
 
-Real = NDArray[np.float64]
 MOST_HARMONICS = 6.0
 DECADES = 6.0
 LEAST_SPAN = 0.02  # on either side of points that coincide, as a share of their value

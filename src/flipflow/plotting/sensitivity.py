@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
-from flipflow.model.fields import FIELD
+from flipflow.model.fields import symbol_of
 from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
@@ -18,7 +18,6 @@ from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
 from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
-Real = NDArray[np.float64]
 SHOWN: Mapping[str, float] = {
     "mm": MM, "rpm": RPM, "kN": KN, "kW": 1e-3, "deg": DEGREES, "g": 1.0 / GRAVITY, "%": 100.0,
     "h": 1.0 / 3600.0, **dict.fromkeys(("", "N", "W", "K", "m/s", "rad"), 1.0),
@@ -101,7 +100,7 @@ def _lines(result: Sensitivity, index: Real, width: Real, label: str) -> Panel:
     areas, lines = [], []
     for rank, i in enumerate(index_order(result)):
         y, half = index[order, i], width[order, i]
-        name = _name(result.names[i])
+        name = symbol_of(result.names[i])
         areas.append(
             Trace(f"{name}, 95 %", x, y + half, "case band", "case band", legend=False,
                   lower=y - half)
@@ -169,16 +168,12 @@ def _rows(result: Sensitivity | OneAtATime, order: list[int]) -> Axis:
 
 def _row(result: Sensitivity | OneAtATime, i: int) -> str:
     """The field, and how far its ends lie from the machine's own value."""
-    nominal, name = result.own[i], _name(result.names[i])
+    nominal, name = result.own[i], symbol_of(result.names[i])
     ends = result.ends[i]
     if not isinstance(nominal, float) or not np.isfinite(nominal) or nominal == 0.0:
         return name
     low, high = (100.0 * (float(end) / nominal - 1.0) for end in ends)  # type: ignore[arg-type]
     return f"{name} {low:+.3g} to {high:+.3g} %".replace("-", MINUS)
-
-
-def _name(field: str) -> str:
-    return FIELD[field].symbol if field in FIELD else field
 
 
 def _title(result: Sensitivity | OneAtATime, at: int | None) -> str:

@@ -1,26 +1,29 @@
-"""Studies drawn: maps with contours, curves over one field, tornado, parallel coordinates."""
+"""Studies drawn: maps with contours, curves over one field, tornado, parallel coordinates.
+
+Of several frequencies the first is drawn; of several load cases, too, but curves show each.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
-from flipflow.errors import InputError, MissingExtra
-from flipflow.model.arguments import checked_index, checked_word
-from flipflow.model.fields import FIELD
+from flipflow.compiled.arrays import Real
+from flipflow.errors import InputError, required
+from flipflow.model.arguments import checked_word
+from flipflow.model.fields import FIELD, symbol_of
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace
+from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace, cell_edges
 from flipflow.plotting.scales import MM
 from flipflow.plotting.sensitivity import SHOWN, tornado_figure
 from flipflow.studies.sensitivity import OneAtATime
@@ -33,21 +36,12 @@ from flipflow.studies.tolerance import (
     limits_left_out,
 )
 
-Real = NDArray[np.float64]
 LEVELS = 7  # contours of a map, about
 MOST_AXES = 10  # of parallel coordinates: the fields, then quantities
 MOST_MAPS = 4  # of one figure
 MOST_LINES = 300  # machines of parallel coordinates
 CLEAR_LINES, LEAST_OPACITY = 30, 0.12  # lines that may be opaque; of very many
 FIELD_SCALES = {"mm": MM, "kN/m": 1e-3, "kN s/m": 1e-3, "kg mm": 1e3}
-
-
-@dataclass(frozen=True)
-class Place:
-    """Which load case and which frequency of a study is drawn, by their indices."""
-
-    case: int = 0
-    at: int = 0
 
 
 def study_figure(study: Study) -> Figure:
@@ -67,12 +61,7 @@ def study_figure(study: Study) -> Figure:
     return parallel_figure(study)
 
 
-def map_figure(
-    study: Study,
-    quantity: str | None = None,
-    limits: Limits | None = None,
-    place: Place | None = None,
-) -> Figure:
+def map_figure(study: Study, quantity: str | None = None, limits: Limits | None = None) -> Figure:
     """Contours of a quantity over the first two fields of a grid, with folds and limits.
 
     Other fields stay at the value next to the machine's own.
@@ -85,8 +74,6 @@ def map_figure(
         Which of the study's quantities; None: the first.
     limits
         Where they are met is shaded; their own contours are drawn, too.
-    place
-        Load case and frequency.
 
     Raises
     ------
@@ -96,7 +83,7 @@ def map_figure(
         When contourpy, which comes with matplotlib, is not installed.
     """
     name = checked_word("quantity", quantity or study.quantities[0], study.quantities)
-    return _maps(study, (name,), limits, place or Place())
+    return _maps(study, (name,), limits)
 
 
 def maps_figure(study: Study, limits: Limits | None = None) -> Figure:
@@ -105,12 +92,12 @@ def maps_figure(study: Study, limits: Limits | None = None) -> Figure:
     Parameters and errors as of :func:`map_figure`.
     """
     motions = [name for name in study.quantities if name not in FOLDS] or study.quantities
-    return _maps(study, motions[:MOST_MAPS], limits, Place())
+    return _maps(study, motions[:MOST_MAPS], limits)
 
 
-def _maps(study: Study, names: Sequence[str], limits: Limits | None, place: Place) -> Figure:
+def _maps(study: Study, names: Sequence[str], limits: Limits | None) -> Figure:
     across, up = _two_fields(study)
-    grid = _Grid(study, across, up, place)
+    grid = _Grid(study, across, up)
     asked = [quantity_named(name, study.machine) for name in names]
     panels = tuple(_map_panel(grid, one, limits) for one in asked)
     shaded = "" if limits is None else _shaded_words(study, limits)
@@ -122,7 +109,7 @@ def _maps(study: Study, names: Sequence[str], limits: Limits | None, place: Plac
     )
     told = " and ".join(f"the {one.label} in {one.shown_unit or 'plain numbers'}" for one in asked)
     over = f"over {symbol_of(across)} and {symbol_of(up)}"
-    title = f"{_capital(asked[0].label)} {over}" if len(asked) == 1 else f"Maps {over}"
+    title = f"{capitalized(asked[0].label)} {over}" if len(asked) == 1 else f"Maps {over}"
     return Figure(title, f"Contours of {told}.{shaded}{jumps}", panels, height=440 * len(panels))
 
 
@@ -136,16 +123,12 @@ def _map_panel(grid: _Grid, one: Quantity, limits: Limits | None) -> Panel:
     traces += _fold_contours(grid)
     notes = tuple(_level_notes(traces))
     unit = f" in {one.shown_unit}" if one.shown_unit else ""
-    where = _where(study, grid.place, one)
+    where = _where(study, one)
     return Panel(
         _field_axis(study, grid.across, grid.x), _field_axis(study, grid.up, grid.y),
         tuple(trace for trace in traces if trace.x.size), cells=cells, notes=notes,
-        title=", ".join(filter(None, (f"{_capital(one.label)}{unit}", where))),
+        title=", ".join(filter(None, (f"{capitalized(one.label)}{unit}", where))),
     )  # fmt: skip
-
-
-def _capital(label: str) -> str:
-    return f"{label[:1].upper()}{label[1:]}"
 
 
 def curves_figure(study: Study, field: str) -> Figure:
@@ -155,7 +138,7 @@ def curves_figure(study: Study, field: str) -> Figure:
     panels = []
     for k, name in enumerate(study.quantities):
         one = quantity_named(name, study.machine)
-        values = _at(study, name, 0)[keep] * SHOWN[one.shown_unit]
+        values = _first(study, name)[keep] * SHOWN[one.shown_unit]
         traces = tuple(
             Trace(
                 case, x, values[:, c], colour=case_colour(c), symbol=case_symbol(c), legend=k == 0
@@ -168,7 +151,7 @@ def curves_figure(study: Study, field: str) -> Figure:
     return Figure(title, caption, tuple(panels), height=230 * len(panels) + 60)
 
 
-def study_tornado(study: Study, quantity: str, place: Place | None = None) -> Figure:
+def study_tornado(study: Study, quantity: str) -> Figure:
     """Change of a quantity when one field alone moves to the low or high end of its range.
 
     Parameters
@@ -177,22 +160,19 @@ def study_tornado(study: Study, quantity: str, place: Place | None = None) -> Fi
         What :func:`flipflow.study` returns.
     quantity
         One of its quantities.
-    place
-        Load case and frequency.
     """
-    place = place or Place()
     checked_word("quantity", quantity, study.quantities)
 
     def read(table: Real) -> Real:
         whole = study.values[quantity].ndim == 2
-        return table[..., place.case] if whole else table[..., place.case, place.at]
+        return table[..., 0] if whole else table[..., 0, 0]
 
     found = OneAtATime(
         machine=study.machine,
         quantity=quantity,
         names=study.names,
         distributions=study.distributions,
-        omega=float(study.omega[place.at]),
+        omega=float(study.omega[0]),
         nominal=float(read(study.nominal[quantity])),
         at_low=np.asarray(read(study.at_low[quantity])),
         at_high=np.asarray(read(study.at_high[quantity])),
@@ -204,7 +184,6 @@ def study_tornado(study: Study, quantity: str, place: Place | None = None) -> Fi
 def parallel_figure(
     study: Study,
     passing: NDArray[np.bool_] | None = None,
-    place: Place | None = None,
     *,
     met: str = "every limit",
 ) -> Figure:
@@ -216,14 +195,11 @@ def parallel_figure(
         What :func:`flipflow.study` returns.
     passing
         Which machines meet every limit, (S,); the others are drawn in another colour.
-    place
-        Load case and frequency.
     met
         What those have met, in words.
     """
-    place = place or Place()
     fine = np.ones(study.size, bool) if passing is None else np.asarray(passing)
-    columns = list(_axes(study, place))[:MOST_AXES]
+    columns = list(_axes(study))[:MOST_AXES]
     rows = np.linspace(0, study.size - 1, min(study.size, MOST_LINES)).astype(int)
     heights = np.stack([_share(values) for _, values in columns], axis=1)[rows]
     groups = [(f"meets {met}", fine[rows], "allowed"), ("does not", ~fine[rows], "limit")]
@@ -240,7 +216,7 @@ def parallel_figure(
     panel = Panel(
         Axis("", "", (-0.4, len(columns) - 0.6), ticks),
         Axis("share of the range", "", (-0.12, 1.12), ((0.0, "low"), (1.0, "high"))),
-        tuple(traces), lines=uprights, notes=notes, title=_where(study, place, None),
+        tuple(traces), lines=uprights, notes=notes, title=_where(study, None),
     )  # fmt: skip
     shown = f" {rows.size} of {study.size} machines are drawn." if rows.size < study.size else ""
     caption = (
@@ -269,9 +245,8 @@ def _machine_lines(name: str, heights: Real, colour: str) -> Iterator[Trace]:
 class _Grid:
     """Two fields of a grid as axes in shown units, and quantities over them."""
 
-    def __init__(self, study: Study, across: str, up: str, place: Place) -> None:
-        self.study, self.place = study, place
-        self.across, self.up = across, up
+    def __init__(self, study: Study, across: str, up: str) -> None:
+        self.study, self.across, self.up = study, across, up
         self._keep = _others_nearest(study, (across, up))
         first, second = (np.asarray(study.columns[n], float)[self._keep] for n in (across, up))
         x, y = np.unique(first), np.unique(second)
@@ -281,20 +256,16 @@ class _Grid:
 
     def values(self, name: str) -> Real:
         """A quantity, (rows of y, columns of x), SI."""
-        table = _at(self.study, name, self.place.at)[self._keep, self.place.case]
+        table = _first(self.study, name)[self._keep, 0]
         return np.asarray(table[self._order].reshape(self._shape))
 
     def lines(self, z: Real, level: float, *, parted: bool = True) -> Iterator[tuple[Real, Real]]:
         """Where z takes a level; ``parted`` by the jump for what is of a motion."""
-        try:
-            from contourpy import contour_generator  # noqa: PLC0415  comes with an extra
-        except ImportError as error:
-            told = "Maps need contourpy: pip install 'flipflow[report]'."
-            raise MissingExtra(told) from error
+        contourpy = required("contourpy", "Maps need contourpy", "report")
         for side in self._sides if parted else (np.ones(self._shape, bool),):
             hidden = np.ma.masked_where(~np.isfinite(z) | ~side, z)
             if hidden.count():
-                for line in contour_generator(self.x, self.y, hidden).lines(level):
+                for line in contourpy.contour_generator(self.x, self.y, hidden).lines(level):
                     yield np.asarray(line[:, 0]), np.asarray(line[:, 1])
 
     @cached_property
@@ -303,7 +274,7 @@ class _Grid:
         everywhere = np.ones(self._shape, bool)
         if not _has_folds(self.study):
             return (everywhere,)
-        jumped = jumped_motions(self.study)[self._keep, self.place.case, self.place.at]
+        jumped = jumped_motions(self.study)[self._keep, 0, 0]
         beyond = jumped[self._order].reshape(self._shape)
         return ~beyond, beyond
 
@@ -329,7 +300,7 @@ def _limit_contours(grid: _Grid, limits: Limits) -> Iterator[Trace]:
 
 
 def _fold_contours(grid: _Grid) -> Iterator[Trace]:
-    omega = float(grid.study.omega[grid.place.at])
+    omega = float(grid.study.omega[0])
     for name, dash in zip(FOLDS, ("dot", "dash"), strict=True):
         if name in grid.study.values and np.isfinite(omega):
             lines = grid.lines(grid.values(name), omega, parted=False)
@@ -342,9 +313,9 @@ def _met_cells(grid: _Grid, limits: Limits) -> Cells:
     for name in limits_known(grid.study, limits):
         low, high = limit_bounds(limits, name)
         operation = QUANTITIES[name].of == "operation"
-        values = grid.study.omega[grid.place.at] if operation else grid.values(name)
+        values = grid.study.omega[0] if operation else grid.values(name)
         met &= (values >= low) & (values <= high)
-    return Cells(_edges(grid.x), _edges(grid.y), met.astype(np.int64), ("none", "case 3"))
+    return Cells(cell_edges(grid.x), cell_edges(grid.y), met.astype(np.int64), ("none", "case 3"))
 
 
 def _shaded_words(study: Study, limits: Limits) -> str:
@@ -392,11 +363,6 @@ def _round_levels(low: float, high: float) -> Real:
     return np.asarray(step * np.arange(np.floor(low / step) + 1.0, np.ceil(high / step)))
 
 
-def _edges(middles: Real) -> Real:
-    inner = (middles[1:] + middles[:-1]) / 2.0
-    return np.concatenate([[2.0 * middles[0] - inner[0]], inner, [2.0 * middles[-1] - inner[-1]]])
-
-
 def wide_fields(study: Study) -> list[str]:
     """Fields with several numbers, in the order given."""
     return [
@@ -429,27 +395,26 @@ def _others_nearest(study: Study, shown: tuple[str, ...]) -> NDArray[np.bool_]:
     return keep
 
 
-def _at(study: Study, name: str, at: int) -> Real:
-    """A quantity at a frequency, (S, C)."""
-    checked_index("at", at, study.omega.size, "give the index of a frequency of the study")
+def _first(study: Study, name: str) -> Real:
+    """A quantity at the first frequency, (S, C)."""
     table = study.values[name]
-    return np.asarray(table if table.ndim == 2 else table[:, :, at])
+    return np.asarray(table if table.ndim == 2 else table[:, :, 0])
 
 
 def _has_folds(study: Study) -> bool:
     return all(name in study.values for name in FOLDS)
 
 
-def _axes(study: Study, place: Place) -> Iterator[tuple[str, Real]]:
+def _axes(study: Study) -> Iterator[tuple[str, Real]]:
     """Label and values of every axis of parallel coordinates, in shown units."""
     for name, column in study.columns.items():
         if column.dtype.kind == "f":
             yield _axis_words(study, name), np.asarray(column, float) * _field_scale(study, name)
     for name in study.quantities:
         one = quantity_named(name, study.machine)
-        values = _at(study, name, place.at)[:, place.case] * SHOWN[one.shown_unit]
+        values = _first(study, name)[:, 0] * SHOWN[one.shown_unit]
         unit = f", {one.shown_unit}" if one.shown_unit else ""
-        known = study.reason[:, place.case, place.at] == FOUND
+        known = study.reason[:, 0, 0] == FOUND
         yield f"{one.symbol}{unit}", np.where(known & np.isfinite(values), values, np.nan)
 
 
@@ -468,11 +433,6 @@ def _end_notes(columns: Sequence[tuple[str, Real]]) -> Iterator[Note]:
             yield Note(float(k), 1.06, f"{finite.max():.4g}", "center", "mark")
 
 
-def symbol_of(field: str) -> str:
-    """Symbol of a field of a screen; the name of any other."""
-    return FIELD[field].symbol if field in FIELD else field
-
-
 def _field_scale(study: Study, field: str) -> float:
     return FIELD_SCALES.get(_field_unit(study, field), 1.0)
 
@@ -480,6 +440,11 @@ def _field_scale(study: Study, field: str) -> float:
 def _field_unit(study: Study, field: str) -> str:
     if field not in FIELD or not isinstance(study.machine, FlipFlowScreen):
         return ""
+    return field_unit(field)
+
+
+def field_unit(field: str) -> str:
+    """Unit in which a field of a screen is drawn: that of its file where its scale is known."""
     known = FIELD[field]
     return known.file_unit if known.file_unit in FIELD_SCALES else known.unit
 
@@ -494,11 +459,11 @@ def _field_axis(study: Study, field: str, shown: Real) -> Axis:
     return Axis(words, _field_unit(study, field), (float(shown.min()), float(shown.max())))
 
 
-def _where(study: Study, place: Place, one: Quantity | None) -> str:
+def _where(study: Study, one: Quantity | None) -> str:
     """Load case and speed of a panel."""
-    case = f"load case {study.cases[place.case]}" if len(study.cases) > 1 else ""
+    case = f"load case {study.cases[0]}" if len(study.cases) > 1 else ""
     whole = one is not None and one.of == "response"
-    speed = "" if whole else speed_in_words(study.omega[place.at]).removeprefix(" ")
+    speed = "" if whole else speed_in_words(study.omega[0]).removeprefix(" ")
     return " ".join(filter(None, (case, speed)))
 
 

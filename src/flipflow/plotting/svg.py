@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.plotting.font import ASCENT, DESCENT, FAMILY, LINE_HEIGHT, MIDDLE, width_of
 from flipflow.plotting.layout import (
     FONT,
@@ -29,8 +30,6 @@ from flipflow.plotting.layout import (
 from flipflow.plotting.palette import COLOURS, DASHES, FAINT, FILLS, INK, SYMBOLS, TINTS
 from flipflow.plotting.panels import Arrow, Band, Bar, Cells, Line, Note, Panel, PanelGrid, Trace
 from flipflow.plotting.view import TICK, TICK_PAD, TITLE_PAD, View, view_of, widest
-
-Real = NDArray[np.float64]
 
 PT = 1.0 / POINT  # pixels
 EDGE = 1.0  # pixels between a figure's edge and what is written

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.continuation.branch import Branch
 from flipflow.errors import InputError
 from flipflow.model.system import Coordinate
-from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour
 from flipflow.plotting.panels import Axis, Panel, Trace
-from flipflow.plotting.response import coordinates, curve_traces, label, speed_axis
+from flipflow.plotting.response import coordinates, label, speed_axis, underlay
 from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.transient.sweep import Sweep
 
@@ -25,7 +23,6 @@ NOT_SETTLED = {
     "chaotic": "chaotic",
     "undecided": "not settled",
 }
-Real = NDArray[np.float64]
 
 
 def sweep_figure(
@@ -52,11 +49,7 @@ def sweep_figure(
     chosen = coordinates(sweeps[0].system, which)[-1]
     traces: list[Trace] = []
     if branch is not None:
-        curve = Curve.of(branch, chosen)
-        traces += curve_traces(
-            "periodic motions", curve, curve.amplitude * MM, colour="relative", symbol=None,
-            bold=False,
-        )  # fmt: skip
+        traces += underlay(branch, chosen)
     for k, sweep in enumerate(sweeps):
         traces += _swept(sweep, chosen, k + 1)
     top = max(float(trace.y.max()) for trace in traces)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from flipflow.model.arguments import checked_index
+from flipflow.model.fields import symbol_of
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
-from flipflow.plotting.study import speed_in_words, symbol_of
+from flipflow.plotting.study import speed_in_words
 from flipflow.studies.tolerance import Tolerance, limits_in_words, stands_out
 
 

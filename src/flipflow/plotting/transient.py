@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate
 from flipflow.plotting.figure import Figure
@@ -18,7 +19,6 @@ from flipflow.plotting.scales import KN, MM, RPM
 from flipflow.transient.run_up import RunUp, foundation_force
 from flipflow.transient.speed_run import swings
 
-Real = NDArray[np.float64]
 MOST_POINTS = 1500
 READING = (
     "Amplitude is half the way from one turning point of the motion to the next; w01 is the first "

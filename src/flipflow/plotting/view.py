@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.plotting.font import ASCENT, DESCENT, width_of
 from flipflow.plotting.layout import FONT, POINT, Rect
 from flipflow.plotting.panels import Axis, Panel
 from flipflow.plotting.scales import MINUS
 
-Real = NDArray[np.float64]
 Ticks = tuple[tuple[float, str], ...]
 
 # In pixels: length of a tick, from there to its words, from those to the title of the axis.

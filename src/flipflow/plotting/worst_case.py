@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flipflow.model.fields import symbol_of
 from flipflow.model.quantities import Quantity, quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
 from flipflow.plotting.scales import HZ, RPM
 from flipflow.plotting.sensitivity import SHOWN
-from flipflow.plotting.study import symbol_of
 from flipflow.plotting.units import speed_of
 from flipflow.studies.worst_case import End, WorstCase
 

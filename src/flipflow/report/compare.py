@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit, shown
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.compare import comparison_figure
 from flipflow.report.blocks import (
@@ -23,12 +23,18 @@ from flipflow.report.blocks import (
     Verdict,
     cells,
 )
-from flipflow.report.first_page import verdict_state
 from flipflow.report.numbers import NO_JUMP, NOTHING, number, percent, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import Assessment
-from flipflow.studies.compare import EMPTY, Comparison, Given, InputDifference, ResultChange
+from flipflow.studies.compare import (
+    EMPTY,
+    Comparison,
+    Given,
+    InputDifference,
+    ResultChange,
+    letter,
+)
 
 MARGIN, JUMP = "margin of ", "jump_margin"
 ONE_NAME = 24  # letters of a name that the head of a column has room for
@@ -49,7 +55,7 @@ def title(found: Comparison) -> Iterator[Block]:
 def verdicts(found: Comparison) -> Iterator[Block]:
     """Each machine's verdict and allowed range."""
     for k, (name, one) in enumerate(zip(found.names, found.assessments, strict=True)):
-        yield Verdict(f"{letter(k)}, {name}: {one.verdict}", verdict_state(one))
+        yield Verdict(f"{letter(k)}, {name}: {one.verdict}", one.state)
         yield Text(allowed_range(one.region), "Allowed speed range:")
 
 
@@ -95,11 +101,6 @@ def every_result(found: Comparison) -> Iterator[Block]:
             yield _changes(found, k, rows, f"{_headed(case)}, {letter(k)} against {letter(0)}")
 
 
-def letter(k: int) -> str:
-    """The letter that stands for a machine."""
-    return chr(ord("A") + k) if k < 26 else str(k + 1)
-
-
 def _described(name: str, one: Assessment) -> str:
     revision = one.project.document.revision
     speed = "no speed" if one.omega is None else f"{rpm(one.omega)} rpm"
@@ -138,7 +139,7 @@ def _changes(found: Comparison, k: int, rows: Sequence[ResultChange], title_: st
 
 
 def _headline(row: ResultChange) -> str:
-    return row.label[:1].upper() + row.label[1:]
+    return capitalized(row.label)
 
 
 def _value(row: ResultChange, value: float | None) -> str:
@@ -190,7 +191,6 @@ def summary_table(names: Sequence[str], found: Sequence[Assessment]) -> Table:
 
 
 def _summary_row(name: str, one: Assessment) -> tuple[Cell, ...]:
-    state = verdict_state(one)
     allowed = "; ".join(f"{rpm(low)} to {rpm(high)}" for low, high in one.region.feasible)
     judged = [row for row in one.limits_table if row.margin is not None]
     tightest = min(judged, key=lambda row: row.margin or 0.0, default=None)
@@ -200,6 +200,6 @@ def _summary_row(name: str, one: Assessment) -> tuple[Cell, ...]:
         label, margin = QUANTITIES[tightest.name].label, percent(tightest.margin)
         case = "" if tightest.name == "speed" else case_words(tightest.case)
     return (
-        Cell(name), Cell(state, state=state), Cell(speed), Cell(allowed or "none"),
+        Cell(name), Cell(one.state, state=one.state), Cell(speed), Cell(allowed or "none"),
         Cell(label, case), Cell(margin),
     )  # fmt: skip

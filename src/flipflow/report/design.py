@@ -8,7 +8,7 @@ import numpy as np
 
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.design import band_figure, proposal_figure
 from flipflow.report.blocks import (
@@ -45,7 +45,7 @@ NOT_COVERED = (
 @section(Proposal, Part.FIRST_PAGE, 10, brief=True)
 def verdict_of_proposal(found: Proposal) -> Iterator[Block]:
     """What was found."""
-    yield Verdict(_sentence(found), _state(found))
+    yield Verdict(f"{capitalized(found.sentence)}.", _state(found))
     if found.cancelled:
         yield Note("The search was stopped: this is the best so far, and it is not proved.")
     for why in found.thrown_out:
@@ -189,11 +189,6 @@ def _margin(name: str, excess: float) -> str:
     if name in (MOTION, EVEN, ALONE):
         return "met" if excess <= MET else "not met"
     return f"{0.0 - 100.0 * excess:.2f}"
-
-
-def _sentence(found: Proposal) -> str:
-    words = found.sentence
-    return f"{words[0].upper()}{words[1:]}."
 
 
 def _failing(found: Proposal) -> str:

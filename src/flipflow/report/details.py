@@ -9,7 +9,7 @@ from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import quantities_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.bars import energy_figure, region_figure
@@ -152,7 +152,7 @@ def _quantities(title: str, cases: Sequence[CaseAssessment], *, explained: bool)
     rows = []
     for one in quantities_of("motion"):
         values = [named(one.name, case.values.get(one.name)) for case in cases]
-        label = one.label[:1].upper() + one.label[1:]
+        label = capitalized(one.label)
         sentence = one.sentence if explained else ""
         rows.append((Cell(label, sentence), Cell(one.symbol), *cells(*values)))
     return Table(title, columns, tuple(rows))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from flipflow.model.limits import PASSAGES
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
@@ -27,6 +27,7 @@ from flipflow.report.blocks import (
     Verdict,
 )
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, speed
+from flipflow.report.parts import worst_of
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import (
@@ -88,7 +89,7 @@ def _title_block(assessment: Assessment) -> TitleBlock:
 @section(Assessment, Part.FIRST_PAGE, 20, brief=True)
 def verdict(assessment: Assessment) -> Iterator[Block]:
     """The verdict, and what it rests on."""
-    yield Verdict(assessment.verdict, verdict_state(assessment))
+    yield Verdict(assessment.verdict, assessment.state)
     yield Text(allowed_range(assessment.region), "Allowed speed range:")
     for lead, text in (
         ("Contact begins:", contact_sentence(assessment.region)),
@@ -144,7 +145,7 @@ def limits(assessment: Assessment) -> Iterator[Block]:
         "distance from the limit as a share of it. Attention: met by less than 5 %."
     )
     passing = tightest_on_the_way(assessment)
-    rows = tuple(_limit_row(row) for row in (*assessment.limits_table, *passing))
+    rows = tuple(limit_cells(row) for row in (*assessment.limits_table, *passing))
     yield Table("", columns, rows, caption)
 
 
@@ -294,11 +295,6 @@ def contact_sentence(region: OperatingRegion) -> str:
     return f"{', '.join(sides)} (empty); w_cs is the last of them."
 
 
-def verdict_state(assessment: Assessment) -> str:
-    """The state of limits, drive and start together."""
-    return assessment.state
-
-
 def stop_sentence(assessment: Assessment) -> str:
     """Whether the stops are reached, case by case."""
     if assessment.omega is None:
@@ -321,7 +317,8 @@ def _reached(omega: float, cases: tuple[CaseAssessment, ...]) -> str:
     return f"not reached in {'; '.join(free)}; reached in the other cases."
 
 
-def _limit_row(row: LimitRow) -> tuple[Cell, ...]:
+def limit_cells(row: LimitRow) -> tuple[Cell, ...]:
+    """A limit, what it allows, the worst value with its load case, the margin and the state."""
     allowed = bounds(*row.limit, row.shown_unit, row.unit)
     worst = quantity(row.worst, row.shown_unit, row.unit)
     if row.name == "speed" and row.worst is not None:
@@ -331,9 +328,8 @@ def _limit_row(row: LimitRow) -> tuple[Cell, ...]:
     case = row.reason if row.worst is None else row.case
     if row.name == "speed" and row.worst is not None:
         case = "all"
-    label = row.label[:1].upper() + row.label[1:]
     return (
-        Cell(label),
+        Cell(capitalized(row.label)),
         Cell(allowed),
         Cell(worst),
         Cell(case),
@@ -357,16 +353,13 @@ def _case_row(case: CaseAssessment) -> tuple[Cell, ...]:
 def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     """Quantities in the case in which the last of them that is known is worst."""
     first = names[0]
-    known = [
-        [(v, c) for c in assessment.cases if (v := c.values.get(name)) is not None]
-        for name in names
-    ]
-    found = next(filter(None, reversed(known)), None)
-    if found is None:
+    found = [worst_of(assessment.cases, name, lowest=lowest) for name in names]
+    worst = next(filter(None, reversed(found)), None)
+    if worst is None:
         screen = assessment.project.screen
         missing = QUANTITIES[first].missing(screen)
         return f"not checked, {missing_words(missing)}" if missing else "not checked"
-    _, case = (min if lowest else max)(found, key=lambda one: one[0])
+    _, case = worst
     if first == "stop_force" and not case.stop_reached:
         return "stop not reached" if case.screen.has_stop else "no stops fitted"
     parts = [

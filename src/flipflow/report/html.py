@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
-from flipflow.errors import MissingExtra
+from flipflow.errors import required
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_ROW, legend_rows
 from flipflow.plotting.plotly import START, element, library
@@ -185,17 +185,15 @@ def require_templates() -> jinja2.Environment:
     MissingExtra
         When jinja2 is not installed.
     """
-    try:
-        import jinja2  # noqa: PLC0415  an extra
-    except ImportError as error:
-        raise MissingExtra("Reports need jinja2: pip install 'flipflow[report]'.") from error
-    return jinja2.Environment(
-        loader=jinja2.FunctionLoader(_template),
+    templates = required("jinja2", "Reports need jinja2", "report")
+    made: jinja2.Environment = templates.Environment(
+        loader=templates.FunctionLoader(_template),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
+        undefined=templates.StrictUndefined,
     )
+    return made
 
 
 def _template(name: str) -> str:

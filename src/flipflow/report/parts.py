@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from flipflow.model.fields import FIELD
 from flipflow.model.load_case import case_words
+from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.screen import WarmedLoad, of_air
 from flipflow.report.blocks import Block, Cell, Column, Note, Table
@@ -86,15 +87,22 @@ def warmed_loads(assessment: Assessment) -> Iterator[WarmedLoad]:
 
 def _row(assessment: Assessment, cases: list[CaseAssessment], one: PartRow) -> tuple[Cell, ...]:
     quantity = QUANTITIES[one.name]
-    label = quantity.label[:1].upper() + quantity.label[1:]
+    label = capitalized(quantity.label)
     formula = Cell(one.formula, one.source)
-    known = [(value, case) for case in cases if (value := case.values.get(one.name)) is not None]
-    if not known:
+    worst = worst_of(cases, one.name, lowest=one.least_is_worst)
+    if worst is None:
         missing = missing_words(quantity.missing(assessment.project.screen))
         return Cell(one.part), Cell(label), Cell(NOTHING), Cell(missing), formula
-    choose = min if one.least_is_worst else max
-    value, case = choose(known, key=lambda pair: pair[0])
+    value, case = worst
     return Cell(one.part), Cell(label), Cell(named(one.name, value)), Cell(case.name), formula
+
+
+def worst_of(
+    cases: Iterable[CaseAssessment], name: str, *, lowest: bool = False
+) -> tuple[float, CaseAssessment] | None:
+    """The greatest, or lowest, value of a quantity with its load case; None where none is known."""
+    known = [(value, case) for case in cases if (value := case.values.get(name)) is not None]
+    return (min if lowest else max)(known, key=lambda one: one[0], default=None)
 
 
 def _notes(assessment: Assessment) -> Iterator[str]:

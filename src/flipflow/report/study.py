@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
+from flipflow.compiled.arrays import Real
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.vary import Choice, Distribution, Normal
 from flipflow.plotting.study import (
-    Place,
     curves_figure,
     map_figure,
     parallel_figure,
@@ -45,7 +44,6 @@ from flipflow.studies.tolerance import (
     limits_left_out,
 )
 
-Real = NDArray[np.float64]
 QUANTILES = (0.025, 0.5, 0.975)
 WORDS = {
     "grid": "every combination",
@@ -144,7 +142,7 @@ def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> I
     yield Heading(heading, 1, new_page=False)
     for name in motions[:MOST_FIGURES]:
         if np.isfinite(found.nominal[name]).all():
-            yield FigureBlock(study_tornado(found, name, Place()))
+            yield FigureBlock(study_tornado(found, name))
     if judged is None:
         yield FigureBlock(parallel_figure(found))
         return
@@ -229,7 +227,7 @@ def _spread_words(found: Study) -> Iterator[str]:
             if counted < found.size:
                 of_case = f" in case {case}" if len(found.cases) > 1 else ""
                 yield (
-                    f"{one.label[:1].upper()}{one.label[1:]}{of_case}: {counted} of {found.size} "
+                    f"{capitalized(one.label)}{of_case}: {counted} of {found.size} "
                     "machines are counted, the rest have none."
                 )
 

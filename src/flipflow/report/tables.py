@@ -9,6 +9,7 @@ import numpy as np
 
 from flipflow.io.spreadsheet import Sheet, Value, csv_text, xlsx
 from flipflow.io.units import in_unit
+from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES
 from flipflow.report.blocks import Block, Cell, Column, Table, TitleBlock, Values, Verdict
 from flipflow.report.html import KIND, footer_of
@@ -61,7 +62,7 @@ def response_sheet(assessment: Assessment) -> Sheet:
     head = ["Load case", "Speed [rpm]", "Speed [Hz]", "Returns after a disturbance"]
     for name in LISTED:
         one = QUANTITIES[name]
-        head.append(f"{one.label[:1].upper()}{one.label[1:]} [{one.shown_unit}]")
+        head.append(f"{capitalized(one.label)} [{one.shown_unit}]")
     rows = [row for case in assessment.cases for row in _response_rows(case)]
     return Sheet(RESPONSE, tuple(head), tuple(rows))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.plotting.transient import run_ups_figure
 from flipflow.report.blocks import (
     Block,
@@ -18,14 +18,15 @@ from flipflow.report.blocks import (
     Text,
     cells,
 )
+from flipflow.report.first_page import limit_cells
 from flipflow.report.jump_risk import millimetres, moment_words
-from flipflow.report.numbers import NOTHING, bounds, number, percent, quantity
+from flipflow.report.numbers import NOTHING, number, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_limit
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.studies.start_sentence import NO_SPEED, drive_words
-from flipflow.transient.run_up import RunSummary, RunUp
+from flipflow.transient.run_up import RunUp
 
 GREATEST = (
     ("main_amplitude", "main frame", "mm", "m"),
@@ -138,7 +139,7 @@ def beyond_running(assessment: Assessment) -> Iterator[str]:
             continue
         worst, limit = (quantity(value, row.shown_unit, row.unit) for value in (row.worst, most))
         yield (
-            f"{row.label[:1].upper()}{row.label[1:]}: {worst} ({case_words(row.case)}) exceeds the "
+            f"{capitalized(row.label)}: {worst} ({case_words(row.case)}) exceeds the "
             f"running limit of {limit}; {row.reason}."
         )
 
@@ -201,11 +202,7 @@ def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
         for values in (case.peaks, case.peaks_of("stop"))
         for name, _, shown, unit in GREATEST
     ]
-    return cells(case.case, _outcome(run), time, rpm(run.final_speed), *peaks)
-
-
-def _outcome(run: RunSummary) -> str:
-    return run.outcome
+    return cells(case.case, run.outcome, time, rpm(run.final_speed), *peaks)
 
 
 def _limits_table(assessment: Assessment) -> Table:
@@ -226,12 +223,9 @@ def _limits_table(assessment: Assessment) -> Table:
 
 
 def _limit_row(assessment: Assessment, row: LimitRow) -> tuple[Cell, ...]:
-    allowed = bounds(*row.limit, row.shown_unit, row.unit)
-    state, case = Cell(row.state, state=row.state), row.case or row.reason
-    if row.limit == NO_LIMIT:
-        most = running_limit(assessment.project, row)
-        allowed = "" if most is None else f"running: {quantity(most, row.shown_unit, row.unit)}"
-        state = Cell(row.reason)
-    worst = quantity(row.worst, row.shown_unit, row.unit)
-    label = Cell(row.label[:1].upper() + row.label[1:])
-    return (label, Cell(allowed), Cell(worst), Cell(case), Cell(percent(row.margin)), state)
+    if row.limit != NO_LIMIT:
+        return limit_cells(row)
+    label, _, worst, case, margin, _ = limit_cells(row)
+    most = running_limit(assessment.project, row)
+    allowed = "" if most is None else f"running: {quantity(most, row.shown_unit, row.unit)}"
+    return label, Cell(allowed), worst, case, margin, Cell(row.reason)

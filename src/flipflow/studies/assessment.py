@@ -389,8 +389,7 @@ def limit_row(project: Project, cases: tuple[CaseAssessment, ...], name: str) ->
     if not judged:
         return dataclasses.replace(row, reason="no motion found at working speed")
     margin, worst, case_name = min(judged, key=lambda one: one[0])
-    state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
-    return dataclasses.replace(row, worst=worst, case=case_name, margin=margin, state=state)
+    return _judged(dataclasses.replace(row, worst=worst, case=case_name), margin)
 
 
 def passing_rows(project: Project, found: Transients) -> tuple[LimitRow, ...]:
@@ -426,7 +425,10 @@ def passing_row(
     row = dataclasses.replace(row, worst=value, case=case)
     if most is None:
         return dataclasses.replace(row, reason=f"no limit given for the {passage}")
-    margin = relative_margin(value, -math.inf, most)
+    return _judged(row, relative_margin(value, -math.inf, most))
+
+
+def _judged(row: LimitRow, margin: float) -> LimitRow:
     state = FAIL if margin < 0.0 else ATTENTION if margin < CLOSE else PASS
     return dataclasses.replace(row, margin=margin, state=state)
 

@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flipflow import __version__
 from flipflow.batch.lanes import Run
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_reals, checked_word
 from flipflow.model.monitor import Monitor
@@ -26,7 +26,6 @@ from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.attractors import Attractors
 
-Int = NDArray[np.int64]
 NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %
 
 

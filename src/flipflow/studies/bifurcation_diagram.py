@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.correction import QUICK, Course
 from flipflow.continuation.field_solver import FieldSolver
 from flipflow.errors import IncompleteError, InputError
@@ -48,7 +49,6 @@ from flipflow.transient.settling import (
 )
 from flipflow.transient.sweep import Step, step_at, step_by_step
 
-Real = NDArray[np.float64]
 Direction = Literal["up", "down"]
 OMEGA = "omega"
 MOST_POINTS = 100_000  # that may be asked for at one value

@@ -15,13 +15,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Int, Real
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
-Int = NDArray[np.int64]
 Kind = Literal["+", "-", "lump"]
 KINDS: tuple[Kind, ...] = ("+", "-", "lump")
 LINEAR_STEP = 1.0 / 60.0  # of the largest blow, between two rungs from a tenth of it on

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.studies.quantity_values import Real, Working
+from flipflow.studies.quantity_values import Working
 
 
 def branch_values(

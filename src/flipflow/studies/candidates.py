@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from flipflow.batch.reasons import FOUND
 from flipflow.batch.side_by_side import processors
+from flipflow.compiled.arrays import Real
 from flipflow.model.duty import Duty, Objective, SpringType
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import limit_bounds
@@ -26,7 +27,6 @@ from flipflow.model.vary import Choice, Interval
 from flipflow.studies.rubber_temperature import warmed_load
 from flipflow.studies.study_values import evaluate_loaded, jump_distance_loaded, one_motion_loaded
 
-Real = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 TARGET, MOTION, EVEN = "relative amplitude asked", "a stable motion", "a motion that does not lean"
 STRAIN, FORCE = "strain of the catalogue", "force of the catalogue"

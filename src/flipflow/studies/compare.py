@@ -222,10 +222,11 @@ def distinct_names(projects: Sequence[Project]) -> tuple[str, ...]:
     stems = [project.name for project in projects]
     if len(set(stems)) == len(stems):
         return tuple(stems)
-    return tuple(f"{name} ({_letter(k)})" for k, name in enumerate(names))
+    return tuple(f"{name} ({letter(k)})" for k, name in enumerate(names))
 
 
-def _letter(k: int) -> str:
+def letter(k: int) -> str:
+    """The letter that stands for a machine."""
     return LETTERS[k] if k < len(LETTERS) else str(k + 1)
 
 

@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.special_points import (
     CONTACT_BEGIN,
@@ -29,8 +30,6 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.studies.quantity_values import MOTION_VALUES
 from flipflow.studies.tilted_motion import TILT, TiltedMotion
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Asked = str | tuple[str, Coordinate]
 OMEGA = "omega"
 STATE, MULTIPLIERS = "state", "multipliers"

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.batch.run_chunks import checked_executor
+from flipflow.compiled.arrays import Real
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_path
 from flipflow.model.duty import Duty, SpringType
@@ -40,7 +40,6 @@ from flipflow.studies.design_search import (
 from flipflow.studies.design_store import search_store
 from flipflow.studies.tolerance import confidence_interval
 
-Real = NDArray[np.float64]
 SEARCHED, POLISHED = 0.7, 0.8  # shares of the work that are done then
 DIGITS = (5, 6, 7)  # of the fields of a proposal
 HALVINGS = 6  # of the way to a polished machine that leaves another motion or a jump too near

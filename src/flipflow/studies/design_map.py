@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.continue_bifurcation import continue_bifurcation
@@ -28,7 +29,6 @@ from flipflow.studies.landmarks import Landmarks, Response, analysed_range, land
 from flipflow.studies.loading import amplitude_from_below
 from flipflow.studies.rubber_temperature import air_notes, warmed_load, warming_known
 
-Real = NDArray[np.float64]
 GAP, STIFFNESS, OMEGA = "clearance", "stop_stiffness", "omega"
 CURVES_SHARE = 0.8  # of the work is done where the curves are followed
 

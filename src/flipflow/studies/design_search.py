@@ -26,11 +26,11 @@ from scipy.optimize import minimize, nnls
 
 from flipflow.batch.chunk_store import ChunkStore
 from flipflow.batch.run_chunks import run_chunks
-from flipflow.errors import Cancelled, MissingExtra
+from flipflow.compiled.arrays import Real
+from flipflow.errors import Cancelled, required
 from flipflow.studies.candidates import MET, TARGET, Judged, Space
 from flipflow.studies.design_store import SHARES, keep, looked_at
 
-Real = NDArray[np.float64]
 Tell = Callable[[float], None]
 POPULATION = 64
 GENERATIONS = 60
@@ -75,12 +75,11 @@ def search(
     MissingExtra
         When pymoo is not installed.
     """
-    try:
-        from pymoo.algorithms.moo.nsga2 import NSGA2  # noqa: PLC0415  an extra
-        from pymoo.core.evaluator import Evaluator  # noqa: PLC0415
-        from pymoo.core.problem import Problem  # noqa: PLC0415
-    except ModuleNotFoundError:
-        raise MissingExtra("A design needs pymoo: pip install 'flipflow[study]'.") from None
+    required("pymoo", "A design needs pymoo", "study")
+    from pymoo.algorithms.moo.nsga2 import NSGA2  # noqa: PLC0415  an extra
+    from pymoo.core.evaluator import Evaluator  # noqa: PLC0415
+    from pymoo.core.problem import Problem  # noqa: PLC0415
+
     size, goals, rules = len(space.genes), len(space.objectives), len(space.constraints)
 
     judging = _Judging(space, executor, kept)

@@ -10,16 +10,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.batch.chunk_store import FINISHED, ChunkStore, Layout, Variable, create_store
+from flipflow.compiled.arrays import Real
 from flipflow.model.duty import Duty
 from flipflow.studies.candidates import Space
 from flipflow.studies.documents import CODEC
 from flipflow.studies.study_plan import refuse_other
 
-Real = NDArray[np.float64]
 SCHEMA = "flipflow/design-search/1"
 SHARES = "share"
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.drive import Drive
@@ -22,7 +22,6 @@ from flipflow.transient.run_up import AT_SPEED
 from flipflow.transient.speed_run import unbalance_weight
 
 Interval = tuple[float, float]
-Real = NDArray[np.float64]
 Subject = Literal["speed", "torque at rest", "power", "resonance"]
 ELSEWHERE = 0.01  # of the working speed: farther away a drive settles at another speed
 SWING = 0.724611  # largest (1 - cos a) / a: a torque, over m0r g, that swings the unbalance over

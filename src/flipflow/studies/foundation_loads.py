@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind, checked_mapping, checked_text, checked_word
@@ -32,7 +32,6 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.results.result import Result
 from flipflow.transient.run_up import RunUp
 
-Real = NDArray[np.float64]
 Direction = Literal["along", "normal", "horizontal", "vertical"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 ORDERS = 3  # highest order of the shaft's speed of which amplitude and phase are told

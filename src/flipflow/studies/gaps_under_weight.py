@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from flipflow.continuation.branch import Branch
-from flipflow.continuation.special_points import CONTACT_BEGIN, DOUBLING
+from flipflow.continuation.special_points import DOUBLING
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.periodic.orbit import Orbit
-from flipflow.studies.landmarks import landmarks
+from flipflow.studies.landmarks import contact_speeds, landmarks
 
 SAMPLES = 4096  # times in a turn at which the forces of both sides are looked at
 
@@ -78,10 +78,7 @@ def _contact_speeds(screen: FlipFlowScreen, branch: Branch) -> dict[int, float]:
     """Where each side's contact begins, up to the last rising one before the main peak."""
     if not screen.has_stop or branch.omega.size == 0:
         return {}
-    first = landmarks(screen, branch).omega_cs
-    begins = branch.points_of(CONTACT_BEGIN)
-    last = max((point.position for point in begins if point.omega == first), default=-1.0)
-    found = {point.side: point.omega for point in begins if point.position <= last}
+    found = contact_speeds(branch, landmarks(screen, branch).omega_cs)
     # Sides that are alike begin together, and one point stands for both.
     if branch.system.symmetric and 1 in found:
         found[-1] = found[1]

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, checked_number, checked_speed, real
@@ -23,7 +23,6 @@ from flipflow.studies.attractors import Attractors
 from flipflow.studies.blows import Blows
 from flipflow.transient.settling import is_stable
 
-Real = NDArray[np.float64]
 PHASES = 60  # in each forcing period at which blows fall
 LONE_STRIDE = 6  # every so many phases serve where no other motion is known
 MOST_IMPULSE = 1e9  # kg m/s, largest impulse that may be asked for

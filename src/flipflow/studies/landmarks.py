@@ -40,6 +40,13 @@ def analysed_range(machine: Machine, speed: float | None = None) -> tuple[float,
     return min(low, 0.9 * speed), max(high, 1.1 * speed)
 
 
+def contact_speeds(branch: Branch, omega_cs: float | None) -> dict[int, float]:
+    """Where each side's contact begins, rad/s, by side: the last rising one up to ``omega_cs``."""
+    begins = branch.points_of(CONTACT_BEGIN)
+    last = max((point.position for point in begins if point.omega == omega_cs), default=-1.0)
+    return {point.side: point.omega for point in begins if point.position <= last}
+
+
 @dataclass(frozen=True)
 class Landmarks:
     """Characteristic frequencies of a machine and its operating region, all in rad/s.

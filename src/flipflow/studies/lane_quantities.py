@@ -8,13 +8,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.batch.lane_columns import LaneColumns
 from flipflow.batch.lane_readings import Asked, Readings
 from flipflow.batch.slope_readings import SlopesAsked
 from flipflow.batch.solutions import nothing_asked
 from flipflow.batch.variants import Batch
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.motion import phase_of
 from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.contact_law import NUMBER
@@ -23,9 +23,6 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.periodic.derivatives import SMOOTH_LAWS
 from flipflow.studies.quantity_values import MOTION_VALUES, Frame, vector_terms
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Peaks of vectors by name, and the quantities that are read off them.
 VECTORS: Mapping[str, tuple[str, ...]] = {

@@ -15,6 +15,7 @@ from flipflow.batch.lane_readings import Readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED, UNSTABLE
 from flipflow.batch.solutions import nearby_motions, solve_lanes, solve_slopes
 from flipflow.batch.variants import Batch, batches
+from flipflow.compiled.arrays import Int, Real
 from flipflow.continuation.frequency_response import formulation_of
 from flipflow.model.parameters import value_of, with_values
 from flipflow.model.quantities import BranchWord, Quantity
@@ -26,9 +27,6 @@ from flipflow.studies.lane_quantities import LaneMotions, LanePlan
 from flipflow.studies.quantity_values import Working, fields_of_rows, number_or_nan, plain
 from flipflow.studies.tilted_lanes import TiltedLanes
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Int = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
 Tell = Callable[[float], None]
 

@@ -6,14 +6,13 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.special_points import SYMMETRY
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 
-Real = NDArray[np.float64]
 SPEEDS = 41  # at which leaning motions are solved for, denser towards both ends
 SETTLING_TURNS = 600  # forcing periods waited for the motion that is pushed aside
 PUSH = 1e-2  # displacement by which it is pushed, over the characteristic length

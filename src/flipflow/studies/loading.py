@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
@@ -20,7 +20,6 @@ from flipflow.periodic.options import Method, checked_method
 from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 
-Real = NDArray[np.float64]
 Start = Literal["unloaded", "loaded"]
 SAMPLES = 121  # speeds over the operating region at which amplitudes are compared
 

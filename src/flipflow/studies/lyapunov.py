@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Real
 from flipflow.model.arguments import checked_count, checked_monitor, checked_speed
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import unit_in
@@ -17,7 +18,6 @@ from flipflow.results.result import Result
 from flipflow.transient.exponents import BATCHES, grown
 from flipflow.transient.settling import MAX_PERIODS, Settling, Word
 
-Real = NDArray[np.float64]
 MOST_PERIODS = 1_000_000  # forcing periods that may be asked for
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import frequency_response
-from flipflow.continuation.special_points import CONTACT_BEGIN
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_all, checked_interval, checked_monitor
 from flipflow.model.limits import Limits
@@ -18,7 +17,7 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.results.result import Result
 from flipflow.studies.feasible import Bound, CaseWindow, Intervals, case_window, common_window
-from flipflow.studies.landmarks import analysed_range, landmarks
+from flipflow.studies.landmarks import analysed_range, contact_speeds, landmarks
 
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
 JUMP_WORDS = "jump when the speed falls (w_lb)"
@@ -86,9 +85,7 @@ class OperatingRegion(Result):
         The last rising one up to ``omega_cs``. With equal gaps both sides begin together and only
         +1 is there; a side that is not touched up to ``omega_cs`` is left out.
         """
-        begins = self.branch.points_of(CONTACT_BEGIN)
-        last = max((p.position for p in begins if p.omega == self.omega_cs), default=-1.0)
-        return {p.side: p.omega for p in begins if p.position <= last}
+        return contact_speeds(self.branch, self.omega_cs)
 
     @property
     def ends(self) -> tuple[str, str]:

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_count, checked_kind, checked_speed
 from flipflow.model.screen import is_screen, unit_in
@@ -17,8 +18,6 @@ from flipflow.results.result import Result
 from flipflow.transient.exponents import with_word
 from flipflow.transient.history import History
 from flipflow.transient.settling import MAX_PERIODS, UNDECIDED, Settling, Word
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

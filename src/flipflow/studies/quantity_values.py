@@ -15,6 +15,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.contact_free import contact_free
 from flipflow.dynamics.motion import longest_on
 from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
@@ -27,8 +28,6 @@ from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.frozen import Frozen
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Values = float | Real
 Harmonics = complex | NDArray[Any]
 Frame = Literal["main", "floating"]

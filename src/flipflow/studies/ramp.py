@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.frequency_response import frequency_response
@@ -25,7 +25,6 @@ from flipflow.transient.history import History
 from flipflow.transient.speed_run import Start, normal_direction, run_history, swings
 from flipflow.transient.startup import MOST_SECONDS
 
-Real = NDArray[np.float64]
 BEYOND = 1e-4  # relative distance past a fold at which the motion after the jump is looked for
 WIDER = 0.15  # share by which the branch reaches beyond the speeds of the ramp
 SHORTEST = 1e-6  # s, shortest ramp, far less than any machine's turn

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
@@ -25,7 +26,6 @@ from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.studies.loading import amplitude_from_below
 
-Real = NDArray[np.float64]
 FREQUENCIES = 9  # equally spaced speeds of the common region at which members are compared
 
 

@@ -16,8 +16,8 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Int, Real
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.load_case import case_words
@@ -27,8 +27,6 @@ from flipflow.periodic.options import Method
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import analysed_range
 
-Real = NDArray[np.float64]
-Int = NDArray[np.int64]
 RISE = "shear_temperature_rise"
 NEEDED = "shear_springs.conductance or pieces"
 AS_AIR = "the rubber is taken to be as warm as the air"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Real
 from flipflow.model.arguments import (
     checked_count,
     checked_generator,
@@ -32,8 +33,6 @@ from flipflow.studies.sensitivity_samples import (
     question_of,
 )
 from flipflow.studies.sobol import LEAST_GROUPS, SobolIndices, saltelli_sample, sobol_indices
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

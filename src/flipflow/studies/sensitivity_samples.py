@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.side_by_side import processors, side_by_side
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
@@ -45,7 +46,6 @@ from flipflow.studies.quantity_values import (
     plain,
 )
 
-Real = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
 STOP_FIELDS = {"stop_stiffness", "stop_damping", "clearance", "clearance_minus", "stop_law"}
 CHUNK_ROWS = 16  # samples that one task of a thread evaluates

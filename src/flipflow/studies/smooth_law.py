@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.elements import ClearanceSpring
 from flipflow.model.smooth import SHARPNESS, smooth_force
 
-Real = NDArray[np.float64]
 UNSWITCHED = 1e-3  # share of the force that the smooth law has not switched at its layer's edge
 POINTS = 20_001  # positions over the stroke, besides those in the layers
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.errors import MissingExtra
+from flipflow.compiled.arrays import Real
+from flipflow.errors import required
 
-Real = NDArray[np.float64]
 RESAMPLES = 100  # of the bootstrap that gives the confidence intervals
 NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %
 # Spread below this share of the largest value is rounding, not variance.
@@ -162,9 +162,4 @@ def _resampled_variance(A: Real, B: Real, weights: Real) -> Real:
 
 
 def _salib(module: str) -> Any:
-    import importlib  # noqa: PLC0415  beside what it is needed for
-
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingExtra("Sobol indices need SALib: pip install 'flipflow[study]'.") from error
+    return required(module, "Sobol indices need SALib", "study")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from flipflow.model.constants import RPM
 from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import capitalized, rpm
 from flipflow.studies.drive_check import Finding
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.transient.run_up import RunUp
@@ -74,4 +74,4 @@ def _success(run: RunUp, cases: tuple[CaseRuns, ...]) -> str:
 
 def _remedies(findings: tuple[Finding, ...]) -> str:
     """The findings on the drive as sentences of their own."""
-    return "".join(f" {one.sentence[:1].upper()}{one.sentence[1:]}" for one in findings)
+    return "".join(f" {capitalized(one.sentence)}" for one in findings)

@@ -24,6 +24,7 @@ from flipflow.batch.chunk_store import (
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REASONS
 from flipflow.batch.run_chunks import executor_or_threads, run_chunks
 from flipflow.batch.side_by_side import processors
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError, StoreError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_path
 from flipflow.model.monitor import Monitor
@@ -49,7 +50,6 @@ from flipflow.studies.study_plan import (
     refuse_other,
 )
 
-Real = NDArray[np.float64]
 Words = NDArray[np.str_]
 MOST_NAMED = 4  # damaged chunks that a sentence names
 BEGIN = "study"

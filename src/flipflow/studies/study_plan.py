@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from flipflow import __version__
 from flipflow.batch.chunk_store import ChunkStore, Layout, Variable
 from flipflow.batch.reasons import NOT_COMPUTED
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError, StoreError
 from flipflow.model.arguments import (
     checked_all,
@@ -33,7 +34,6 @@ from flipflow.studies.documents import CODEC
 from flipflow.studies.lane_values import on_lanes, slope_key
 from flipflow.studies.study_values import evaluate_loaded
 
-Real = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
 SCHEMA = "flipflow/study-store/1"
 REASON = "reason"

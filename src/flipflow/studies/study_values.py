@@ -17,6 +17,7 @@ from flipflow.batch.reasons import (
     REFUSED,
     UNSETTLED,
 )
+from flipflow.compiled.arrays import Real
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.fields import FIELD
 from flipflow.model.parameters import with_values
@@ -49,7 +50,6 @@ from flipflow.studies.sensitivity_samples import (
 )
 from flipflow.studies.tilted_motion import TILT
 
-Real = NDArray[np.float64]
 Reasons = NDArray[np.int8]
 Values = tuple[dict[str, Real], Reasons]
 

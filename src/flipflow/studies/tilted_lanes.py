@@ -11,18 +11,15 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.batch.lane_readings import Readings
 from flipflow.batch.slope_readings import AGREE, TIED, Slopes
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.motion import phase_of
 from flipflow.model.quantities import Quantity
 from flipflow.studies.lane_quantities import LanePlan
 from flipflow.studies.quantity_values import MOTION_VALUES, Frame
 from flipflow.studies.tilted_motion import TILT, beside_zero
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flipflow.batch.slope_readings import AGREE, TIED
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import Named, stop_columns
 from flipflow.errors import IncompleteError
 from flipflow.model.contact_law import WHOLE, carries_force, engaged_side, shares
@@ -31,8 +32,6 @@ from flipflow.periodic.derivatives import MotionDerivatives
 from flipflow.periodic.orbit import GAUSS_POINTS, Orbit
 from flipflow.studies.quantity_values import Frame, number_or_nan
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Pieces = NDArray[np.intp]
 TILT = 1e-60  # size of an imaginary part, as a share of the derivative it stands for
 LOWER = 0.01  # share by which a sample of the grid may lie below the highest and lead to it

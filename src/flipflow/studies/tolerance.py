@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.batch.reasons import FOUND
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind
 from flipflow.model.limits import PASSAGES, PASSING_FIELDS, Limits, limit_bounds
@@ -20,7 +21,6 @@ from flipflow.model.vary import Choice, Distribution, Interval, Normal
 from flipflow.results.result import Result
 from flipflow.studies.study import Study
 
-Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 CONFIDENCE = 0.95
 # Fewer machines say little of the share of those that pass.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_index, checked_monitor, checked_word
 from flipflow.model.monitor import Monitor
@@ -27,8 +28,6 @@ from flipflow.studies.sensitivity_samples import (
     question_of,
 )
 
-Real = NDArray[np.float64]
-Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 End = Literal["least", "greatest"]
 SIGNS: dict[End, float] = {"least": -1.0, "greatest": 1.0}

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
@@ -17,7 +17,6 @@ from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
 from flipflow.transient.sampling import PANEL, Budget, Changes, Table, sample_motion
 
-Real = NDArray[np.float64]
 GAUSS_NODES = 16  # in each panel over which powers are integrated
 TURNS_A_CALL = 32  # turns calculated at once, between two calls of the monitor
 WORK_A_CALL = 4e5  # Gauss panels times N^2 at most, a tenth of a second: the work at low speeds

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile
@@ -28,7 +28,6 @@ from flipflow.transient.speed_run import (
 )
 from flipflow.transient.time_stepping import CREEP
 
-Real = NDArray[np.float64]
 Outcome = Literal[
     "reached", "captured", "short", "not started", "unfinished", "stopped", "followed"
 ]

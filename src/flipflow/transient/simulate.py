@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
@@ -30,7 +31,6 @@ from flipflow.transient.history import ContactChange, History
 from flipflow.transient.recording import Recording, work_rate
 from flipflow.transient.settling import MAX_PERIODS, Settling
 
-Real = NDArray[np.float64]
 SAMPLES_A_TURN = 128  # default times in each forcing period
 MOST_PERIODS = 1_000_000  # forcing periods that may be asked for
 MOST_WORK = 5e10  # as work_rate counts it: some hours

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.contact_law import engaged_side
@@ -28,7 +28,6 @@ from flipflow.transient.time_stepping import (
     UnbalanceWeight,
 )
 
-Real = NDArray[np.float64]
 MOST_ROWS = 400_000  # rows after which a run is ended
 SETTLED = 1e-7  # change of the state over a period, relative to it, within which it has settled
 MOST_TURNS = 2000  # turns waited for a motion to settle

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.compiled.arrays import Real
 from flipflow.errors import Cancelled
 from flipflow.model.arguments import checked_count, checked_monitor, checked_speeds, refuse_pair
 from flipflow.model.monitor import Monitor
@@ -22,8 +23,6 @@ from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.transient.exponents import with_word
 from flipflow.transient.settling import MAX_PERIODS, MOST_TURNS, Settled, Settling, Word
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

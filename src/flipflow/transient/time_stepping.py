@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import stops_of
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_number, checked_positive, checked_word
@@ -33,7 +34,6 @@ from flipflow.transient.shaft_equations import (
 )
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4, Tableau
 
-Real = NDArray[np.float64]
 Formula = Literal["dopri5", "rk4"]
 TABLEAUX: dict[str, Tableau] = {"dopri5": DORMAND_PRINCE, "rk4": RK4}
 CHUNK = 2048  # rows of the record, after which a stretch is handed over
