@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -178,12 +177,6 @@ class Branch(Frozen, Result):
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
         return self.formulation.system
-
-    @property
-    def solver(self) -> object:
-        """A solver of the branch's equations, made anew; use ``formulation.solver()``."""
-        warnings.warn("Branch.solver: use Branch.formulation.solver()", DeprecationWarning, 2)
-        return self.formulation.solver()
 
     @property
     def periods(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,12 +75,6 @@ class Motion:
     rate: Complex
     harmonic: Complex
     order: Real
-
-    @property
-    def pieces(self) -> Motion:
-        """The motion itself, which holds start, length and regime of its pieces."""
-        warnings.warn("Motion.pieces: start, length, regime stand in Motion", DeprecationWarning, 2)
-        return self
 
     def derivative(self, t: ArrayLike, order: int) -> Real:
         """x, x' or x'' (order 0, 1, 2) at times t, shape (..., N)."""

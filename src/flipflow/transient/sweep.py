@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -86,12 +85,6 @@ class Sweep(Frozen, Result):
     def system(self) -> MechanicalSystem:
         """The machine as it was solved."""
         return self.formulation.system
-
-    @property
-    def solver(self) -> object:
-        """A solver of the motions' equations, made anew; use ``formulation.solver()``."""
-        warnings.warn("Sweep.solver: use Sweep.formulation.solver()", DeprecationWarning, 2)
-        return self.formulation.solver()
 
     @property
     def settled(self) -> NDArray[np.bool_]:
