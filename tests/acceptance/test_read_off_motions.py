@@ -91,9 +91,19 @@ def test_a_motion_is_found_whatever_other_speeds_are_asked() -> None:
     w = 0.8519
     alone = ff.study(machine, {"forcing": np.array([1.0, 1.0])}, "amplitude[0]", omega=[w])
     both = ff.study(machine, {"forcing": np.array([1.0, 1.0])}, "amplitude[0]", omega=[0.5 * w, w])
-    one, two = (study.values["amplitude[0]"][0, 0, -1] for study in (alone, both))
+    twice = ff.study(machine, {"forcing": np.array([1.0, 1.0])}, "amplitude[0]", omega=[w, w])
+    told = [study.values["amplitude[0]"][0, 0, -1] for study in (alone, both, twice)]
     stable = [o for o in ff.periodic_orbits(machine, w) if o.stable and o.periods == 1]
-    close("amplitude", [one, two], [stable[0].amplitude(0)] * 2, rel=1e-9)
+    close("amplitude", told, [stable[0].amplitude(0)] * 3, rel=1e-9)
+
+
+def test_a_change_of_period_jumps_as_far_on_the_way_out_as_on_the_way_in() -> None:
+    """In steps so long that a motion of two periods lies far from that of one: both ways alike."""
+    speeds = DOUBLING + np.array([-5e-3, -3e-3, -1e-3, 1e-3])
+    up = ff.sweep(ONE_SIDED, speeds)
+    down = ff.sweep(ONE_SIDED, speeds[::-1], initial=up.rows[-1].state)
+    assert set(up.periods) == set(down.periods) == {1, 2}
+    assert len(up.jumps) == len(down.jumps)
 
 
 def test_a_smooth_change_of_period_is_no_jump() -> None:
@@ -130,6 +140,21 @@ def test_a_simulation_tells_the_greatest_force_between_its_times() -> None:
     assert np.all(history.peak >= np.abs(history.force))
 
 
+def test_each_peak_is_that_since_the_time_before() -> None:
+    """One contact lasts through many times, or begins before the first of them."""
+    stop = ff.ClearanceSpring([1.0], 10.0, 0.5, 0.3, math.inf)
+    push = ff.HarmonicForce([0.5], order=3)
+    system = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], [stop], push, static_force=[5.0])
+    turn = 2.0 * math.pi
+    t = np.linspace(30.0 * turn, 32.0 * turn, 7)
+    coarse = ff.simulate(system, 1.0, 32, t=t)
+    fine = np.linspace(t[0], t[-1], 6 * 400 + 1)
+    force = np.abs(ff.simulate(system, 1.0, 32, t=fine).force[:, 0])
+    most = [force[k * 400 : (k + 1) * 400 + 1].max() for k in range(6)]
+    close("peaks", coarse.peak[1:, 0], most, rel=1e-4)
+    close("first", coarse.peak[0, 0], force[0], rel=1e-9)
+
+
 def test_a_worst_case_beside_machines_without_a_value_says_what_may_be_missing() -> None:
     screen = ff.load("ffs0827").replace(
         main_mass=2018.91, floating_mass=713.58, eccentric_moment=4.78993,
@@ -143,6 +168,7 @@ def test_a_worst_case_beside_machines_without_a_value_says_what_may_be_missing()
     sample = ff.study(
         screen, box, "relative_amplitude", omega=70.967286, sampling=ff.Sample(n=1024)
     )
+    assert np.isfinite(worst.error[0])
     assert worst.greatest[0] + worst.error[0] >= np.nanmax(sample.values["relative_amplitude"])
 
 
@@ -160,7 +186,10 @@ def test_what_nothing_excites_once_a_turn_has_no_phase(order: int) -> None:
     system = ff.MechanicalSystem(
         [[1.0]], [[0.1]], [[1.0]], [stop], ff.HarmonicForce([0.5], order=order)
     )
-    orbit = ff.frequency_response(system, (0.2, 0.5)).orbits_at(0.35)[0]
+    branch = ff.frequency_response(system, (0.2, 0.5))
+    orbit = branch.orbits_at(0.35)[0]
     assert math.isnan(orbit.phase(0))
+    assert np.isnan(branch.phase(0)).all()
+    assert np.isnan(orbit.sensitivity(("phase", 0), ["forcing"])).all()
     study = ff.study(system, {"forcing": np.array([1.0, 1.0])}, "phase[0]", omega=0.35)
     assert np.isnan(study.values["phase[0]"]).all()

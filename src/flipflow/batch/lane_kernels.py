@@ -110,7 +110,7 @@ def run_lane(
     half, lost, jumps = even, False, 0
     for f in range(omega.shape[0]):
         begun = not math.isnan(work.omega[0])
-        rising = f + 1 == omega.shape[0] or omega[f + 1] > omega[f]
+        rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
             half = even and guess_even[f] != 0
             begun = start_from_guess(problem_of(machine, half, length), work, omega[f], guess[f])

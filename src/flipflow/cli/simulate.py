@@ -127,6 +127,7 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
     out.print(f"{'':<18}{'last turn':>14}{heads}")
     for which in history.system.named:
         x = history.displacement(which)
+        x = x - x[0]
         times, ends = turning_points(history.t, x, history.velocity(which))
         t, x = np.append(history.t, times), np.append(x, ends)
         here = x[t >= begin]

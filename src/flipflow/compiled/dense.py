@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flipflow.compiled.compile import kernel
 
-INVERSE_STEPS = 3  # of inverse iteration, each a solve: the size is then right to a few per cent
+INVERSE_STEPS = 3  # of inverse iteration, each a solve: right to a factor of 2 where it is small
 
 
 @kernel
@@ -67,7 +67,7 @@ def lu_sign(A: NDArray[np.float64], pivot: NDArray[np.int64]) -> float:
 
 @kernel
 def lu_spread(A: NDArray[np.float64], pivot: NDArray[np.int64], b: NDArray[np.float64]) -> float:
-    """How near the factored matrix is to a singular one, as a share of its largest pivot.
+    """Size of the factored matrix's smallest eigenvalue, as a share of its largest pivot.
 
     By inverse iteration, in scratch b: no pivot of a matrix that is nearly singular need be small.
     """

@@ -18,6 +18,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
 from flipflow.continuation.refinement import SHARE_TOLERANCE
 from flipflow.continuation.special_points import FOLD
+from flipflow.dynamics.motion import phase_of
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import (
     checked_index,
@@ -232,8 +233,12 @@ class Branch(Frozen, Result):
         return np.asarray((high - low) / 2.0)
 
     def phase(self, which: Coordinate) -> Real:
-        """Phase of the first harmonic against the force in rad, (n,); positive: it leads."""
-        return np.asarray(np.angle(self._extremes(which)[2]))
+        """Phase of the first harmonic against the force in rad, (n,); positive: it leads.
+
+        NaN where there is none, as in a motion that nothing excites once a turn.
+        """
+        low, high, first = self._extremes(which)
+        return phase_of(first, 0.5 * (high - low))
 
     def orbit(self, i: int) -> Orbit:
         """The motion at point i of the branch."""

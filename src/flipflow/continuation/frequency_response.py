@@ -81,7 +81,7 @@ def frequency_response(
     until it leaves the interval. Every point has its stability and error, every special point is
     refined. Motions detached from this branch are not seen. A machine that stands on its stops has
     no motion without contact: there the branch is that of the motion into which it settles or,
-    where that one turns back, the one that leads down from the upper end.
+    where that one turns back, one that motions at higher frequencies lead down to.
 
     Parameters
     ----------

@@ -461,6 +461,17 @@ def force_peak(
     machine: MachineArrays, flow: Flow, motion: GapMotion, count: int, e: int, j: int
 ) -> tuple[float, float]:
     """Greatest force of stop j during segment e, and when; its row becomes the force."""
+    set_force(machine, flow, motion, count, e, j)
+    prepare_search(motion, count)
+    low, high, at_low, at_high = extremes(motion, count, j, flow.length[e])
+    return (high, at_high) if high > -low else (-low, at_low)
+
+
+@kernel
+def set_force(
+    machine: MachineArrays, flow: Flow, motion: GapMotion, count: int, e: int, j: int
+) -> None:
+    """Make row j of a segment's motions along the stops the force of stop j."""
     stops, regime = machine.stops, flow.regimes[e, j]
     k = stiffness_share(stops, j, regime) * stops.stiffness[j]
     c = damping_share(stops, j, regime) * stops.damping[j]
@@ -469,6 +480,3 @@ def force_peak(
     motion.drift[j] *= k
     for i in range(count):
         motion.amplitude[j, i] *= k + c * motion.rate[i]
-    prepare_search(motion, count)
-    low, high, at_low, at_high = extremes(motion, count, j, flow.length[e])
-    return (high, at_high) if high > -low else (-low, at_low)

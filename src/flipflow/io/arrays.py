@@ -284,6 +284,12 @@ def _(history: History) -> Arrays:
         for name, (values, unit) in known.items()
         if values is not None
     }
+    stops = ("time", "stop")
+    peak = (
+        {}
+        if history.peak is None
+        else {"stop_force_peak": Variable(stops, history.peak, units["force"])}
+    )
     return Arrays(
         "Motion over time",
         "time",
@@ -293,6 +299,7 @@ def _(history: History) -> Arrays:
             "velocity": each("time", system, history.velocity, units["velocity"]),
             "acceleration": each("time", system, history.acceleration, units["acceleration"]),
             "stop_force": Variable(("time", "stop"), history.force, units["force"]),
+            **peak,
             "omega": column("time", history.omega, units["frequency"]),
             "angle": column("time", history.angle, "rad"),
             **more,

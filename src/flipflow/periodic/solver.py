@@ -23,6 +23,7 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError, InputError
+from flipflow.model.static_rest import ROUNDING
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.readings import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
@@ -509,7 +510,8 @@ def pressed_depths(system: MechanicalSystem, rest: Real) -> Iterator[float]:
     for spring in system.springs:
         y = float(spring.direction @ rest)
         depth = max(y - spring.gaps[0], -y - spring.gaps[1])
-        if spring.acts and depth > 0.0:
+        rounding = ROUNDING * float(np.abs(spring.direction) @ np.abs(rest))
+        if spring.acts and depth > rounding:
             yield depth
     yield math.inf
 

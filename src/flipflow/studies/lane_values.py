@@ -139,7 +139,7 @@ def jump_distance(
     """Distance |omega - jump| / jump of S variants from their nearest jump, (S,), at most ``most``.
 
     Lanes rise and fall through rings around omega. Where they jump, part or meet is a jump; where
-    a motion begins to lean, or gives way to one of two periods, it goes on smoothly, and is none.
+    a motion begins to lean, or gives way to one of more periods, it goes on, and is none.
     Distances are rounded down to a ring's edge, and 0 where two motions or none stand at omega. A
     jump and the one back may be missed where they lie within one ring.
 
@@ -244,7 +244,10 @@ class _Question:
     ) -> dict[str, Real]:
         """Quantities (L, K) read off the orbit of each motion that was found."""
         values = {one.name: np.full(found.reason.shape, np.nan) for one in quantities}
-        for lane, k in np.argwhere(found.reason == FOUND).tolist():
+        motions = np.argwhere(found.reason == FOUND).tolist()
+        for done, (lane, k) in enumerate(motions):
+            if self.tell is not None:
+                self.tell(done / len(motions))
             row = self.batch.rows[lane]
             own = {name: plain(column[row]) for name, column in self.columns.items()}
             machine = with_values(self.machine, own)

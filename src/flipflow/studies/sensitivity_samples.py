@@ -36,7 +36,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
-from flipflow.studies.lane_values import lane_values, of_one_motion, on_lanes
+from flipflow.studies.lane_values import lane_values, of_one_motion
 from flipflow.studies.quantity_values import (
     MOTION_VALUES,
     ContactFree,
@@ -148,7 +148,7 @@ def closed_form_values(question: Question, columns: Columns, omega: Real) -> Rea
 
 def checked_threads(question: Question, threads: object) -> int:
     """Threads as asked for; None: every processor for lanes, which leave the interpreter free."""
-    free = processors() if on_lanes(question.machine, question.quantity) else 1
+    free = processors() if of_one_motion(question.quantity) else 1
     return checked_count("threads", free if threads is None else threads, 256)
 
 

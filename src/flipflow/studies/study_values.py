@@ -368,7 +368,7 @@ def _measure(
     motion = [one for one in asked if one.of == "motion"]
     if not motion:
         return
-    for j, working in enumerate(workings(question, machine, response if whole else None)):
+    for j, working in enumerate(workings(question, machine, response)):
         if working is None:
             reasons[j] = NO_MOTION
             continue

@@ -71,7 +71,7 @@ class TiltedLanes:
         with np.errstate(invalid="ignore", divide="ignore"):  # what does not move has no phase
             turned = (slope / harmonic).imag
         phase = phase_of(harmonic, self.amplitude(which).real)
-        return np.asarray(phase + 1j * TILT * turned)
+        return np.asarray(phase + 1j * TILT * np.where(np.isnan(phase), np.nan, turned))
 
     def offset(self) -> Complex:
         low, high = self._extremes("relative")

@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 from flipflow.batch.slope_readings import AGREE, TIED
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import Named, stop_columns
+from flipflow.dynamics.motion import phase_of
 from flipflow.errors import IncompleteError
 from flipflow.model.contact_law import WHOLE, carries_force, engaged_side, shares
 from flipflow.model.elements import ClearanceSpring
@@ -140,8 +141,9 @@ class TiltedMotion:
         cosine = self._average(lambda path: (d @ path.x) * path.cos)
         sine = self._average(lambda path: (d @ path.x) * path.sin)
         harmonic = cosine.real - 1j * sine.real
-        slope = (cosine.imag - 1j * sine.imag) / harmonic
-        return np.asarray(np.angle(harmonic) + 1j * slope.imag)
+        phase = phase_of(harmonic, self.amplitude(which).real)
+        slope = ((cosine.imag - 1j * sine.imag) / harmonic).imag
+        return np.asarray(phase + 1j * np.where(np.isnan(phase), np.nan, slope))
 
     def offset(self) -> Complex:
         """How far the middle of the relative motion lies beside zero, in m."""

@@ -67,7 +67,8 @@ class WorstCase(Result):
         Frequencies analysed where the quantity is one of the whole response, rad/s.
     error
         By how much an end may lie farther out between machines that were looked at, SI, (K,), by
-        what those beside it show. Where the drop beside it is smooth, far less is missing.
+        what those beside it show. Where the drop beside it is smooth, far less is missing; infinite
+        where no machine beside it has a value.
     looked_at
         Number of machines that were solved.
     notes
@@ -380,7 +381,7 @@ class Search:
                     beside = [self._row.get(one[j].tobytes(), -1) for one in sides]
                     heights = sign * self.values[[best, *beside], k]
                     if min(beside) >= 0 and np.isfinite(heights[0]):
-                        yield e, k, j, *np.nan_to_num(heights, nan=-np.inf).tolist()
+                        yield e, k, j, *np.where(np.isnan(heights), -np.inf, heights).tolist()
 
     @property
     def _told(self) -> str:

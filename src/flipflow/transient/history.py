@@ -74,7 +74,8 @@ class History(Result):
     works
         Running totals in J of what stands in ``energy``, (n,) each, where they were kept.
     peak
-        Greatest size of each stop's force since the row before in N, (n, m), where it was sought.
+        Greatest size of each stop's force since the row before in N, (n, m), where it was sought;
+        in the first row that of its own force.
     """
 
     system: MechanicalSystem

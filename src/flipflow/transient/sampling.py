@@ -8,8 +8,9 @@ from typing import NamedTuple
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
+from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, force_peak, run_flow, segment_motion, segment_state
+from flipflow.dynamics.flow import Flow, run_flow, segment_motion, segment_state, set_force
 from flipflow.dynamics.law import force, kind
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
@@ -79,10 +80,11 @@ def sample_motion(
             last = flow.start[e] + flow.length[e]
             if e == flow.segments[0] - 1:
                 last = t + duration if t + duration < end else math.inf
+            before = row
             while row < table.t.shape[0] and table.t[row] <= last and table.t[row] <= end:
                 sample(problem, work, e, omega, row, table)
                 row += 1
-            add_peaks(problem.machine, flow, e, omega, row, table)
+            add_peaks(problem.machine, flow, e, omega, before, row, table)
             add_work(problem, work, e, omega, budget)
             if e > 0:
                 note_change(flow, e, changes)
@@ -122,21 +124,39 @@ def sample(
 
 @kernel
 def add_peaks(
-    machine: MachineArrays, flow: Flow, e: int, omega: float, row: int, table: Table
+    machine: MachineArrays, flow: Flow, e: int, omega: float, first: int, row: int, table: Table
 ) -> None:
-    """Greatest forces of the stops over segment e, after which ``row`` is the next one."""
-    count = 0
+    """Greatest forces of the stops over segment e, in which rows from ``first`` to ``row`` - 1 lie.
+
+    What comes before the first row of all is nobody's.
+    """
+    motion, count = flow.motion, 0
+    last = min(row, table.t.shape[0] - 1)
     for j in range(table.peak.shape[1]):
         if kind(machine.stops, j, flow.regimes[e, j]) == 0:
             continue
         if count == 0:
-            count = segment_motion(machine, flow, e, omega, machine.direction, flow.motion)
-        peak, at = force_peak(machine, flow, flow.motion, count, e, j)
-        r, when = row, flow.start[e] + at
-        while r > 0 and table.t[r - 1] >= when:
-            r -= 1
-        if r < table.t.shape[0]:
-            table.peak[r, j] = max(table.peak[r, j], peak)
+            count = segment_motion(machine, flow, e, omega, machine.direction, motion)
+        set_force(machine, flow, motion, count, e, j)
+        begin = 0.0
+        for r in range(first, last + 1):
+            end = flow.length[e]
+            if r < row:
+                end = min(max(table.t[r] - flow.start[e], 0.0), end)
+            if end > begin and r > 0:
+                prepare_search(motion, count)
+                low, high, _, _ = extremes(motion, count, j, end - begin)
+                table.peak[r, j] = max(table.peak[r, j], high, -low)
+            go_on(motion, count, j, end - begin)
+            begin = end
+
+
+@kernel(inline=True)
+def go_on(motion: GapMotion, count: int, j: int, elapsed: float) -> None:
+    """Let row j of sums of exponentials begin later."""
+    motion.offset[j] += motion.drift[j] * elapsed
+    for i in range(count):
+        motion.amplitude[j, i] *= exponential(motion.rate[i] * elapsed)
 
 
 @kernel(inline=True)

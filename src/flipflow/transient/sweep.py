@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -300,5 +302,12 @@ def _leads(step: Step, point: Point, value: float, to: Settled) -> bool:
     if followed is None:
         return False
     share = JUMP_SHARE * settling.size(to.recent, omega)
-    images = settling.phases(followed)
-    return any(settling.distance(image, to.state, omega) <= share for image in images)
+    one, other = settling.phases(followed), settling.phases(cast("Point", to.point))
+    turns = range(math.lcm(len(one), len(other)))
+    return any(
+        all(
+            settling.distance(one[(k + shift) % len(one)], other[k % len(other)], omega) <= share
+            for k in turns
+        )
+        for shift in range(len(one))
+    )
