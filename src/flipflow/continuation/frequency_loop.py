@@ -67,6 +67,7 @@ MET = 1e-3  # distance from that point of a branch that has
 CONTACT_STEP = 0.03  # longest step that may change the contacts of a turn
 STRAND_STEP = 1e-4  # longest step that may change the sign of det [J; tangent]
 CROSSING_STEP = 1e-2  # the same where the branch goes straight on
+STRAIGHT_STEPS = (1e-2, 1e-4, 1e-6)  # tried along the chord where tangents mix
 STRAIGHT = 0.9999  # cosine between the tangents from which on it does
 STRAIGHT_MOST = 1e-3  # largest distance from the guess for that, as a share of the step
 CROSSING = 1e-2  # how near to singular that matrix is where others may cross
@@ -348,7 +349,50 @@ def attempt(
     if step > CORNER_STEP:
         return 0.0, False, iterations
     step = turn_corner(problem, scratch, work, branch, p - 1, step, course)
+    if step == 0.0 and reason == REASON_STRAND:
+        step = go_straight(problem, scratch, work, branch, p - 1, course)
     return step, False, NEWTON_FEW
+
+
+@kernel
+def go_straight(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, course: Course
+) -> float:
+    """Go on from point p along the chord behind it; the step, 0 if that leads nowhere.
+
+    Right where another branch crosses the tangents of both mix, however short the next step is.
+    """
+    chord = chord_behind(work)
+    if not chord > 0.0:
+        return 0.0
+    for k in range(work.b.shape[0]):
+        work.border[k] = work.b[k] / chord
+    for step in STRAIGHT_STEPS:
+        for k in range(work.b.shape[0]):
+            work.before[k] = work.border[k]
+            work.guess[k] = work.here[k] + step * work.before[k] * work.scale[k]
+        code, _ = correct(problem, scratch, work, TOLERATED * step, STALLED * step)
+        if code == status.OK and keeps_straight(problem, scratch, work, branch, p, step, course):
+            return step
+    recall(problem, work, course)
+    return 0.0
+
+
+@kernel
+def keeps_straight(
+    problem: Any, scratch: Any, work: Corrector, branch: Record, p: int, step: float,
+    course: Course,
+) -> bool:  # fmt: skip
+    """Whether a corrected step from point p goes straight on to a motion of the same kind."""
+    straight = in_bounds(work, course) and astray(work) < STRAIGHT_MOST * step
+    if not straight or signature(problem, scratch) != branch.signature[p]:
+        return False
+    if tangent_ahead(work) < STRAIGHT:
+        return False
+    depths(problem, scratch, float(work.w[work.r.shape[0]]), work.depth)
+    depth = branch.depth[p]
+    leans = begins_to_lean(problem, scratch, work, depth, step, False)
+    return not leans and not becomes_even(work, depth, step)
 
 
 @kernel
