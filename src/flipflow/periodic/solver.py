@@ -507,7 +507,7 @@ def resting_position(system: MechanicalSystem) -> Real:
 
 def pressed_depths(system: MechanicalSystem, rest: Real) -> Iterator[float]:
     """How deep in m the machine lies in the stops on which it rests; infinity at last."""
-    for spring in system.springs:
+    for spring in system.springs if rest.any() else ():
         y = float(spring.direction @ rest)
         depth = max(y - spring.gaps[0], -y - spring.gaps[1])
         rounding = ROUNDING * float(np.abs(spring.direction) @ np.abs(rest))
