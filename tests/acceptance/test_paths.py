@@ -190,6 +190,8 @@ DRAWN = 1_690_858_624  # a seed of benchmarks/paths.py, of which these did not r
         ("paper", 0.0, 293, 1948909184),
         ("paper", 1.0, 204, 201260871),
         ("paper", 0.15, 271, 201260871),
+        # A step over a sharp corner landed on the other side, and led back over it.
+        ("paper", 0.0, 92, 221801667),
         # Tangents mix so far around a crossing that no short step leads on: the chord does.
         ("undamped-rebound", 1.0, 312, 221801667),
         ("undamped-rebound", 0.05, 92, 221801667),

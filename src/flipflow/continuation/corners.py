@@ -134,6 +134,19 @@ def keeps_even(work: Corrector, tangent: Real) -> bool:
 
 
 @kernel
+def runs_back(problem: Any, scratch: Any, work: Corrector, contacts: int, step: float) -> bool:
+    """Whether a step over a corner has landed behind it, so that its tangent leads back there.
+
+    Where the branch turns sharply at the corner, what lies ahead has other contacts again.
+    """
+    here, along = work.w, work.tangent
+    ahead = contacts_beside(problem, scratch, work, here, along, step) == contacts
+    behind = contacts_beside(problem, scratch, work, here, along, -step) == contacts
+    residual(problem, scratch, work.w, float(work.w[work.r.shape[0]]), work.r, work.J)
+    return behind and not ahead
+
+
+@kernel
 def orient(problem: Any, scratch: Any, work: Corrector, contacts: int, step: float) -> None:
     """Let the tangent of a point with new contacts lead to where these stay.
 

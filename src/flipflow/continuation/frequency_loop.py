@@ -20,6 +20,7 @@ from flipflow.continuation.corners import (
     begins_to_lean,
     distance,
     orient,
+    runs_back,
     turn_corner,
 )
 from flipflow.continuation.correction import (
@@ -203,7 +204,8 @@ def judge(
     depth = branch.depth[p]
     leans = begins_to_lean(problem, scratch, work, depth, step, changed)
     other_strand = other_side and not may_cross(work, step, changed, cosine)
-    if leans or other_strand or becomes_even(work, depth, step):
+    back = changed and step > STRAND_STEP and runs_back(problem, scratch, work, contacts, step)
+    if leans or other_strand or back or becomes_even(work, depth, step):
         return REASON_STRAND
     if changed and other_side:
         orient(problem, scratch, work, contacts, step)
