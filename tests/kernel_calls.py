@@ -9,7 +9,7 @@ import numpy as np
 from flipflow.batch.lane_path import predict as predict_lane
 from flipflow.compiled import status
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
+from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve, lu_spread
 from flipflow.continuation.correction import Course, new_corrector
 from flipflow.continuation.frequency_loop import new_branch, predict
 from flipflow.continuation.refinement import TRACE_ALL, follow
@@ -30,6 +30,13 @@ def solve(A, pivot, b):
         return 0.0
     lu_solve(A, pivot, b)
     return lu_sign(A, pivot)
+
+
+@kernel(entry=True)
+def spread(A, pivot, b):
+    """``lu_spread`` of a matrix, of which the factors are left in A."""
+    lu_factor(A, pivot)
+    return lu_spread(A, pivot, b)
 
 
 @kernel(entry=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from judge import close
-from kernel_calls import solve
+from kernel_calls import solve, spread
 
 pytestmark = pytest.mark.numerical
 
@@ -39,3 +39,15 @@ def test_singular_is_said() -> None:
 def test_not_finite_is_said() -> None:
     A = np.array([[np.nan, 1.0], [1.0, 1.0]])
     assert solve(A, np.zeros(2, np.int64), np.ones(2)) == 0.0
+
+
+@pytest.mark.parametrize("least", [1e-2, 1e-4, 1e-8])
+@pytest.mark.parametrize("seed", range(5))
+def test_nearness_to_a_singular_matrix(least: float, seed: int) -> None:
+    """By the smallest eigenvalue, a hundredth of the others here, over the largest pivot."""
+    rng = np.random.default_rng(seed)
+    V = np.linalg.qr(rng.normal(size=(8, 8)))[0] @ np.diag(rng.uniform(0.5, 2.0, 8))
+    A = V @ np.diag([*rng.uniform(1.0, 2.0, 7), least]) @ np.linalg.inv(V)
+    factors = A.copy()
+    told = spread(factors, np.zeros(8, np.int64), np.zeros(8))
+    close("size", told, least / np.abs(np.diag(factors)).max(), rel=0.05)

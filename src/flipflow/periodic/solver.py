@@ -224,10 +224,8 @@ class Solver(ABC):
         self.half_turn, self.turns = half_turn, turns
         self.machine = machine_arrays(self.system)
         self.rest = resting_position(self.system)
-        self.length = min(
-            characteristic_length(self.system, self.machine),
-            *pressed_depths(self.system, self.rest),
-        )
+        length = characteristic_length(self.system, self.machine)
+        self.length = min([length, *pressed_depths(self.system, self.rest)])
 
     @property
     def options(self) -> tuple[float, ...]:
@@ -506,14 +504,13 @@ def resting_position(system: MechanicalSystem) -> Real:
 
 
 def pressed_depths(system: MechanicalSystem, rest: Real) -> Iterator[float]:
-    """How deep in m the machine lies in the stops on which it rests; infinity at last."""
+    """How deep in m the machine lies in each of the stops on which it rests."""
     for spring in system.springs if rest.any() else ():
         y = float(spring.direction @ rest)
         depth = max(y - spring.gaps[0], -y - spring.gaps[1])
         rounding = ROUNDING * float(np.abs(spring.direction) @ np.abs(rest))
         if spring.acts and depth > rounding:
             yield depth
-    yield math.inf
 
 
 def characteristic_length(system: MechanicalSystem, machine: MachineArrays) -> float:

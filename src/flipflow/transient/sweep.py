@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import cast
 
 import numpy as np
@@ -302,12 +302,6 @@ def _leads(step: Step, point: Point, value: float, to: Settled) -> bool:
     if followed is None:
         return False
     share = JUMP_SHARE * settling.size(to.recent, omega)
-    one, other = settling.phases(followed), settling.phases(cast("Point", to.point))
-    turns = range(math.lcm(len(one), len(other)))
-    return any(
-        all(
-            settling.distance(one[(k + shift) % len(one)], other[k % len(other)], omega) <= share
-            for k in turns
-        )
-        for shift in range(len(one))
-    )
+    # Of all their phases, for in which of them a run was caught is chance.
+    pairs = product(settling.phases(followed), settling.phases(cast("Point", to.point)))
+    return any(settling.distance(*pair, omega) <= share for pair in pairs)
