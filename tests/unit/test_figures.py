@@ -20,6 +20,7 @@ from flipflow.plotting import font
 from flipflow.plotting.bars import energy_figure, region_figure
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
+from flipflow.plotting.history import history_figure
 from flipflow.plotting.layout import arrange, place_labels
 from flipflow.plotting.motion import contact_bands, motions_figure, orbits_figures, portrait_figure
 from flipflow.plotting.panels import PAGE_WIDTH, Axis, Line, Panel
@@ -441,3 +442,14 @@ def test_the_schematic_turns_as_the_unbalance(screen):
         (begin, sweep, along) = re.search(r"M(\d+) 128a17 17 0 0 (\d) (-?\d+) 8", drawn).groups()
         ways[rotation] = (int(begin) < 266, int(sweep), int(along))
     assert ways == {"with-flow": (True, 0, 24), "counter-flow": (False, 1, -24)}
+
+
+def test_the_last_turns_of_a_long_run_are_not_drawn_in_stairs():
+    """Five digits of the time itself are coarser, after some seconds, than the samples."""
+    history = ff.simulate(ff.load("ffs0827"), 89.0, 200)
+    figure = history_figure(history)
+    data = described(figure)["data"]
+    last = [trace["x"] for trace in data if min(trace["x"]) > 13.0]
+    assert last
+    for times in last:
+        assert np.all(np.diff(times) > 0.0)

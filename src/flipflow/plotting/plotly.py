@@ -352,5 +352,8 @@ def _line_label(line: Line, data: Json, over: Json, place: Label | None) -> Json
 
 
 def _plain(values: NDArray[np.float64]) -> list[float | None]:
-    """Five digits, which is finer than a pixel; what is not finite leaves a hole."""
-    return [float(f"{v:.5g}") if math.isfinite(v) else None for v in values.tolist()]
+    """Five digits of the values' spread, finer than a pixel; what is not finite is a hole."""
+    finite = values[np.isfinite(values)]
+    spread, size = (float(np.ptp(finite)), float(np.abs(finite).max())) if finite.size else (0, 0)
+    digits = min(5 + math.ceil(math.log10(size / spread)), 15) if 0.0 < spread < size else 5
+    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in values.tolist()]
