@@ -38,7 +38,7 @@ def settled_on(machine, omega, rng):
         if not end.settled:
             continue
         phases = settling.phases(end.point)
-        if not any(settling.same(z, one.u, omega) for z in phases for one in found):
+        if not any(settling.same(one.u, phases, omega).any() for one in found):
             found.append(end.point)
     return found
 

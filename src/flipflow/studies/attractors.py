@@ -74,7 +74,7 @@ class Attractors:
         """Label of the motion that passes through the state z at the start of a turn."""
         for label, orbit in enumerate(self.orbits):
             phases = self._settling.phases(orbit.point)
-            if any(self._settling.same(z, phase, orbit.omega) for phase in phases):
+            if self._settling.same(z, phases, orbit.omega).any():
                 return label
         return None
 

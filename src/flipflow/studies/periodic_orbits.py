@@ -140,6 +140,7 @@ class _Search:
         self.settling = Settling(system_of(machine), max_periods)
         self.omega, self.max_periods = omega, max_periods
         self.found: list[Point] = []
+        self.phases: list[Real] = []  # states after each forcing period of those found
         self.mirrored: list[Point] = []  # those whose mirror image has been looked for
         self.flown = self.lost = 0
 
@@ -252,26 +253,38 @@ class _Search:
             self._try_over(z, periods)
 
     def _try(self, z: Real) -> None:
+        if self._known(z, 1) is not None:
+            return  # over any number of turns Newton would lead back to it
         for periods in range(1, self.max_periods + 1):
             self._try_over(z, periods)
 
     def _try_over(self, z: Real, periods: int) -> None:
         """Newton for a motion of so many periods and no fewer."""
         point = self.settling.solver_of(periods).solve(z, self.omega)
-        if point is not None and self.settling.shortest(point) is point:
-            kept = self._keep(point)
-            if self.settling.solver.system.symmetric and kept not in self.mirrored:
-                self.mirrored += [kept, self._keep(self._mirrored(kept))]
+        if point is None:
+            return
+        known = self._known(point.u, periods)
+        if known is None and self.settling.shortest(point) is not point:
+            return
+        kept = known or self._keep(point)
+        if self.settling.solver.system.symmetric and kept not in self.mirrored:
+            self.mirrored += [kept, self._keep(self._mirrored(kept))]
+
+    def _known(self, z: Real, periods: int) -> Point | None:
+        """The motion found that passes through a state and repeats after so many periods."""
+        for point, phases in zip(self.found, self.phases, strict=True):
+            again = periods % point.formulation.turns == 0
+            if again and self.settling.same(z, phases, self.omega).any():
+                return point
+        return None
 
     def _keep(self, point: Point) -> Point:
         """Add a motion unless it is known, in whatever phase; the one that then is known."""
-        for known in self.found:
-            if known.formulation.turns == point.formulation.turns and any(
-                self.settling.same(point.u, phase, self.omega)
-                for phase in self.settling.phases(known)
-            ):
-                return known
+        known = self._known(point.u, point.formulation.turns)
+        if known is not None:
+            return known
         self.found.append(point)
+        self.phases.append(self.settling.phases(point))
         return point
 
     def _mirrored(self, point: Point) -> Point:

@@ -147,16 +147,17 @@ class Settling:
         """States of a motion after 1, 2, ... all of its forcing periods, the last its own."""
         return self.solver.section(point.u, point.omega, point.formulation.turns)
 
-    def same(self, z: Real, other: Real, omega: float) -> bool:
-        """Whether two states differ by less than 1e-6 of the motion's size."""
-        size = self.size(other[None], omega) + self.solver.length
-        return self.distance(z, other, omega) < SAME * size
+    def same(self, z: Real, others: Real, omega: float) -> NDArray[np.bool_]:
+        """Which of the states (K, 2 N) differ from z by less than 1e-6 of their motion's size."""
+        apart, sizes = (
+            np.abs(self._lengths(one, omega)).max(axis=1) for one in (others - z, others)
+        )
+        return np.asarray(apart < SAME * (sizes + self.solver.length))
 
     def shortest(self, point: Point) -> Point:
         """The same motion with the least number of forcing periods after which it repeats."""
-        phases = self.phases(point)
-        repeats = (n for n, z in enumerate(phases, 1) if self.same(point.u, z, point.omega))
-        periods = next(repeats, point.formulation.turns)
+        again = np.flatnonzero(self.same(point.u, self.phases(point), point.omega))
+        periods = 1 + int(again[0]) if again.size else point.formulation.turns
         if periods == point.formulation.turns:
             return point
         return self.solver_of(periods).solve(point.u, point.omega) or point
