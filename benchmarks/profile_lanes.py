@@ -2,9 +2,9 @@
 
     python benchmarks/profile_lanes.py [--omega 120] [--repeats 20000]
 
-Each stage is what lanes call, repeated on the motion of FFS0827 reached from below. Where speeds lie
-close a lane needs Newton's step, multipliers, guess and readings once each; a machine that has no
-neighbour needs the modes of its contact states, too, and Newton's step some times.
+Each stage is what lanes call, repeated on the motion of FFS0827 reached from below. Where speeds
+lie close a lane needs Newton's step, multipliers, guess and readings once each; a machine that has
+no neighbour needs the modes of its contact states, too, and Newton's step some times.
 """
 
 import argparse

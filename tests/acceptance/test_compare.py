@@ -263,3 +263,43 @@ def test_a_bad_file_is_refused_before_anything_is_computed(command, files, monke
     assert code == 2
     assert "missing.toml" in err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def started():
+    """Two files that differ in how the motor is put on, which decides whether it starts."""
+    text = SMALL.read_text(encoding="utf-8")
+    drive = '[drive]\nrated_power = "5.5 kW"\nfriction = "60 N m"\nstart = "{}"\n\n[limits.start]\n'
+    made = []
+    for start, most in (("star-delta", "0.04 m"), ("direct", "0.05 m")):
+        one = text.replace(
+            "[limits]", f'{drive.format(start)}main_amplitude = "{most}"\n\n[limits]'
+        )
+        one = one.replace('["20 degC", 1.0]', f'["20 degC", {1.0 if start == "direct" else 1.02}]')
+        made.append(one)
+    return made
+
+
+def test_inputs_are_named_as_in_the_file_and_a_start_that_fails_is_a_result(started, tmp_path):
+    """No result was said to change between a machine that starts and one that does not."""
+    paths = []
+    for name, text in zip(("star", "direct"), started, strict=True):
+        paths.append(tmp_path / f"{name}.toml")
+        paths[-1].write_text(text, encoding="utf-8")
+    found = ff.compare(paths)
+    inputs = {one.key: (one.values, one.shown_unit) for one in found.inputs}
+    assert inputs["drive.start"] == (("star-delta", "direct"), "")
+    assert inputs["limits.start.main_amplitude"] == ((0.04, 0.05), "mm")
+    assert inputs["shear_springs.temperature_factor, factor 2"] == ((1.02, 1.0), "")
+    (speed, time), unit = inputs["drive.switch_over_speed"]
+    assert speed is not None
+    assert time is None
+    assert unit == "rpm"
+    assert not [key for key in inputs if "assumed" in key or "[" in key]
+    start = found.result("start_speed", "empty")
+    assert start.values[0] == 0.0
+    assert start.values[1] > 0.95 * found.assessments[1].omega
+    assert found.result("start_time", "empty").values[0] is None
+    assert found.result("stop.foundation_force", "empty").changes
+    tables = [block for block in main_changes(found) if isinstance(block, Table)]
+    assert "Speed that the start reaches" in [row[0].text for row in tables[0].rows]

@@ -12,10 +12,10 @@ from scipy import stats
 import flipflow as ff
 from flipflow.plotting.dispatch import figure
 from flipflow.plotting.plotly import described
-from flipflow.plotting.study import parallel_figure
-from flipflow.report.blocks import Text
+from flipflow.plotting.study import map_figure, parallel_figure, study_tornado
+from flipflow.report.blocks import FigureBlock, Note, Text
 from flipflow.report.registry import blocks_of
-from flipflow.report.study import spread_table
+from flipflow.report.study import spread_table, study_blocks
 from flipflow.studies.tolerance import (
     confidence_interval,
     limits_in_words,
@@ -182,6 +182,54 @@ def test_many_machines_are_translucent_lines(linear):
     assert max(t.opacity for t in lines[256]) < 0.3
     whole = described(drawn[256])["data"]
     assert {item.get("opacity", 1.0) for item in whole} == {1.0, lines[256][0].opacity}
+
+
+def test_what_a_report_of_several_cases_speeds_and_fields_says(linear):
+    """Shading and colours are of every load case; what is held, or left out, is named."""
+    m, k = linear.eccentric_moment, linear.shear_stiffness
+    loads = (ff.Load(name="empty"), ff.Load(name="soft", stiffness_factor=0.9))
+    limits = ff.Limits(relative_amplitude=(0.0, 1.03 * amplitude(linear)))
+    grid = ff.study(
+        linear,
+        {"eccentric_moment": m * np.array([0.9, 1.0]), "shear_stiffness": k * np.array([1.0, 1.2]),
+         "isolation_stiffness": linear.isolation_stiffness * np.array([0.5, 0.97])},
+        "relative_amplitude", OMEGA, load_cases=loads,
+    )  # fmt: skip
+    drawn = map_figure(grid, limits=limits)
+    assert "Held: k1, kN/m = 611.1." in drawn.caption
+    assert "every limit in every load case" in drawn.caption
+    table = grid.values["relative_amplitude"][:, :, 0]
+    met = (table <= limits.relative_amplitude[1]).all(axis=1)
+    of_first = table[:, 0] <= limits.relative_amplitude[1]
+    near = grid.columns["isolation_stiffness"] > 0.9 * linear.isolation_stiffness
+    assert of_first[near].sum() > met[near].sum()
+    assert int((drawn.panels[0].cells[0].kind == 1).sum()) == int(met[near].sum())
+    sample = ff.study(
+        linear, {"eccentric_moment": (0.9 * m, 1.1 * m)}, "relative_amplitude",
+        OMEGA + np.arange(6.0), load_cases=loads, sampling=ff.Sample(n=16),
+    )  # fmt: skip
+    assert study_tornado(sample, "relative_amplitude").title.endswith(", load case empty")
+    blocks = list(study_blocks(sample, ff.tolerance(sample, limits)))
+    (table_,) = (b for b in blocks if getattr(b, "title", "") == "Machines that meet each limit")
+    assert table_.caption == "The first 4 of 6 speeds; the share at each stands above."
+    captions = [b.figure.caption for b in blocks if isinstance(b, FigureBlock)]
+    assert any("meets every limit in every load case; red" in one for one in captions)
+
+
+def test_a_list_has_no_cost_of_tolerances_and_notes_stand_once(linear):
+    m = linear.eccentric_moment
+    found = ff.study(
+        linear, {"eccentric_moment": [0.9 * m, m, 1.1 * m]}, "relative_amplitude", OMEGA,
+        sampling="list",
+    )  # fmt: skip
+    noted = replace(found, notes=("Damaged, and computed again: chunk 0.",))
+    limits = ff.Limits(relative_amplitude=(0.0, amplitude(linear)))
+    blocks = list(study_blocks(noted, ff.tolerance(noted, limits)))
+    titles = [b.figure.title for b in blocks if isinstance(b, FigureBlock)]
+    assert titles
+    assert not [title for title in titles if title.startswith("What tolerances cost")]
+    told = [b.text for b in blocks if isinstance(b, Note)]
+    assert told.count(noted.notes[0]) == 1
 
 
 def test_limits_that_were_not_looked_at_are_named():

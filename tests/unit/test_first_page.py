@@ -6,15 +6,17 @@ import dataclasses
 import io
 import math
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 import flipflow as ff
+from flipflow.periodic.orbit import Orbit
 from flipflow.report import first_page, summary
 from flipflow.report.blocks import Note, Table
 from flipflow.report.registry import blocks_of
 from flipflow.studies.allowed_range import allowed_range
-from flipflow.studies.assessment import assess
+from flipflow.studies.assessment import assess, verdict
 
 RPM = 30.0 / math.pi
 
@@ -114,3 +116,28 @@ def test_notes_without_room_stand_overleaf(many):
     assert [text for text in texts if text in notes] == list(notes)
     assert any(text.startswith(f"{7 - shown} more notes stand") for text in texts)
     assert all(note in " ".join(printed(noted).split()) for note in notes)
+
+
+def test_a_side_that_the_weight_closes_is_touched_at_rest(project):
+    screen = project.screen.replace(
+        clearance=0.2e-3, clearance_minus=6e-3, clearance_measured="drawn", deck_angle=0.3
+    )
+    closed = dataclasses.replace(project, screen=screen, load_cases=project.load_cases[:1])
+    found = assess(closed)
+    assert screen.stop().gaps[0] < 0.0
+    assert set(found.region.contact_speeds) == {-1}
+    assert "plus side at rest, minus side at " in first_page.contact_sentence(found.region)
+
+
+def test_a_motion_that_does_not_return_is_said_so_and_marked(many):
+    """The multiplier -1.014 was told as "not sure to return", and its numbers bore no mark."""
+    case = many.cases[0]
+    map_ = np.diag([1.2, 0.5, 0.5, 0.5])
+    point = dataclasses.replace(case.orbit.point, known_map=map_)
+    lost = dataclasses.replace(
+        case, working=dataclasses.replace(case.working, orbit=Orbit(case.screen, point))
+    )
+    assert lost.orbit.stability == "unstable"
+    sentence = verdict(many.omega, many.limits_table, (lost, *many.cases[1:]), many.region)
+    assert sentence.endswith("the motion does not return after a disturbance in case 0.")
+    assert first_page._case_row(lost)[0].small == "the motion does not return"

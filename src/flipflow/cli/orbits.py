@@ -83,11 +83,13 @@ def _show(title: str, omega: float, found: tuple[Orbit, ...], out: Console) -> N
 
 def _count(found: tuple[Orbit, ...]) -> str:
     """How many motions there are, and how many of them last."""
+    from flipflow.periodic.stability import RETURNS  # noqa: PLC0415  keeps --help quick
+
     lasting = sum(orbit.stable for orbit in found)
     if not found:
         return "no motion that repeats itself was found"
     if len(found) == 1:
-        return f"1 motion, which {'returns' if lasting else 'is not sure to return'} {AFTER}"
+        return f"1 motion, which {RETURNS[found[0].stability]} {AFTER}"
     return (
         f"{len(found)} motions, {lasting} of them {'returns' if lasting == 1 else 'return'} {AFTER}"
     )

@@ -475,8 +475,13 @@ def set_force(
     stops, regime = machine.stops, flow.regimes[e, j]
     k = stiffness_share(stops, j, regime) * stops.stiffness[j]
     c = damping_share(stops, j, regime) * stops.damping[j]
-    rest = motion.offset[j] - signed_gap(stops, j, regime)
-    motion.offset[j] = k * rest + c * motion.drift[j]
+    press(motion, count, j, signed_gap(stops, j, regime), k, c)
+
+
+@kernel(inline=True)
+def press(motion: GapMotion, count: int, j: int, gap: float, k: float, c: float) -> None:
+    """Make row j of sums of exponentials k (y - gap) + c y'."""
+    motion.offset[j] = k * (motion.offset[j] - gap) + c * motion.drift[j]
     motion.drift[j] *= k
     for i in range(count):
         motion.amplitude[j, i] *= k + c * motion.rate[i]

@@ -53,7 +53,9 @@ class Impulse:
 class LoadStep:
     """A step of load: springs and masses change at once, displacements and velocities do not.
 
-    Carried mass joins at the speed its frame has then.
+    Carried mass joins at the speed its frame has then. Where the deck angle is known its weight
+    hangs on the springs from then on: displacements still count from where the machine hung before,
+    and its work is part of what is put in.
 
     Parameters
     ----------
@@ -77,6 +79,7 @@ class Lump:
     """A lump of material that lands on a frame and stays there.
 
     Momentum along the surface is kept: the frame's velocity v becomes (m v + mass u) / (m + mass).
+    Its weight hangs on the springs as that of a :class:`LoadStep`.
 
     Parameters
     ----------

@@ -137,8 +137,8 @@ _ALL = (
         "Half the peak-to-peak motion of the floating frame along the surface.",
     ),
     Quantity(
-        "relative_offset", "offset of the relative motion", "|mean x2|", "m", "mm",
-        "How far the middle of the motion between the frames lies beside the middle of the gaps.",
+        "relative_offset", "offset of the relative motion", "|x2|mid", "m", "mm",
+        "How far the middle of the motion between the frames lies from where they hang at rest.",
     ),
     Quantity(
         "relative_phase", "relative phase", "phi2", "rad", "deg",

@@ -36,7 +36,7 @@ REMEDY = (
     "give an interval as a tuple (low, high), values in a list or an array, ff.Normal(mean, std) "
     "or ff.Choice(values)"
 )
-VALUES = "give an array or a list of at least two numbers, shape (n,)"
+VALUES = "give an array or a list of at least two finite numbers, shape (n,)"
 WORDS = "give a list or ff.Choice of at least two words"
 
 

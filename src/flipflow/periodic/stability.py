@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from flipflow.compiled.arrays import Complex, Real
 
 STABLE, UNSTABLE, UNDETERMINED = "stable", "unstable", "undetermined"
+RETURNS = {
+    STABLE: "returns", UNSTABLE: "does not return", UNDETERMINED: "is not sure to return",
+}  # fmt: skip
 NEAR_ONE = 1e-6  # distance of the largest modulus from 1 within which stability is undetermined
 LARGEST_LOG = 690.0  # logarithm above which a determinant is cut off, near the largest number
 SADDLE_NODE_BAND = 0.2  # distance from +1 within which the Jacobian overrules a real multiplier

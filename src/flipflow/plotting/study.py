@@ -6,7 +6,9 @@ Of several frequencies the first is drawn; of several load cases, too, but curve
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +112,8 @@ def _maps(study: Study, names: Sequence[str], limits: Limits | None) -> Figure:
     told = " and ".join(f"the {one.label} in {one.shown_unit or 'plain numbers'}" for one in asked)
     over = f"over {symbol_of(across)} and {symbol_of(up)}"
     title = f"{capitalized(asked[0].label)} {over}" if len(asked) == 1 else f"Maps {over}"
-    return Figure(title, f"Contours of {told}.{shaded}{jumps}", panels, height=440 * len(panels))
+    caption = f"Contours of {told}.{_held_words(study, (across, up))}{shaded}{jumps}"
+    return Figure(title, caption, panels, height=440 * len(panels))
 
 
 def _map_panel(grid: _Grid, one: Quantity, limits: Limits | None) -> Panel:
@@ -147,7 +150,10 @@ def curves_figure(study: Study, field: str) -> Figure:
         )
         panels.append(Panel(_field_axis(study, field, x), Axis(one.label, one.shown_unit), traces))
     title = f"{symbol_of(field)} varied{speed_in_words(study.omega[0])}"
-    caption = "Each line: a load case. Where a line is broken the quantity has no value."
+    caption = (
+        "Each line: a load case. Where a line is broken the quantity has no value."
+        f"{_held_words(study, (field,))}"
+    )
     return Figure(title, caption, tuple(panels), height=230 * len(panels) + 60)
 
 
@@ -178,7 +184,10 @@ def study_tornado(study: Study, quantity: str) -> Figure:
         at_high=np.asarray(read(study.at_high[quantity])),
         own=tuple(value_of(study.machine, name) for name in study.names),
     )
-    return tornado_figure(found)
+    drawn = tornado_figure(found)
+    if len(study.cases) == 1:
+        return drawn
+    return replace(drawn, title=f"{drawn.title}, load case {study.cases[0]}")
 
 
 def parallel_figure(
@@ -224,7 +233,8 @@ def parallel_figure(
         f"least and the greatest value.{shown}"
     )
     if passing is not None:
-        caption += f" Green: the machine meets {met}; red: it does not."
+        where = _in_every_case(study)
+        caption += f" Green: the machine meets {met}{where}; red: it does not."
     return Figure("Machines of the study", caption, (panel,), height=400)
 
 
@@ -254,9 +264,9 @@ class _Grid:
         self._shape = y.size, x.size
         self.x, self.y = x * _field_scale(study, across), y * _field_scale(study, up)
 
-    def values(self, name: str) -> Real:
+    def values(self, name: str, case: int = 0) -> Real:
         """A quantity, (rows of y, columns of x), SI."""
-        table = _first(self.study, name)[self._keep, 0]
+        table = _first(self.study, name)[self._keep, case]
         return np.asarray(table[self._order].reshape(self._shape))
 
     def lines(self, z: Real, level: float, *, parted: bool = True) -> Iterator[tuple[Real, Real]]:
@@ -308,12 +318,12 @@ def _fold_contours(grid: _Grid) -> Iterator[Trace]:
 
 
 def _met_cells(grid: _Grid, limits: Limits) -> Cells:
-    """Machines that meet every limit, as cells around the points of the grid."""
+    """Machines that meet every limit in every case, as cells around the points of the grid."""
     met = np.ones((grid.y.size, grid.x.size), bool)
-    for name in limits_known(grid.study, limits):
+    for name, case in product(limits_known(grid.study, limits), range(len(grid.study.cases))):
         low, high = limit_bounds(limits, name)
         operation = QUANTITIES[name].of == "operation"
-        values = grid.study.omega[0] if operation else grid.values(name)
+        values = grid.study.omega[0] if operation else grid.values(name, case)
         met &= (values >= low) & (values <= high)
     return Cells(cell_edges(grid.x), cell_edges(grid.y), met.astype(np.int64), ("none", "case 3"))
 
@@ -325,7 +335,29 @@ def _shaded_words(study: Study, limits: Limits) -> str:
         return ""
     left_out = limits_left_out(limits, known)
     others = f" Not looked at: {', '.join(left_out)}." if left_out else ""
-    return f" Shaded: machines that meet {limits_in_words(limits, known)}.{others}"
+    met = f"{limits_in_words(limits, known)}{_in_every_case(study)}"
+    return f" Shaded: machines that meet {met}.{others}"
+
+
+def _in_every_case(study: Study) -> str:
+    return " in every load case" if len(study.cases) > 1 else ""
+
+
+def _held_words(study: Study, shown: tuple[str, ...]) -> str:
+    """At which of their values other varied fields are held; empty where there are none."""
+    keep = _others_nearest(study, shown)
+    held = [
+        f"{_axis_words(study, name)} = {_field_value(study, name, column[keep][0])}"
+        for name, column in study.columns.items()
+        if name not in shown and np.unique(column).size > 1
+    ]
+    return f" Held: {'; '.join(held)}." if held else ""
+
+
+def _field_value(study: Study, field: str, value: object) -> str:
+    if isinstance(value, float):
+        return f"{value * _field_scale(study, field):.4g}"
+    return str(value)
 
 
 def _joined(

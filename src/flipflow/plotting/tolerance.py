@@ -55,10 +55,14 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
             ),
         )  # fmt: skip
     caption = (
-        f"Above: the share of built machines that meet {met} in every load case, against a "
-        "factor on all tolerances. Below: the same with one tolerance alone half as wide; a bar "
-        f"to the right is what that would gain.{_noise_words(found, at, order)}"
+        f"{'Above: the' if order else 'The'} share of built machines that meet {met} in every "
+        "load case, against a factor on all tolerances."
     )
+    if order:
+        caption += (
+            " Below: the same with one tolerance alone half as wide; a bar to the right is what "
+            f"that would gain.{_noise_words(found, at, order)}"
+        )
     title = f"What tolerances cost{speed_in_words(found.omega[at])}"
     return Figure(title, caption, panels, height=300 + 60 + 30 * len(order))
 

@@ -38,7 +38,7 @@ from flipflow.studies.compare import (
 
 MARGIN, JUMP = "margin of ", "jump_margin"
 ONE_NAME = 24  # letters of a name that the head of a column has room for
-BRIEF = ("relative_amplitude",)  # beside margins and speeds, what the terminal shows
+BRIEF = ("relative_amplitude", "start_speed")  # beside margins and speeds, what the terminal shows
 
 
 @section(Comparison, Part.FIRST_PAGE, 10)

@@ -38,7 +38,7 @@ from flipflow.studies.assessment import Assessment, CaseAssessment
 SCHEMATIC = (
     "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "
     "relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds the gap per "
-    "side (e), that on the other side when x2 falls below -e."
+    "side (e), that on the other side when x2 falls below -e, or -e- where the gaps differ."
 )
 MACHINE_TITLE = "The machine"
 MODEL_LIMITS = (

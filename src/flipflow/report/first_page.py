@@ -11,6 +11,7 @@ from flipflow.model.limits import PASSAGES
 from flipflow.model.load_case import case_words
 from flipflow.model.numerals import capitalized, rpm
 from flipflow.model.quantities import QUANTITIES, missing_words
+from flipflow.periodic.stability import RETURNS
 from flipflow.plotting.layout import legend_lines
 from flipflow.plotting.motion import motions_figure
 from flipflow.plotting.response import LEGEND_WITHIN, case_names, cases_figure
@@ -288,11 +289,19 @@ def contact_sentence(region: OperatingRegion) -> str:
     speeds = region.contact_speeds
     if region.branch.system.symmetric or not speeds:
         return ""
+    gaps = region.screen.stop().gaps
     sides = (
-        f"{word} side {f'at {rpm(speeds[side])} rpm' if side in speeds else 'not touched before'}"
-        for side, word in ((1, "plus"), (-1, "minus"))
+        f"{word} side {_touched(speeds.get(side), gap)}"
+        for side, word, gap in ((1, "plus", gaps[0]), (-1, "minus", gaps[1]))
     )
     return f"{', '.join(sides)} (empty); w_cs is the last of them."
+
+
+def _touched(speed: float | None, gap: float) -> str:
+    """Where a side is first touched, in words: a side that the weight closes is at rest."""
+    if speed is not None:
+        return f"at {rpm(speed)} rpm"
+    return "at rest" if gap < 0.0 else "not touched before"
 
 
 def stop_sentence(assessment: Assessment) -> str:
@@ -341,7 +350,8 @@ def limit_cells(row: LimitRow) -> tuple[Cell, ...]:
 def _case_row(case: CaseAssessment) -> tuple[Cell, ...]:
     if case.orbit is None:
         return (Cell(case.name, "no motion found"), *(Cell(NOTHING) for _ in CASE_COLUMNS))
-    row = [Cell(case.name)]
+    word = "" if case.orbit.stable else f"the motion {RETURNS[case.orbit.stability]}"
+    row = [Cell(case.name, word)]
     for name, _ in CASE_COLUMNS:
         text = named(name, case.values.get(name), with_unit=False)
         if name == "stop_force" and not case.stop_reached:

@@ -53,6 +53,7 @@ WORDS = {
     "monte-carlo": "independent draws",
 }
 MOST_FIGURES = 4  # maps or tornado charts of one report
+MOST_COLUMNS = 4  # speeds beside each other in a table
 
 
 @section(Study, Part.FIRST_PAGE, 10, brief=True)
@@ -114,7 +115,10 @@ def study_blocks(
     if judged is not None:
         yield from yield_of_machines(judged)
     yield Heading("The study", 1, new_page=False)
-    yield from summary_of_study(found)
+    told = () if judged is None else judged.notes  # the study's own among them
+    for block in summary_of_study(found):
+        if not (isinstance(block, Note) and block.text in told):
+            yield block
     yield spread_table(found)
     if judged is not None:
         yield from cost_of_tolerances(judged)
@@ -169,7 +173,7 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
     columns = (
         Column("Limit"), Column("Allowed"), *(
             Column(f"{rpm(omega)} rpm" if np.isfinite(omega) else "Met", "%", numeric=True)
-            for omega in found.omega[:4]
+            for omega in found.omega[:MOST_COLUMNS]
         ),
     )  # fmt: skip
     rows = [
@@ -183,15 +187,18 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
     ]
     rows.append(cells(f"{every}, every case", "", *_percents(found.share)))
     title = f"Machines that meet each limit{' looked at' if left_out else ''}"
-    yield Table(title, columns, tuple(rows))
+    count = found.omega.size
+    first = f"The first {MOST_COLUMNS} of {count} speeds; the share at each stands above."
+    yield Table(title, columns, tuple(rows), first if count > MOST_COLUMNS else "")
     yield from (Note(text) for text in found.notes)
 
 
 @section(Tolerance, Part.DETAILS, 10)
 def cost_of_tolerances(found: Tolerance) -> Iterator[Block]:
-    """The share against the width of the tolerances."""
-    for j in range(min(found.omega.size, MOST_FIGURES)):
-        yield FigureBlock(tolerance_figure(found, j))
+    """The share against the width of the tolerances; a list or a grid has none."""
+    known = np.isfinite(found.scaled).any(axis=0) | np.isfinite(found.halved).any(axis=0)
+    for j in np.flatnonzero(known)[:MOST_FIGURES]:
+        yield FigureBlock(tolerance_figure(found, int(j)))
 
 
 def spread_table(found: Study) -> Table:
@@ -314,7 +321,7 @@ def _bounds(found: Tolerance, name: str) -> str:
 
 
 def _percents(shares: Real) -> list[str]:
-    return [f"{100.0 * one:.1f}" for one in shares[:4]]
+    return [f"{100.0 * one:.1f}" for one in shares[:MOST_COLUMNS]]
 
 
 def _share(share: float) -> str:

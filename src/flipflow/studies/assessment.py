@@ -32,6 +32,7 @@ from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
+from flipflow.periodic.stability import RETURNS, UNDETERMINED, UNSTABLE
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.drive_check import Demand
@@ -478,10 +479,15 @@ def verdict(
     unknown = [case for case in cases if case.orbit is None]
     if unknown:
         return f"{speed}: not judged, for {_why_unknown(omega, unknown)}."
-    lost = [case.name for case in cases if case.orbit is not None and not case.orbit.stable]
+    lost = {
+        case.name: case.orbit.stability
+        for case in cases
+        if case.orbit is not None and not case.orbit.stable
+    }
     if lost:
         where = "; ".join(lost) if len(lost) < len(cases) else "every load case"
-        return f"{speed}: the motion is not sure to return after a disturbance in {where}."
+        word = UNSTABLE if set(lost.values()) == {UNSTABLE} else UNDETERMINED
+        return f"{speed}: the motion {RETURNS[word]} after a disturbance in {where}."
     judged = [row for row in rows if row.margin is not None]
     unchecked = [row for row in rows if row.state == NOT_CHECKED and row.limit != NO_LIMIT]
     if not judged:

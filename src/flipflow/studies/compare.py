@@ -9,21 +9,25 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
+from types import NoneType
 
 from flipflow import __version__
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_monitor, members_of
-from flipflow.model.drive import DRIVE_FIELDS
-from flipflow.model.fields import FIELDS
-from flipflow.model.limits import LIMIT_FIELDS, Limits, limit_bounds
+from flipflow.model.drive import DRIVE_FIELDS, Drive
+from flipflow.model.fields import FIELDS, Field
+from flipflow.model.limits import LIMIT_FIELDS, PASSAGES, PASSING_FIELDS, Limits, limit_bounds
 from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
 from flipflow.model.project import Document, Project
 from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
+from flipflow.model.starter import Converter, StarDelta
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.assessment import Assessment, CaseAssessment, assess, relative_margin
+from flipflow.studies.start_and_blows import CaseRuns
 
 # The layer above reads files; `plot` and `save` are bound as late.
 READER = "flipflow.io.project"
@@ -44,7 +48,19 @@ LOAD_UNITS: Mapping[str, tuple[str, str]] = {
     "main_mass": ("kg", "kg"), "floating_mass": ("kg", "kg"), "temperature": ("degC", "degC"),
 }  # fmt: skip
 
+# Places in the machine file of what is no field of its tables.
+SCREEN_WORDS: Mapping[str, str] = {
+    "stop_law": "stops.law", "clearance_measured": "stops.clearance_measured",
+    "rotation": "exciter.rotation", "temperature_factor": "shear_springs.temperature_factor",
+    "stop_temperature_factor": "stops.temperature_factor",
+}  # fmt: skip
+STARTS: Mapping[type, str] = {
+    NoneType: "direct", StarDelta: "star-delta", Converter: "converter",
+}  # fmt: skip
+SWITCH_OVER: Mapping[str, str] = {"speed": "switch_over_speed", "time": "switch_over_time"}
+
 Given = float | str | None
+Input = tuple[str, tuple[str, str, Given]]
 Flat = dict[str, tuple[str, str, Given]]
 
 
@@ -262,31 +278,64 @@ def _differences(keys: Mapping[str, None], flat: Sequence[Flat]) -> Iterator[Inp
 
 def _inputs_of(project: Project) -> Flat:
     """Every input that decides a result, by its place in the machine file; None is left out."""
-    flat: Flat = {}
-    units = {field.name: (field.key, field.unit, field.file_unit) for field in FIELDS}
-    for name, value in _parts(project.screen):
-        key, *pair = units.get(name, (name, "", ""))
-        flat[key] = (pair[0], pair[1], value)
-    flat["operation.speed"] = ("rad/s", "rpm", project.speed)
-    if project.drive is not None:
-        units = {field.name: (field.key, field.unit, field.file_unit) for field in DRIVE_FIELDS}
-        for name, value in _parts(project.drive):
-            last = name.rpartition(".")[2]
-            key, *pair = units.get(last, (f"drive.{name}", "", ""))
-            flat[key] = (pair[0], pair[1], value)
-    units = {field.name: (field.key, field.unit, field.file_unit) for field in LIMIT_FIELDS}
-    for name, value in _parts(project.limits):
+    speed = ("operation.speed", ("rad/s", "rpm", project.speed))
+    found = chain(
+        _screen_inputs(project.screen), (speed,), _drive_inputs(project.drive),
+        _limit_inputs(project.limits), _load_inputs(project.load_cases),
+    )  # fmt: skip
+    return {key: one for key, one in found if one[2] is not None}
+
+
+def _screen_inputs(screen: FlipFlowScreen) -> Iterator[Input]:
+    fields = {field.name: field for field in FIELDS}
+    for name, value in _parts(screen):
+        table, _, place = name.partition("[")
+        if not place:
+            yield _input(fields.get(name), SCREEN_WORDS.get(name, name), value)
+            continue
+        row, column = place.removesuffix("]").split("][")
+        of, units = (("temperature", "degC"), ("factor", ""))[int(column)]
+        yield f"{SCREEN_WORDS[table]}, {of} {int(row) + 1}", (units, units, value)
+
+
+def _drive_inputs(drive: Drive | None) -> Iterator[Input]:
+    """Those of the drive with what was assumed of it; how the motor is put on, as a word."""
+    if drive is None:
+        return
+    fields = {field.name: field for field in DRIVE_FIELDS}
+    start = STARTS[type(drive.starter)]
+    yield "drive.start", ("", "", start)
+    for name, value in _parts(replace(drive, assumed=(), assumed_fields=())):
+        last = name.rpartition(".")[2]
+        if name.startswith("starter."):
+            last = SWITCH_OVER.get(last, last)
+        yield _input(fields.get(last), f"drive.{last}", value)
+
+
+def _limit_inputs(limits: Limits) -> Iterator[Input]:
+    fields = {field.name: field for field in LIMIT_FIELDS}
+    fields |= {f"{of}.{one.name}": one for of in PASSAGES for one in PASSING_FIELDS[of]}
+    for name, value in _parts(limits):
         field, _, end = name.partition("[")
-        key, *pair = units.get(field, (f"limits.{field}", "", ""))
         words = {"0]": ", least", "1]": ", most"}.get(end, "")
-        flat[f"{key}{words}"] = (pair[0], pair[1], value)
-    for load in project.load_cases:
-        flat[f"load case {load.name}"] = ("", "", "given")
+        key, one = _input(fields.get(field), f"limits.{field}", value)
+        yield f"{key}{words}", one
+
+
+def _load_inputs(loads: Sequence[Load]) -> Iterator[Input]:
+    for load in loads:
+        yield f"load case {load.name}", ("", "", "given")
         for name, value in _parts(load):
             if name != "name":
-                pair = list(LOAD_UNITS.get(name, ("", "")))
-                flat[f"load case {load.name}, {name}"] = (pair[0], pair[1], value)
-    return {key: one for key, one in flat.items() if one[2] is not None}
+                units = LOAD_UNITS.get(name, ("", ""))
+                yield f"load case {load.name}, {name}", (*units, value)
+
+
+def _input(field: Field | None, otherwise: str, value: Given) -> Input:
+    """An input by its field's key and units; by another key where it has none."""
+    if field is None:
+        return otherwise, ("", "", value)
+    return field.key, (field.unit, field.file_unit, value)
 
 
 def _parts(value: object, name: str = "") -> Iterator[tuple[str, Given]]:
@@ -323,7 +372,33 @@ def _results_of(found: Assessment) -> Results:
         rows[EMPTY, f"allowed_{word}"] = ((f"allowed speed range {word}", *speed), end)
     for case in found.cases:
         rows |= {(case.name, name): one for name, one in _case_results(found, case)}
+    for runs in found.transients.cases if found.transients else ():
+        rows |= {(runs.case, name): one for name, one in _run_results(runs)}
     return rows
+
+
+def _run_results(runs: CaseRuns) -> Iterator[tuple[str, tuple[Head, float | None]]]:
+    """Start, coast-down and least blows of a load case."""
+    if runs.start is not None:
+        reached = "speed that the start reaches", "rad/s", "rpm"
+        turns = runs.start.outcome != "not started"
+        yield "start_speed", (reached, runs.start.final_speed if turns else 0.0)
+        yield "start_time", (("time to working speed", "s", "s"), runs.start.time_to_speed)
+    if runs.coast_down is not None:
+        yield "stop_time", (("duration of the coast-down", "s", "s"), runs.coast_down.duration)
+    if runs.jump is not None:
+        blow, lump = ("least blow that throws the motion", "least lump that throws the motion")
+        yield "least_impulse", ((blow, "kg m/s", "kg m/s"), _if_any(runs.jump.impulse))
+        yield "least_lump", ((lump, "kg", "kg"), _if_any(runs.jump.lump))
+    for passage in PASSAGES:
+        for name, peak in runs.peaks_of(passage).items():
+            one = QUANTITIES[name]
+            head = f"{one.label}, {passage}", one.unit, one.shown_unit
+            yield f"{passage}.{name}", (head, peak.value)
+
+
+def _if_any(size: float) -> float | None:
+    return size if math.isfinite(size) else None
 
 
 def _case_results(

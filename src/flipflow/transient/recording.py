@@ -10,12 +10,20 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
 from flipflow.model.arguments import LARGEST
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
-from flipflow.transient.sampling import PANEL, Budget, Changes, Table, sample_motion
+from flipflow.transient.sampling import (
+    PANEL,
+    Budget,
+    Changes,
+    Springs,
+    Table,
+    sample_motion,
+)
 
 GAUSS_NODES = 16  # in each panel over which powers are integrated
 TURNS_A_CALL = 32  # turns calculated at once, between two calls of the monitor
@@ -47,13 +55,13 @@ class Recording:
     t
         Times at which the motion is wanted, rising, (K,).
     size, springs
-        Degrees of freedom N and springs m.
+        Degrees of freedom N, and springs of the machine, whether they open or not.
     """
 
     def __init__(self, t: Real, size: int, springs: int) -> None:
         k = t.size
         x, v, a = np.empty((3, k, size))
-        self.table = Table(t, x, v, a, np.empty((k, springs)), np.zeros((k, springs)))
+        self.table = Table(t, x, v, a, np.zeros((k, springs)), np.zeros((k, springs)))
         self.row = 0
         self.changes: list[tuple[float, int, int]] = []
         self.work = {"input": 0.0, "dampers": 0.0, "stops": 0.0}
@@ -79,6 +87,7 @@ class Recording:
         machine = machine_arrays(linear, damped=False)
         problem = new_shooting(machine, half_turn=False, length=math.nan)
         work = new_shooting_work(machine)
+        springs = _springs(system, work)
         node, weight = np.polynomial.legendre.leggauss(GAUSS_NODES)
         budget = Budget(
             damping=linear.C.copy(),
@@ -95,7 +104,7 @@ class Recording:
         t = begin
         while t < end:
             until = min(t + stretch, end)
-            reached = self._stretch(problem, work, z, omega, t, until, budget)
+            reached = self._stretch(problem, work, z, omega, t, until, springs, budget)
             if reached is None:
                 # A turn has more contacts than are recorded at once: go on by parts of it.
                 stretch = min(stretch, turn) / 2.0
@@ -120,6 +129,7 @@ class Recording:
         omega: float,
         t: float,
         until: float,
+        springs: Springs,
         budget: Budget,
     ) -> Real | None:
         """State at ``until``; None, and nothing recorded, where the flow does not end."""
@@ -131,7 +141,7 @@ class Recording:
         )  # fmt: skip
         work.flow.z[:] = z
         code, row = sample_motion(
-            problem, work, omega, t, until, self.row, self.table, changes, budget
+            problem, work, omega, t, until, self.row, springs, self.table, changes, budget
         )
         if code != status.OK or not (np.abs(work.flow.z) < LARGEST).all():
             budget.work[:] = kept
@@ -140,8 +150,23 @@ class Recording:
         count = int(changes.used[0])
         self.changes += zip(
             changes.t[:count].tolist(),
-            changes.spring[:count].tolist(),
+            springs.place[changes.spring[:count]].tolist(),
             changes.state[:count].tolist(),
             strict=True,
         )
         return work.flow.z.copy()
+
+
+def _springs(system: MechanicalSystem, work: ShootingWork) -> Springs:
+    """The springs of a machine, for the scratch of its flow."""
+    place = [k for k, one in enumerate(system.springs) if one.acts and not one.bonded]
+    always = [k for k, one in enumerate(system.springs) if one.bonded]
+    held = [system.springs[k] for k in always]
+    return Springs(
+        place=np.array(place, np.int64),
+        always=np.array(always, np.int64),
+        direction=np.array([one.direction for one in held]).reshape(len(held), system.size),
+        stiffness=np.array([one.stiffness for one in held]),
+        damping=np.array([one.damping for one in held]),
+        motion=new_gap_motion(len(held), work.flow.motion.rate),
+    )

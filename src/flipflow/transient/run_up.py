@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -306,10 +306,9 @@ def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
         if history.normal is not None:
             reach = np.hypot(history.displacement("main"), history.normal[:, 0])
             found["main_amplitude"] = _peak(history, reach)
-        relative = found.get("relative_amplitude")
-        if relative is not None and screen.shear_height is not None:
-            strain = relative.value / screen.shear_height
-            found["shear_strain"] = replace(relative, value=strain)
+        if screen.shear_height is not None:
+            reach = np.abs(history.displacement("relative"))
+            found["shear_strain"] = _peak(history, reach / screen.shear_height)
         found["foundation_force"] = _peak(history, foundation_force(screen, history))
     for j in range(history.force.shape[1]):
         name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"

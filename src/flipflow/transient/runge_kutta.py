@@ -98,29 +98,36 @@ def _hermite(h: float, g0: float, s0: float, g1: float, s1: float, share: float)
 
 
 @kernel(inline=True)
+def _summit(h: float, g0: float, s0: float, g1: float, s1: float, sign: float) -> float:
+    """Share of the step at which the cubic, times a sign, has its top, by golden section."""
+    low, high = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        one, two = low + 0.381966 * (high - low), low + 0.618034 * (high - low)
+        if sign * (_hermite(h, g0, s0, g1, s1, one) - _hermite(h, g0, s0, g1, s1, two)) > 0.0:
+            high = two
+        else:
+            low = one
+    return 0.5 * (low + high)
+
+
+@kernel(inline=True)
 def _expected(h: float, g0: float, s0: float, g1: float, s1: float) -> float:
     """Share of the step at which a switching function is expected to turn positive; 2 if it is not.
 
     The share is negative if the function turns back within the step: its size then tells where the
     function is largest.
     """
-    top = 1.0
+    low, high = 0.0, 1.0
     if g1 <= 0.0:
         if not (s0 > 0.0 and s1 < 0.0):
             return 2.0
-        # Golden-section search for the top of the cubic between a rising and a falling end.
-        low, high = 0.0, 1.0
-        for _ in range(BISECTIONS):
-            one, two = low + 0.381966 * (high - low), low + 0.618034 * (high - low)
-            if _hermite(h, g0, s0, g1, s1, one) > _hermite(h, g0, s0, g1, s1, two):
-                high = two
-            else:
-                low = one
-        top = 0.5 * (low + high)
-        if _hermite(h, g0, s0, g1, s1, top) <= 0.0:
+        top = _summit(h, g0, s0, g1, s1, 1.0)
+        return 2.0 if _hermite(h, g0, s0, g1, s1, top) <= 0.0 else -top
+    if g0 > 0.0 and s0 <= 0.0:
+        # What is left above zero by rounding and falls has acted already: it is to rise again.
+        low = _summit(h, g0, s0, g1, s1, -1.0)
+        if _hermite(h, g0, s0, g1, s1, low) > 0.0:
             return 2.0
-        return -top
-    low, high = 0.0, top
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         if _hermite(h, g0, s0, g1, s1, middle) > 0.0:

@@ -10,7 +10,14 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, run_flow, segment_motion, segment_state, set_force
+from flipflow.dynamics.flow import (
+    Flow,
+    press,
+    run_flow,
+    segment_motion,
+    segment_state,
+    set_force,
+)
 from flipflow.dynamics.law import force, kind
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
@@ -25,8 +32,19 @@ class Table(NamedTuple):
     x: Real  # (K, N)
     v: Real  # (K, N)
     a: Real  # (K, N)
-    force: Real  # (K, m)
-    peak: Real  # (K, m) greatest size of the force since the sample before
+    force: Real  # (K, all springs)
+    peak: Real  # (K, all springs) greatest size of the force since the sample before
+
+
+class Springs(NamedTuple):
+    """Where the flow's m springs stand among all, and the b that always act, in its matrices."""
+
+    place: Int  # (m,)
+    always: Int  # (b,) places of those that always act
+    direction: Real  # (b, N) of them
+    stiffness: Real  # (b,)
+    damping: Real  # (b,)
+    motion: GapMotion  # scratch along them
 
 
 class Changes(NamedTuple):
@@ -58,6 +76,7 @@ def sample_motion(
     t: float,
     end: float,
     first: int,
+    springs: Springs,
     table: Table,
     changes: Changes,
     budget: Budget,
@@ -82,9 +101,9 @@ def sample_motion(
                 last = t + duration if t + duration < end else math.inf
             before = row
             while row < table.t.shape[0] and table.t[row] <= last and table.t[row] <= end:
-                sample(problem, work, e, omega, row, table)
+                sample(problem, work, e, omega, row, springs, table)
                 row += 1
-            add_peaks(problem.machine, flow, e, omega, before, row, table)
+            add_peaks(problem.machine, flow, e, omega, before, row, springs, table)
             add_work(problem, work, e, omega, budget)
             if e > 0:
                 note_change(flow, e, changes)
@@ -107,8 +126,9 @@ def note_change(flow: Flow, e: int, changes: Changes) -> None:
 
 @kernel(inline=True)
 def sample(
-    problem: Shooting, work: ShootingWork, e: int, omega: float, row: int, table: Table
-) -> None:
+    problem: Shooting, work: ShootingWork, e: int, omega: float, row: int, springs: Springs,
+    table: Table,
+) -> None:  # fmt: skip
     """Row of the table from segment e."""
     flow = work.flow
     n = table.x.shape[1]
@@ -117,38 +137,60 @@ def sample(
         table.x[row, k] = flow.z[k]
         table.v[row, k] = flow.z[n + k]
         table.a[row, k] = work.rate[n + k]
+    for j in range(springs.place.shape[0]):
+        table.force[row, springs.place[j]] = spring_force(problem.machine, flow, e, j)
+    for b in range(springs.always.shape[0]):
+        H = 0.0
+        for k in range(n):
+            H += springs.direction[b, k] * springs.stiffness[b] * flow.z[k]
+            H += springs.direction[b, k] * springs.damping[b] * flow.z[n + k]
+        table.force[row, springs.always[b]] = H
     for j in range(table.force.shape[1]):
-        table.force[row, j] = spring_force(problem.machine, flow, e, j)
         table.peak[row, j] = max(table.peak[row, j], abs(table.force[row, j]))
 
 
 @kernel
 def add_peaks(
-    machine: MachineArrays, flow: Flow, e: int, omega: float, first: int, row: int, table: Table
-) -> None:
-    """Greatest forces of the stops over segment e, in which rows from ``first`` to ``row`` - 1 lie.
-
-    What comes before the first row of all is nobody's.
-    """
+    machine: MachineArrays, flow: Flow, e: int, omega: float, first: int, row: int,
+    springs: Springs, table: Table,
+) -> None:  # fmt: skip
+    """Greatest forces over segment e, in which rows from ``first`` to ``row`` - 1 lie."""
     motion, count = flow.motion, 0
-    last = min(row, table.t.shape[0] - 1)
-    for j in range(table.peak.shape[1]):
+    for j in range(springs.place.shape[0]):
         if kind(machine.stops, j, flow.regimes[e, j]) == 0:
             continue
         if count == 0:
             count = segment_motion(machine, flow, e, omega, machine.direction, motion)
         set_force(machine, flow, motion, count, e, j)
-        begin = 0.0
-        for r in range(first, last + 1):
-            end = flow.length[e]
-            if r < row:
-                end = min(max(table.t[r] - flow.start[e], 0.0), end)
-            if end > begin and r > 0:
-                prepare_search(motion, count)
-                low, high, _, _ = extremes(motion, count, j, end - begin)
-                table.peak[r, j] = max(table.peak[r, j], high, -low)
-            go_on(motion, count, j, end - begin)
-            begin = end
+        add_peak(flow, e, motion, count, j, first, row, springs.place[j], table)
+    motion = springs.motion
+    if springs.always.shape[0] > 0:
+        count = segment_motion(machine, flow, e, omega, springs.direction, motion)
+    for b in range(springs.always.shape[0]):
+        press(motion, count, b, 0.0, springs.stiffness[b], springs.damping[b])
+        add_peak(flow, e, motion, count, b, first, row, springs.always[b], table)
+
+
+@kernel(inline=True)
+def add_peak(
+    flow: Flow, e: int, motion: GapMotion, count: int, j: int, first: int, row: int, place: int,
+    table: Table,
+) -> None:  # fmt: skip
+    """Greatest sizes of the force that row j of the sums is, into a column of the table.
+
+    What comes before the first row of all is nobody's.
+    """
+    begin = 0.0
+    for r in range(first, min(row, table.t.shape[0] - 1) + 1):
+        end = flow.length[e]
+        if r < row:
+            end = min(max(table.t[r] - flow.start[e], 0.0), end)
+        if end > begin and r > 0:
+            prepare_search(motion, count)
+            low, high, _, _ = extremes(motion, count, j, end - begin)
+            table.peak[r, place] = max(table.peak[r, place], high, -low)
+        go_on(motion, count, j, end - begin)
+        begin = end
 
 
 @kernel(inline=True)

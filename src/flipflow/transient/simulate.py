@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -20,7 +21,8 @@ from flipflow.model.arguments import (
     checked_numbers,
     checked_speed,
 )
-from flipflow.model.contact_law import WHOLE, engaged_side, force_in, regime_at, stored_energy
+from flipflow.model.constants import GRAVITY
+from flipflow.model.contact_law import engaged_side, regime_at, stored_energy
 from flipflow.model.disturbance import Disturbance, Impulse, LoadStep, Lump
 from flipflow.model.excitation import Unbalance
 from flipflow.model.monitor import Monitor
@@ -104,17 +106,17 @@ def simulate(
         raise InputError("disturbances", blows[-1].t, f"give a time before the end, {end:.6g} s")
     z = initial_state(system, initial)
     run = _Run(machine, system_of, speed, end, say)
-    run.carry(Recording(times, system.size, len(run.kept)), z, blows)
-    distance, near = _settled(system_of(run.machine), run.z, speed)
-    forces = run.forces()
+    run.carry(Recording(times, system.size, len(system.springs)), z, blows)
+    distance, near = _settled(run.system(), run.z, speed)
+    table = run.recording.table
     return History(
         system=system,
         t=times,
-        x=run.recording.table.x,
-        v=run.recording.table.v,
-        a=run.recording.table.a,
-        force=forces,
-        peak=run.peaks(forces),
+        x=table.x,
+        v=table.v,
+        a=table.a,
+        force=table.force,
+        peak=table.peak,
         omega=np.full(times.size, speed),
         angle=speed * times,
         normal=_normal(machine, speed, times, initial, blows, end),
@@ -184,10 +186,8 @@ class _Run:
     ) -> None:
         self.machine, self.build, self.omega, self.end = machine, build, omega, end
         self.monitor, self.began = monitor, time.monotonic()
-        self.springs = build(machine).springs
-        # The flow knows only springs that can open and close.
-        self.kept = [k for k, one in enumerate(self.springs) if one.acts and not one.bonded]
         self.blown = {"impulses": 0.0, "loads": 0.0}
+        self.sunk = np.zeros(build(machine).size)  # by the weight that came on the way, in m
 
     def carry(self, recording: Recording, z: Real, blows: Sequence[Disturbance]) -> None:
         """Fill ``recording`` from the state z to the end."""
@@ -196,9 +196,7 @@ class _Run:
         at = 0.0
         for blow in (*blows, None):
             until = self.end if blow is None else blow.t
-            self.z = recording.carry(
-                self.build(self.machine), self.z, self.omega, at, until, self._tell
-            )
+            self.z = recording.carry(self.system(), self.z, self.omega, at, until, self._tell)
             at = until
             if blow is not None:
                 before = self.moving()
@@ -207,9 +205,16 @@ class _Run:
                 # A blow that makes a clipped stop take hold, or let go, gives it no energy.
                 self.blown[kind] += self.moving() - before
 
+    def system(self) -> MechanicalSystem:
+        """The machine as it is now; displacements count from where it hung at the beginning."""
+        system = self.build(self.machine)
+        if not self.sunk.any():
+            return system
+        return replace(system, static_force=system.constant_force + system.K @ self.sunk)
+
     def moving(self) -> float:
         """Energy in J of the masses and of the springs that always act."""
-        system = self.build(self.machine).with_bonded()
+        system = self.system().with_bonded()
         x, v = np.split(self.z, 2)
         return float(0.5 * v @ system.M @ v + 0.5 * x @ system.K @ x)
 
@@ -219,10 +224,10 @@ class _Run:
 
     def held(self) -> float:
         """Energy in J of the stops that are touched."""
-        system = self.build(self.machine)
+        system = self.system().with_bonded()
         x, v = np.split(self.z, 2)
         total = 0.0
-        for spring in (system.springs[k] for k in self.kept):
+        for spring in system.springs:
             y, rate = spring.direction @ x, spring.direction @ v
             regime = regime_at(spring.law, spring.stiffness, spring.damping, spring.gaps, y, rate)
             held = stored_energy(spring.law, spring.stiffness, spring.gaps, regime, np.asarray(y))
@@ -236,35 +241,16 @@ class _Run:
         dissipated = work["dampers"] + work["stops"] - held
         return {"input": work["input"], **self.blown, "dissipated": dissipated, "stored": stored}
 
-    def forces(self) -> Real:
-        """Force of every spring of the machine as it was given, (K, m)."""
-        table = self.recording.table
-        forces = np.zeros((table.t.size, len(self.springs)))
-        forces[:, self.kept] = table.force
-        for k, spring in enumerate(self.springs):
-            if spring.bonded:
-                y, rate = table.x @ spring.direction, table.v @ spring.direction
-                of = spring.law, spring.stiffness, spring.damping, spring.gaps
-                forces[:, k] = force_in(*of, np.full(y.shape, WHOLE), y, rate)
-        return forces
-
-    def peaks(self, forces: Real) -> Real:
-        """Greatest size of the force of every spring since the time before, (K, m)."""
-        peaks = np.abs(forces)
-        peaks[:, self.kept] = self.recording.table.peak
-        return peaks
-
     def events(self) -> tuple[ContactChange, ...]:
         """Every change of contact."""
+        springs = self.build(self.machine).springs
         return tuple(
-            ContactChange(
-                t, self.kept[j], int(engaged_side(self.springs[self.kept[j]].law, regime))
-            )
+            ContactChange(t, j, int(engaged_side(springs[j].law, regime)))
             for t, j, regime in self.recording.changes
         )
 
     def _strike(self, blow: Disturbance) -> None:
-        system = self.build(self.machine)
+        system = self.system()
         n = system.size
         self.z = self.z.copy()
         if isinstance(blow, Impulse):
@@ -274,18 +260,23 @@ class _Run:
         if not isinstance(self.machine, FlipFlowScreen):
             raise InputError("disturbances", blow, "only a screen has frames that can be loaded")
         if isinstance(blow, LoadStep):
-            self.machine = self._carrying(blow.load)
+            self._take_up(blow.load)
             return
         frame = 0 if blow.frame == "main" or n == 1 else 1
         mass, velocity = system.M[frame, frame], blow.velocity if n > 1 else 0.0
         self.z[n + frame] = (mass * self.z[n + frame] + blow.mass * velocity) / (mass + blow.mass)
         main = blow.mass if blow.frame == "main" else 0.0
-        self.machine = self._carrying(Load(main_mass=main, floating_mass=blow.mass - main))
+        self._take_up(Load(main_mass=main, floating_mass=blow.mass - main))
 
-    def _carrying(self, load: Load) -> FlipFlowScreen:
-        """The screen under a load that arrives on the way; its own weight is left out."""
+    def _take_up(self, load: Load) -> None:
+        """Carry a load from now on: what it adds hangs on the springs as they are under it."""
         screen = cast("FlipFlowScreen", self.machine)
-        return screen.loaded(load).replace(measured_shift=screen.measured_shift)
+        self.machine = screen.loaded(load).replace(measured_shift=screen.gap_shift)
+        system = self.build(self.machine)
+        if system.size > 1:
+            fall = GRAVITY * math.sin(screen.deck_angle or 0.0)
+            weight = -fall * np.array([load.main_mass, load.floating_mass])
+            self.sunk = self.sunk + np.linalg.solve(system.K, weight)
 
     def _tell(self, t: float) -> None:
         if self.monitor is None:
