@@ -123,7 +123,7 @@ def _expected(h: float, g0: float, s0: float, g1: float, s1: float) -> float:
             return 2.0
         top = _summit(h, g0, s0, g1, s1, 1.0)
         return 2.0 if _hermite(h, g0, s0, g1, s1, top) <= 0.0 else -top
-    if g0 > 0.0 and s0 <= 0.0:
+    if g0 > 0.0 > s0:
         # What is left above zero by rounding and falls has acted already: it is to rise again.
         low = _summit(h, g0, s0, g1, s1, -1.0)
         if _hermite(h, g0, s0, g1, s1, low) > 0.0:
