@@ -11,6 +11,7 @@ import flipflow as ff
 from flipflow.dynamics.motion import longest_on, states_on
 from flipflow.studies.quantity_values import Working
 
+pytestmark = pytest.mark.numerical
 LAWS = ("paper", "compression-only", "undamped-rebound", "elasto-gap")
 SAMPLES, CLOSE = 20_000, 1e-6  # a summit between two is seen to the square of their distance
 

@@ -20,6 +20,7 @@ from flipflow.studies.feasible import case_window
 from flipflow.studies.landmarks import RESPONSE_VALUES
 from flipflow.studies.quantity_values import MOTION_VALUES, ContactFree, Working, beyond_rounding
 
+pytestmark = pytest.mark.numerical
 OMEGA = 80.0
 OPTIONAL = tuple(sorted({name for one in QUANTITIES.values() for name in one.needs}))
 # No limit needs the rest of them.
