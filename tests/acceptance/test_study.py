@@ -269,9 +269,9 @@ def test_a_monitor_hears_of_chunks_and_ends_the_work(linear):
     [
         ({"vary": {"gap": (0.0, 1.0)}}, "vary = 'gap'"),
         ({"vary": {}}, "vary"),
-        ({"vary": {"clearance": [6e-3]}}, "= [0.006]: give an array or a list of at least two n"),
+        ({"vary": {"clearance": [6e-3]}}, "= [0.006]: give an array or a list of at least two finite n"),
         ({"vary": {"stop_law": ["paper"]}}, "= ['paper']: give a list or ff.Choice of at least tw"),
-        ({"vary": {"clearance": [6e-3, "wide"]}}, "a list of at least two numbers"),
+        ({"vary": {"clearance": [6e-3, "wide"]}}, "a list of at least two finite numbers"),
         ({"quantities": ()}, "quantities = ()"),
         ({"quantities": ("size",)}, "quantity = 'size'"),
         ({"quantities": ("stroke", "stroke")}, "named twice"),
