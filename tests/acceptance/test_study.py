@@ -269,7 +269,7 @@ def test_a_monitor_hears_of_chunks_and_ends_the_work(linear):
     [
         ({"vary": {"gap": (0.0, 1.0)}}, "vary = 'gap'"),
         ({"vary": {}}, "vary"),
-        ({"vary": {"clearance": [6e-3]}}, "= [0.006]: give an array or a list of at least two finite n"),
+        ({"vary": {"clearance": [6e-3]}}, "= [0.006]: give an array or a list of at least two "),
         ({"vary": {"stop_law": ["paper"]}}, "= ['paper']: give a list or ff.Choice of at least tw"),
         ({"vary": {"clearance": [6e-3, "wide"]}}, "a list of at least two finite numbers"),
         ({"quantities": ()}, "quantities = ()"),
