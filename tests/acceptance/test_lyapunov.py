@@ -15,6 +15,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import Cancelled, IncompleteError
+from flipflow.transient.exponents import generic_frame
 from judge import close
 from reference import integrate
 
@@ -185,7 +186,7 @@ def test_two_trajectories_part_as_the_largest_exponent_says(start):
     found = ff.lyapunov_exponents(machine, omega, initial=start, periods=turns, skip=0)
     reference, turn = integrate.Machine.of(machine), 2.0 * math.pi / omega
     z, growth = np.array(start), 0.0
-    other = z + np.array([apart, 0.0])
+    other = z + apart * generic_frame(2, omega)[:, 0]
     for _ in range(turns):
         z, other = (
             integrate.flow(reference, one, omega, 0.0, turn, rtol=1e-9).final for one in (z, other)
@@ -486,3 +487,16 @@ def test_disturbances_that_die_out_beyond_what_can_be_told_are_said_so():
     machine = ff.MechanicalSystem([[1.0]], [[1e9]], [[1.0]], (), ff.HarmonicForce([1.0]))
     with pytest.raises(IncompleteError, match="die out"):
         ff.lyapunov_exponents(machine, 1.0)
+
+
+def test_exponents_beyond_the_first_of_a_machine_in_plain_modes():
+    """All displacements excite a mode in one phase, and the frame never left it."""
+    K = 1e5 * (2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
+    M = 100.0 * np.eye(3)
+    stop = ff.ClearanceSpring([1, 0, 0], 2e5, 100.0, 5.0)
+    system = ff.MechanicalSystem(M, 0.1 * M + 2e-4 * K, K, (stop,), ff.Unbalance([0.2, 0, 0]))
+    found = ff.lyapunov_exponents(system, 100.0)
+    (orbit,) = ff.periodic_orbits(system, 100.0)
+    expected = np.sort(np.log(np.abs(orbit.multipliers)) / orbit.period)[::-1]
+    assert (np.abs(found.exponents - expected) < 4.0 * found.standard_error).all()
+    assert found.standard_error.max() < 0.02

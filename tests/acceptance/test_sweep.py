@@ -9,6 +9,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import Cancelled
+from judge import close
 
 pytestmark = pytest.mark.numerical
 FOLD_UP, FOLD_DOWN = 206.405559, 198.649272  # rad/s, reference values
@@ -162,3 +163,21 @@ def test_a_cancelled_sweep_keeps_the_speeds_it_has_passed(screen, tmp_path):
     whole = ff.sweep(screen, omega)
     assert whole.complete
     np.testing.assert_array_equal(found.amplitude("main"), whole.amplitude("main")[:3])
+
+
+def test_a_glide_that_ends_in_chaos_has_jumped():
+    screen = ff.FlipFlowScreen(
+        main_mass=492.3697878296305, floating_mass=256.99200310348476,
+        eccentric_moment=2.098880491781376, isolation_stiffness=165118.24244853383,
+        isolation_damping=2325.4215666204746, shear_stiffness=2829512.36825727,
+        shear_damping=4937.930155228843, stop_stiffness=41342708.252715796,
+        stop_damping=41342.7082527158, clearance=0.00440841022657993, clearance_minus=0.01,
+        stop_law="elasto-gap",
+    )  # fmt: skip
+    glide = ff.ramp(screen, (340.0, 367.0), 2.5)
+    (jump,) = glide.jumps
+    close("fold", jump.fold, 346.27035536787855, rel=1e-9)
+    assert 0.3 < jump.late < 4.0
+    speed, size = glide.amplitude("relative")
+    before, after = size[speed < jump.fold][-20:], size[speed > jump.omega + 5.0]
+    assert np.median(after) < 0.8 * before.min()

@@ -186,7 +186,7 @@ def test_shaft_and_frames_solve_lagranges_equations_together(screen):
     """[M -q; -q^T J] (a, phi'') = (p phi'^2 - C v - K x - d H, T - T_f), written out and solved."""
     motor = Motor(rated_power=3000.0, synchronous_speed=157.0)
     drive = Drive(inertia=0.5, motor=motor, ratio=1.5, friction=3.0, viscous_friction=0.02)
-    normal = NormalDirection(1226.0, 630e3, 9866.0)
+    normal = NormalDirection(1226.0, 630e3, 9866.0, 1.0)
     state = np.array([3e-3, -5e-3, 2e-3, 0.4, -0.3, 0.2])
     angle, speed, m0r = 0.7, 60.0, screen.eccentric_moment
     stepper = Stepper(

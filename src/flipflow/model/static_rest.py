@@ -15,6 +15,7 @@ from flipflow.model.elements import ClearanceSpring
 MOST_STATES = 4096  # contact states that are tried, those with few stops engaged first
 NEWTON_STEPS = 100
 ROUNDING = 1e-9  # share of the machine's size by which a stop may miss its gap
+SOLVED = 1e-13  # share of the sizes of matrix and solution by which any row may be missed
 
 
 def static_rest(K: Real, springs: Sequence[ClearanceSpring], force: Real) -> Real:
@@ -86,9 +87,18 @@ def rest_of(
             push += k * signed_gap_of(spring, regime) * d
     if not push.any():
         return push
-    x = np.linalg.lstsq(held, push, rcond=None)[0]
-    size = np.abs(held) @ np.abs(x) + np.abs(push)
-    return np.asarray(x) if np.all(np.abs(held @ x - push) <= ROUNDING * size) else None
+    x = np.asarray(np.linalg.lstsq(held, push, rcond=None)[0], np.float64)
+    allowed = ROUNDING * np.abs(push) + rounding(held, x)
+    return x if np.all(np.abs(held @ x - push) <= allowed) else None
+
+
+def rounding(rows: Real, x: Real) -> Real:
+    """What products of rows (..., N) with a position (N,) may be off by.
+
+    Where a position is zero but for rounding, its own size tells nothing.
+    """
+    whole = SOLVED * np.linalg.norm(rows) * np.linalg.norm(x)
+    return np.asarray(ROUNDING * (np.abs(rows) @ np.abs(x)) + whole)
 
 
 def signed_gap_of(spring: ClearanceSpring, side: int) -> float:
@@ -106,7 +116,7 @@ def _holds(springs: Sequence[ClearanceSpring], sides: Sequence[int], x: Real) ->
     """Whether a position lies where its contact state holds, but for rounding."""
     for spring, side in zip(springs, sides, strict=True):
         y = float(spring.direction @ x)
-        slack = ROUNDING * float(np.abs(spring.direction) @ np.abs(x))
+        slack = float(rounding(spring.direction, x))
         if side == OPEN and not -spring.gaps[1] - slack <= y <= spring.gaps[0] + slack:
             return False
         beyond = (y - signed_gap_of(spring, side)) * side if side != OPEN else 0.0

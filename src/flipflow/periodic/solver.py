@@ -23,7 +23,7 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.static_rest import ROUNDING
+from flipflow.model.static_rest import rounding
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.readings import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
@@ -508,8 +508,7 @@ def pressed_depths(system: MechanicalSystem, rest: Real) -> Iterator[float]:
     for spring in system.springs if rest.any() else ():
         y = float(spring.direction @ rest)
         depth = max(y - spring.gaps[0], -y - spring.gaps[1])
-        rounding = ROUNDING * float(np.abs(spring.direction) @ np.abs(rest))
-        if spring.acts and depth > rounding:
+        if spring.acts and depth > rounding(spring.direction, rest):
             yield depth
 
 

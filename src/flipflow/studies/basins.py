@@ -285,7 +285,10 @@ def _notes(run: Run, most: int, motions: int) -> tuple[str, ...]:
     failed = int(np.sum(ran & (run.code != status.OK)))
     slow = int(np.sum(ran & (run.code == status.OK) & (run.label == NOT_SETTLED)))
     if motions == 0:
-        notes.append("No stable motion was found: the machine does not settle at this speed.")
+        notes.append(
+            "No stable motion was found: the machine does not settle at this speed, or nothing "
+            "holds it where it floats."
+        )
     if slow:
         notes.append(f"{slow} cells did not settle within {most} turns.")
     if failed:

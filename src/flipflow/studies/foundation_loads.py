@@ -483,8 +483,7 @@ def _run_loads(name: str, run: RunUp) -> RunLoads:
     along = _between(history.t, k * x + c * v, k * v + c * a)
     across = y = None
     if history.normal is not None and screen.normal_stiffness is not None:
-        # A run counts the normal direction such that the unbalance turns from up the slope to it.
-        down = -screen.normal_sense * history.normal.T
+        down = -history.normal.T
         kn, cn = screen.normal_stiffness, screen.normal_damping or 0.0
         across = _between(history.t, kn * down[0] + cn * down[1], kn * down[1] + cn * down[2])
         y = _between(history.t, down[0], down[1])

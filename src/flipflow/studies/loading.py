@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
@@ -254,29 +255,30 @@ def _region(
         for branch in (unloaded, loaded)
     ]
     before, after = amplitudes
-    size = np.abs(after - before)
-    if not np.isfinite(size).any():
+    change = after - before
+    if not np.isfinite(change).any():
         why = " ".join(one.status.value for one in (unloaded, loaded) if not one.complete)
         raise IncompleteError(
             "No motion of both the empty and the loaded machine is known in the operating region, "
             f"{ends[0]:.6g} to {ends[1]:.6g} rad/s. {why}".strip()
         )
 
-    def found(index: int, sign: float) -> Change:
-        return _refined(unloaded, loaded, omega, size, index, sign)
-
-    least, greatest = found(int(np.nanargmin(size)), 1.0), found(int(np.nanargmax(size)), -1.0)
-    return RegionChange(start, omega, before, after, least, greatest)
-
-
-def _refined(
-    unloaded: Branch, loaded: Branch, omega: Real, size: Real, index: int, sign: float
-) -> Change:
-    """The least (sign 1) or greatest (-1) change between the neighbours of a sample."""
-
     def at(w: float) -> Change:
         return Change(w, relative_from_below(unloaded, w), relative_from_below(loaded, w))
 
+    zeros = (
+        at(float(brentq(lambda w: at(float(w)).change, omega[k], omega[k + 1], xtol=1e-9)))
+        for k in np.flatnonzero(change[:-1] * change[1:] < 0.0)
+    )
+    least = min((_refined(at, omega, change, 1.0), *zeros), key=lambda one: abs(one.change))
+    greatest = _refined(at, omega, change, -1.0)
+    return RegionChange(start, omega, before, after, least, greatest)
+
+
+def _refined(at: Callable[[float], Change], omega: Real, change: Real, sign: float) -> Change:
+    """The least (sign 1) or greatest (-1) change around the sample that has it."""
+    size = np.abs(change)
+    index = int(np.nanargmin(size) if sign > 0.0 else np.nanargmax(size))
     low, high = omega[max(index - 1, 0)], omega[min(index + 1, omega.size - 1)]
     best = minimize_scalar(
         lambda w: sign * abs(at(float(w)).change), bounds=(low, high), method="bounded",

@@ -82,7 +82,8 @@ def periodic_orbits(
     tuple of Orbit
         Stable and unstable, each once whatever its phase, largest relative motion at the first gap
         first. A search, not a proof: a motion with a small basin and weak instability can be
-        missed.
+        missed. Motions of a machine that nothing holds while it touches no stop are as many as
+        places where it can float, and are left out.
 
     Raises
     ------

@@ -40,7 +40,8 @@ class LateJump:
     fold
         Speed in rad/s at which the motion ceases to exist.
     omega
-        Speed in rad/s at which the amplitude has gone half the way to that of the other motion.
+        Speed in rad/s at which the amplitude has gone half the way to that of the other motion; to
+        the median of what follows where none of one turn is stable beyond the fold.
     """
 
     fold: float
@@ -187,28 +188,33 @@ def _jumps(
     speed = np.interp(t, history.t, history.omega)
     found = []
     for fold in branch.folds:
-        other = _beyond(branch, fold, rising=rising)
         past = speed > fold.omega if rising else speed < fold.omega
-        if other is None or not past.any() or past.all():
+        if not _loses(branch, fold, rising=rising) or not past.any() or past.all():
             continue
-        lost = np.abs(size - fold.amplitude(which)) > np.abs(size - other.amplitude(which))
+        before = fold.amplitude(which)
+        other = _beyond(branch, fold, rising=rising)
+        after = float(np.median(size[past])) if other is None else other.amplitude(which)
+        lost = np.abs(size - before) > np.abs(size - after)
+        # What moves irregularly beyond is known by the glide alone, which was on the motion before.
+        if other is None and lost[~past][-1]:
+            continue
         rows = np.flatnonzero(past & lost)
         if rows.size:
             found.append(LateJump(fold.omega, float(speed[rows[0]])))
     return tuple(found)
 
 
-def _beyond(branch: Branch, fold: SpecialPoint, *, rising: bool) -> Orbit | None:
-    """The stable motion just past a fold at which a gliding speed loses its motion.
-
-    None for a fold that opens towards the way the speed goes: nothing is lost there.
-    """
+def _loses(branch: Branch, fold: SpecialPoint, *, rising: bool) -> bool:
+    """Whether a gliding speed loses its motion at a fold, which else opens towards its way."""
     sign = 1.0 if rising else -1.0
     k = int(fold.position)
     neighbours = branch.omega[max(k - 1, 0) : k + 3]
-    if np.mean(sign * (neighbours - fold.omega)) > 0.0:
-        return None
-    past = (1.0 + sign * BEYOND) * fold.omega
+    return bool(np.mean(sign * (neighbours - fold.omega)) <= 0.0)
+
+
+def _beyond(branch: Branch, fold: SpecialPoint, *, rising: bool) -> Orbit | None:
+    """The stable motion of one turn just past a fold; None where none is known."""
+    past = (1.0 + (BEYOND if rising else -BEYOND)) * fold.omega
     if not branch.omega.min() <= past <= branch.omega.max():
         return None
     return next((orbit for orbit in branch.orbits_at(past) if orbit.stable), None)

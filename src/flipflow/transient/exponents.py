@@ -37,7 +37,6 @@ CERTAIN = 4.0  # standard errors beyond which an exponent is not 0
 STRETCHES = 16  # of the growth, whose ranges tell whether it stays within bounds
 # A random walk's range over all of it is that over a sixteenth times 4, one within bounds times 1.
 WITHIN_BOUNDS = 2.0
-REPEATS = 1e-9  # distance of states, relative to the motion, within which it repeats
 PERIODS = 2048  # forcing periods followed for a word, after
 ALIGNING = 256  # those in which the frame turns into the directions that grow most
 MOST_PARTS = 4096  # times a period that the frame may have to be made orthonormal
@@ -83,7 +82,7 @@ class Growth:
 
     def word(self, settling: Settling) -> Word:
         """What the motion is."""
-        if self._repeats(settling):
+        if settling.repeats_after(self.recent, self.omega) is not None:
             return PERIODIC
         largest, error = self.exponents[0], CERTAIN * self.standard_error[0]
         bounded = self._within_bounds()
@@ -96,16 +95,6 @@ class Growth:
         if largest < -error or (near is not None and self._comes_closer(settling, near)):
             return PERIODIC
         return UNDECIDED
-
-    def _repeats(self, settling: Settling) -> bool:
-        """Whether the last states repeat after a number of periods that is looked for."""
-        recent = self.recent
-        same = REPEATS * (settling.size(recent, self.omega) + settling.solver.length)
-        counts = range(1, min(settling.max_periods, recent.shape[0] - 1) + 1)
-        return any(
-            settling.distance(recent[count:], recent[:-count], self.omega) <= same
-            for count in counts
-        )
 
     def _comes_closer(self, settling: Settling, near: Point) -> bool:
         """Whether the way to a periodic motion has at least halved."""
@@ -159,6 +148,15 @@ def with_word(settling: Settling, row: Settled, omega: float) -> Settled:
     return replace(row, word=found.word(settling))
 
 
+def generic_frame(size: int, omega: float) -> Real:
+    """An orthonormal frame of displacements and velocities over omega, (2 N, 2 N), with no zeros.
+
+    Displacements alone excite every mode in one phase, and would not turn out of it.
+    """
+    generic = np.linalg.qr(np.random.default_rng(0).normal(size=(size, size)))[0]
+    return np.asarray(np.repeat([1.0, omega], size // 2)[:, None] * generic)
+
+
 class _Frame:
     """A state and its frame of disturbances, carried on batch by batch."""
 
@@ -166,7 +164,7 @@ class _Frame:
         size = z.size
         self.solver, self.omega, self.parts = solver, omega, 1
         self.z = np.array(z, float)
-        self.frame = np.diag(np.repeat([1.0, omega], size // 2))
+        self.frame = generic_frame(size, omega)
         self.touched = np.zeros(len(solver.springs))
         self.recent = self.z[None].copy()
 

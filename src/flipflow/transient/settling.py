@@ -22,7 +22,7 @@ from flipflow.errors import IncompleteError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.solver import STEP_SHARE, Point
-from flipflow.periodic.stability import STABLE, stability_words
+from flipflow.periodic.stability import NEAR_ONE, STABLE, stability_words
 
 Word = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 PERIODIC: Word = "periodic"
@@ -38,6 +38,7 @@ LONGEST_CHUNK = 256  # most turns run at once while no periodic motion is in sig
 NEAR = 0.1  # distance, relative to the motion, within which a periodic motion is looked for
 SAME_PERIOD = 3.0  # the first period whose step is within this factor of the least one is taken
 RECENT = 64  # turns whose states are kept
+REPEATS = 1e-9  # distance of states, relative to the motion, within which it repeats
 SAME = 1e-6  # distance, relative to the motion, within which two states are one
 
 
@@ -103,7 +104,7 @@ class Settling:
         turns, chunk = 0, FIRST_CHUNK
         recent = np.array(z, float)[None]
         while True:
-            point = self.approached(recent, omega)
+            point = self.ended_on(recent, omega)
             distance = math.inf if point is None else self.distance(recent[-1], point.u, omega)
             done = distance <= TOLERANCE * (self.size(recent, omega) + self.solver.length)
             if done or turns >= most:
@@ -123,6 +124,28 @@ class Settling:
             return self.solver.section(z, omega, turns)
         except IncompleteError:
             return None
+
+    def ended_on(self, recent: Real, omega: float) -> Point | None:
+        """The motion approached, or the one that a machine repeats which nothing holds in place.
+
+        Such a machine floats where it has come to, a multiplier of its motion is 1, and Newton's
+        equations have no single solution.
+        """
+        point = self.approached(recent, omega)
+        periods = self.repeats_after(recent, omega) if point is None else None
+        if periods is None:
+            return point
+        floating = Point(self.solver_of(periods).formulation, recent[-1].copy(), omega)
+        largest = np.abs(floating.eigenvalues).max()
+        return floating if largest <= 1.0 + NEAR_ONE else None
+
+    def repeats_after(self, recent: Real, omega: float) -> int | None:
+        """Forcing periods after which all recent states (K, 2 N) come again, if they do."""
+        same = REPEATS * (self.size(recent, omega) + self.solver.length)
+        counts = range(1, min(self.max_periods, recent.shape[0] - 1) + 1)
+        return next(
+            (n for n in counts if self.distance(recent[n:], recent[:-n], omega) <= same), None
+        )
 
     def approached(self, recent: Real, omega: float) -> Point | None:
         """The stable periodic motion near the last of the recent states (K, 2 N)."""
@@ -167,7 +190,7 @@ class Settling:
         ahead = self._run(z, omega, 2 * self.max_periods)
         if ahead is None:
             return None
-        point = self.approached(np.concatenate([z[None], ahead]), omega)
+        point = self.ended_on(np.concatenate([z[None], ahead]), omega)
         if point is None:
             return None
         return min(self.distance(z, phase, omega) for phase in self.phases(point))

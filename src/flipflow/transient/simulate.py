@@ -311,12 +311,12 @@ def _normal(
 
 
 def _normal_system(machine: Machine) -> MechanicalSystem:
-    """Both frames as one mass on the isolation, under m0r w^2 sin(w t)."""
+    """Both frames as one mass on the isolation, under s m0r w^2 sin(w t), s its sense."""
     screen = cast("FlipFlowScreen", machine)
     return MechanicalSystem(
         [[screen.main_mass + screen.floating_mass]],
         [[cast("float", screen.normal_damping)]],
         [[cast("float", screen.normal_stiffness)]],
         (),
-        Unbalance([-1j * screen.eccentric_moment]),
+        Unbalance([-1j * screen.normal_sense * screen.eccentric_moment]),
     )

@@ -66,7 +66,7 @@ def normal_direction(machine: Machine) -> NormalDirection | None:
     k, c = machine.normal_stiffness, machine.normal_damping
     if k is None or c is None:
         return None
-    return NormalDirection(machine.main_mass + machine.floating_mass, k, c)
+    return NormalDirection(machine.main_mass + machine.floating_mass, k, c, machine.normal_sense)
 
 
 def unbalance_weight(machine: Machine) -> UnbalanceWeight:

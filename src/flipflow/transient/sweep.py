@@ -23,7 +23,14 @@ from flipflow.periodic.solver import Formulation, Point
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.transient.exponents import with_word
-from flipflow.transient.settling import MAX_PERIODS, MOST_TURNS, Settled, Settling, Word
+from flipflow.transient.settling import (
+    MAX_PERIODS,
+    MOST_TURNS,
+    Settled,
+    Settling,
+    Word,
+    is_stable,
+)
 
 
 @dataclass(frozen=True)
@@ -292,6 +299,9 @@ def _jumped(last: Step, before: Settled, step: Step, after: Settled) -> bool:
     """
     if before.point is None or after.point is None:
         return (before.point is None) != (after.point is None)
+    one, other = is_stable(before.point), is_stable(after.point)
+    if not (one and other):
+        return one != other  # what floats in place is on no branch
     ahead = _leads(step, before.point, last.value, after)
     return not (ahead or _leads(last, after.point, step.value, before))
 

@@ -73,11 +73,15 @@ class RungeKutta:
 
 @dataclass(frozen=True)
 class NormalDirection:
-    """Mass, stiffness and damping of the motion normal to the surface, in SI."""
+    """Mass, stiffness and damping of the motion normal to the surface, in SI.
+
+    ``sense`` is that of the unbalance: :attr:`~flipflow.FlipFlowScreen.normal_sense`.
+    """
 
     mass: float
     stiffness: float
     damping: float
+    sense: float
 
 
 class UnbalanceWeight(NamedTuple):
@@ -297,7 +301,8 @@ def extended(
     """M, C, K, vectors of the exciting terms (E, N) and constant force, with the normal direction.
 
     It is one more degree of freedom. Normal to the surface the unbalance acts a quarter of a turn
-    later: its component is -i times that along the surface.
+    later, or sooner where it turns the other way: its component is -i, or i, times that along the
+    surface.
     """
     vector = np.array([vector for one in system.excitations for _, vector in one.terms])
     static = np.array(system.constant_force)
@@ -305,7 +310,7 @@ def extended(
         return np.array(system.M), np.array(system.C), np.array(system.K), vector, static
     pairs = ((system.M, normal.mass), (system.C, normal.damping), (system.K, normal.stiffness))
     M, C, K = (np.block([[A, np.zeros((len(A), 1))], [np.zeros(len(A)), b]]) for A, b in pairs)
-    across = -1j * vector.sum(axis=1, keepdims=True)
+    across = -1j * normal.sense * vector.sum(axis=1, keepdims=True)
     return M, C, K, np.concatenate([vector, across], axis=1), np.append(static, 0.0)
 
 
