@@ -343,3 +343,29 @@ def test_doubled_motions_that_end_at_a_corner_are_cut_there() -> None:
         return 7.05 - 1.02 / 0.636 - abs(1.0 / (0.636 - 1.077 * omega**2 + 0.162j * omega))
 
     close("end", branch.omega[-1], brentq(room, 0.6, 0.7), abs=1e-6)
+
+
+def test_a_branch_point_at_which_no_motion_is_solved_for_keeps_the_branch():
+    """The nearest motion stands for it, with the parameter's value."""
+    M = np.diag([1.4174600013204364, 1.1454834748344422, 1.0893036332777184, 0.5553159144999489])
+    C, K = (
+        np.diag(one) + np.diag(beside, 1) + np.diag(beside, -1)
+        for one, beside in (
+            ([0.1762877413203289, 0.1456117756622435, 0.07144405688839077, 0.020002863765821388],
+             [-0.08805562497910742, -0.04610131593479168, -0.0144497046208219]),
+            ([4.052828532678113, 3.3539235228474773, 1.5137755138903395, 0.3612426155205475],
+             [-2.2013906244776855, -1.152532898369792, -0.3612426155205475]),
+        )
+    )  # fmt: skip
+    stops = (
+        ff.ClearanceSpring([1, -1, 0, 0], 1.4978880389357119, 0.16033456524986658,
+                           1.1858833105792475, 1.225743760857352),
+        ff.ClearanceSpring([-1, 0, 0, 1], 15.723068349759481, 0.2524554944204484,
+                           0.6559009546223957, law="elasto-gap"),
+    )  # fmt: skip
+    system = ff.MechanicalSystem(M, C, K, stops, ff.HarmonicForce([1, 0, 0, 0]))
+    for orbit in ff.periodic_orbits(system, 0.7119863585171984):
+        branch = ff.continue_orbit(orbit, "forcing", (0.4, 1.0))
+        for point in branch.special_points:
+            assert 0.4 <= point.value <= 1.0
+            assert point.orbit.omega == 0.7119863585171984

@@ -50,7 +50,7 @@ def double_fold(solver: ExactSolver, traced: Traced, p: int) -> tuple[float, Poi
     w, null = known.get(share, (ends[0], np.zeros((0, chord.size))))
     if null.shape[0] < RANKS:
         raise IncompleteError(f"no fold found near {traced.omega[p]:.6g}")
-    return share, Point(solver.formulation, w[:-1], float(w[-1]), 0.0, None)
+    return share, solver.point_at(w[:-1], float(w[-1]), 0.0, None)
 
 
 def _corrected(solver: ExactSolver, guess: Real, scale: Real, chord: Real) -> tuple[Real, Real]:

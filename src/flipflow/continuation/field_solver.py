@@ -144,7 +144,7 @@ class FieldSolver(ExactSolver):
         course = Course(omega, omega, 1e-3 * (high - low), STEP_SHARE, 1.0, SHARP)
         record = self.new_branch(1)
         _, points, _ = self._follow(record, u, omega, course)
-        return None if points == 0 else self._point(record.u[0], omega, np.nan, None)
+        return None if points == 0 else self.point_at(record.u[0], omega, np.nan, None)
 
     def eigenvalues(self, traced: Traced, maps: Real) -> Complex:  # noqa: ARG002
         return eigenvalues(maps)
@@ -173,7 +173,7 @@ class FieldSolver(ExactSolver):
         size = 2 * self.system.size
         return np.asarray(jacobian[..., :size, :size] + np.eye(size))
 
-    def _point(
+    def point_at(
         self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None
     ) -> FieldPoint:
         size = 2 * self.system.size
@@ -214,4 +214,4 @@ class FieldSolver(ExactSolver):
             for J, phase in zip(record.jacobian, record.phase, strict=True)
         ]
         rows = zip(record.u, record.omega, record.tangent[:, -1], known, strict=True)
-        return [self._point(u, float(at), float(slope), J) for u, at, slope, J in rows]
+        return [self.point_at(u, float(at), float(slope), J) for u, at, slope, J in rows]

@@ -286,7 +286,7 @@ def _crossing(solver: Solver, traced: Traced, p: int, ends: Real) -> Found:
     nearer = int(abs(ends[1]) < abs(ends[0]))
     u, omega = traced.u[p + nearer].copy(), float(traced.omega[p + nearer])
     rise = float(traced.tangent[p + nearer, -1] / traced.course.omega_step)
-    known = {float(nearer): Point(solver.formulation, u, omega, rise)}
+    known = {float(nearer): solver.point_at(u, omega, rise, None)}
 
     def value(share: float) -> float:
         if share in (0.0, 1.0):

@@ -394,11 +394,11 @@ def extremes(
     radian apart at the mean frequency of the motion. A pair of zeros between two samples could hide
     only a ripple smaller than what the samples resolve.
     """
-    frequency = _mean_frequency(motion, count, j, 0.0)
+    frequency = mean_frequency(motion, count, j, 1, 0.0)
     for i in range(count):
         if motion.rate[i].real > 0.0:
             # What grows may be nothing at first and all of the motion at last.
-            frequency = max(frequency, _mean_frequency(motion, count, j, duration))
+            frequency = max(frequency, mean_frequency(motion, count, j, 1, duration))
             break
     samples = min(1 + int(3.0 * frequency * duration), 4000)
     step = duration / samples
@@ -427,15 +427,27 @@ def extremes(
 
 
 @kernel(inline=True)
-def _mean_frequency(motion: GapMotion, count: int, j: int, t: float) -> float:
-    """Root mean square of |rate|, each weighted with the size of its term at time t."""
-    weight, second = 0.0, 0.0
+def mean_frequency(motion: GapMotion, count: int, first: int, rows: int, t: float) -> float:
+    """Root mean square of |rate|, each weighted with the size of its terms at time t in some rows.
+
+    Slow terms may be large and cancel, or hold the mean: not less than that of what vibrates, each
+    weighted with the square of its acceleration. Other terms add a zero of y' each at most.
+    """
+    weight, second, bends, squared = 0.0, 0.0, 0.0, 0.0
     exponentials(motion, count, t)
     for i in range(count):
-        size = modulus(motion.amplitude[j, i]) * motion.decay[i]
+        size = 0.0
+        for j in range(first, first + rows):
+            size += modulus(motion.amplitude[j, i])
+        size *= motion.decay[i]
+        turning = motion.rate[i].imag * motion.rate[i].imag
         weight += size
-        second += size * motion.size[i] * motion.size[i]
-    return math.sqrt(second / weight) if weight > 0.0 else 0.0
+        second += size * (motion.rate[i].real * motion.rate[i].real + turning)
+        bend = size * turning
+        bends += bend * bend
+        squared += bend * bend * turning
+    mean = second / weight if weight > 0.0 else 0.0
+    return math.sqrt(max(mean, squared / bends) if bends > 0.0 else mean)
 
 
 @kernel(inline=True)

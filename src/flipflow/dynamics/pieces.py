@@ -19,7 +19,7 @@ from flipflow.dynamics.contact_search import (
     exponential,
     exponentials,
     gap_state,
-    modulus,
+    mean_frequency,
 )
 
 PER_RADIAN = 4.0  # samples of a vector's length per radian of its mean frequency
@@ -67,14 +67,7 @@ def longest(motion: GapMotion, count: int, duration: float) -> tuple[float, floa
 
     All samples count, and the summits beside the highest.
     """
-    weight, second = 0.0, 0.0
-    for i in range(count):
-        size = modulus(motion.amplitude[0, i]) + modulus(motion.amplitude[1, i])
-        weight += size
-        second += size * (motion.rate[i].real ** 2 + motion.rate[i].imag ** 2)
-    samples = 4
-    if weight > 0.0:
-        samples += int(PER_RADIAN * math.sqrt(second / weight) * duration)
+    samples = 4 + int(PER_RADIAN * mean_frequency(motion, count, 0, 2, 0.0) * duration)
     best, at, before, rate_before = 0.0, 0.0, 0.0, 0.0
     for k in range(samples + 1):
         t = duration * k / samples

@@ -384,9 +384,9 @@ class Solver(ABC):
         w, tangent = self.corrector.home, float(self.corrector.tangent[-1])
         at_home = self.corrector.phase[0] == 0.0
         J = self.corrector.J[:, :-1] if at_home else None
-        return share, self._point(w[:-1].copy(), float(w[-1]), tangent, J)
+        return share, self.point_at(w[:-1].copy(), float(w[-1]), tangent, J)
 
-    def _point(self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None) -> Point:
+    def point_at(self, u: Real, omega: float, omega_tangent: float, jacobian: Real | None) -> Point:
         """A corrected point; where a Jacobian tells the return map, with it."""
         known = None
         if self.reads_jacobian and jacobian is not None:
@@ -418,7 +418,7 @@ class Solver(ABC):
         if not self._corrected(record, u, omega, correction.SHARP):
             return None
         J = record.jacobian[0] if record.phase[0] == 0.0 else None
-        point = self._point(record.u[0], omega, float(record.tangent[0, -1]), J)
+        point = self.point_at(record.u[0], omega, float(record.tangent[0, -1]), J)
         if J is None and self.reads_jacobian:
             # Nearly every caller asks for the map; found later, it needs a solver of its own.
             return replace(point, known_map=self._map_of(point))
