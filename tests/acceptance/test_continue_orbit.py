@@ -364,8 +364,11 @@ def test_a_branch_point_at_which_no_motion_is_solved_for_keeps_the_branch():
                            0.6559009546223957, law="elasto-gap"),
     )  # fmt: skip
     system = ff.MechanicalSystem(M, C, K, stops, ff.HarmonicForce([1, 0, 0, 0]))
+    kinds = set()
     for orbit in ff.periodic_orbits(system, 0.7119863585171984):
         branch = ff.continue_orbit(orbit, "forcing", (0.4, 1.0))
         for point in branch.special_points:
+            kinds.add(point.kind)
             assert 0.4 <= point.value <= 1.0
             assert point.orbit.omega == 0.7119863585171984
+    assert "branch point" in kinds

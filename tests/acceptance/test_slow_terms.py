@@ -46,10 +46,9 @@ def test_machines_that_nobody_chose(seed):
         )  # fmt: skip
         for orbit in ff.periodic_orbits(system, rng.uniform(1.0, 3.0)):
             t = np.linspace(0.0, orbit.period, 20_001)
-            y, a = orbit.displacement(0, t), orbit.acceleration(0, t)
+            y = orbit.displacement(0, t)
             close("amplitude", orbit.amplitude(0), np.ptp(y) / 2.0, rel=1e-5)
             close("mean", orbit.mean(0), (y.max() + y.min()) / 2.0, abs=1e-5 * np.ptp(y))
-            assert np.isfinite(a).all()
             found += 1
     assert found > 4
 

@@ -83,6 +83,23 @@ def test_a_series_has_the_peaks_of_its_samples():
         assert working.value(name) == pytest.approx(np.hypot(one, other).max(), rel=CLOSE)
 
 
+def test_slow_terms_that_are_large_hide_no_summit():
+    """A soft mode of metres that cancels in free flight, under a second order of the force."""
+    forces = (ff.HarmonicForce([0.9]), ff.HarmonicForce([1.94], order=4))
+    stop = ff.ClearanceSpring([1.0], 40.0, 2.0, math.inf, 0.0)
+    system = ff.MechanicalSystem(
+        [[1.0]], [[0.107]], [[1e-3]], (stop,), forces, static_force=[-0.866]
+    )
+    linear = np.array([[1.0], [0.0], [0.0]])
+    lengths = []
+    for orbit in ff.periodic_orbits(system, 1.5, 2):
+        found = longest_on(orbit.motion, linear, -0.2)
+        seen = sampled(orbit.motion, linear, -0.2, 0.0, 0.0)
+        assert seen * (1.0 - 1e-12) <= found <= seen * (1.0 + CLOSE)
+        lengths.append(found)
+    assert lengths
+
+
 def test_times_in_any_order_of_memory():
     motion = ff.periodic_orbits(machine("paper", 1), omega=1.3)[0].motion
     t, piece = motion.samples()

@@ -447,7 +447,8 @@ def mean_frequency(motion: GapMotion, count: int, first: int, rows: int, t: floa
         bends += bend * bend
         squared += bend * bend * turning
     mean = second / weight if weight > 0.0 else 0.0
-    return math.sqrt(max(mean, squared / bends) if bends > 0.0 else mean)
+    known = bends > 0.0 and squared < math.inf
+    return math.sqrt(max(mean, squared / bends) if known else mean)
 
 
 @kernel(inline=True)

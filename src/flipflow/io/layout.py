@@ -18,6 +18,7 @@ from flipflow.model.fields import FIELD, FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS, PASSING_FIELDS
 from flipflow.model.quantities import needing
 from flipflow.model.screen import Measured, Rotation, TemperatureOf
+from flipflow.model.starter import STARTS
 
 FORMAT = 1
 MOST_LISTED = 30  # names that a sentence lists
@@ -213,7 +214,7 @@ def _load_entries() -> Iterable[Entry]:
 
 START = Entry(
     "drive", "start", "choice", "How the motor is put on the mains.", "direct",
-    choices=("direct", "star-delta", "converter"),
+    choices=tuple(STARTS.values()),
 )  # fmt: skip
 TORQUE_TABLE = Entry(
     "drive", "torque_table", "torques",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import NoneType
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_positive
@@ -74,3 +76,6 @@ class Converter:
 
 
 Starter = StarDelta | Converter
+STARTS: Mapping[type, str] = {
+    NoneType: "direct", StarDelta: "star-delta", Converter: "converter",
+}  # fmt: skip

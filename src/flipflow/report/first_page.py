@@ -30,6 +30,7 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, speed
 from flipflow.report.parts import worst_of
 from flipflow.report.registry import Part, section
+from flipflow.report.weight import AT_REST, contact
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import (
     Assessment,
@@ -298,10 +299,9 @@ def contact_sentence(region: OperatingRegion) -> str:
 
 
 def _touched(speed: float | None, gap: float) -> str:
-    """Where a side is first touched, in words: a side that the weight closes is at rest."""
-    if speed is not None:
-        return f"at {rpm(speed)} rpm"
-    return "at rest" if gap < 0.0 else "not touched before"
+    """Where a side is first touched, in words."""
+    word = contact(speed, gap)
+    return {NOTHING: "not touched before", AT_REST: AT_REST}.get(word, f"at {word} rpm")
 
 
 def stop_sentence(assessment: Assessment) -> str:

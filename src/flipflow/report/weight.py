@@ -13,6 +13,7 @@ from flipflow.studies.assessment import Assessment, CaseAssessment
 from flipflow.studies.gaps_under_weight import GapsUnderWeight
 
 LEAD = "Weight:"
+AT_REST = "at rest"  # where a side is touched that the weight closes
 NOT_CONSIDERED = (
     "weight not considered: frames.deck_angle is missing, so both gaps are taken as they are given."
 )
@@ -87,8 +88,8 @@ def _table(cases: list[CaseAssessment]) -> Table:
             _millimetres(case.gaps.shift),
             _millimetres(case.gaps.plus),
             _millimetres(case.gaps.minus),
-            _contact(case.gaps.contact_plus, case.gaps.plus),
-            _contact(case.gaps.contact_minus, case.gaps.minus),
+            contact(case.gaps.contact_plus, case.gaps.plus),
+            contact(case.gaps.contact_minus, case.gaps.minus),
             _kilo(case.gaps.force_plus),
             _kilo(case.gaps.force_minus),
         )
@@ -106,9 +107,10 @@ def _millimetres(value: float) -> str:
     return "no stop" if math.isinf(value) else f"{1e3 * value:.2f}"
 
 
-def _contact(omega: float | None, gap: float) -> str:
+def contact(omega: float | None, gap: float) -> str:
+    """Where a side is first touched: the speed in rpm, "at rest", or nothing."""
     if gap <= 0.0:
-        return "at rest"
+        return AT_REST
     return NOTHING if omega is None else rpm(omega)
 
 

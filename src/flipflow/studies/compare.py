@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
-from types import NoneType
 
 from flipflow import __version__
 from flipflow.errors import InputError
@@ -23,7 +22,7 @@ from flipflow.model.monitor import Monitor
 from flipflow.model.project import Document, Project
 from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
-from flipflow.model.starter import Converter, StarDelta
+from flipflow.model.starter import STARTS
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.assessment import Assessment, CaseAssessment, assess, relative_margin
@@ -53,9 +52,6 @@ SCREEN_WORDS: Mapping[str, str] = {
     "stop_law": "stops.law", "clearance_measured": "stops.clearance_measured",
     "rotation": "exciter.rotation", "temperature_factor": "shear_springs.temperature_factor",
     "stop_temperature_factor": "stops.temperature_factor",
-}  # fmt: skip
-STARTS: Mapping[type, str] = {
-    NoneType: "direct", StarDelta: "star-delta", Converter: "converter",
 }  # fmt: skip
 SWITCH_OVER: Mapping[str, str] = {"speed": "switch_over_speed", "time": "switch_over_time"}
 
@@ -158,7 +154,7 @@ class Comparison(Frozen, Result):
 
     @cached_property
     def results(self) -> tuple[ResultChange, ...]:
-        """Every result: characteristic speeds, then case by case quantities and margins."""
+        """Characteristic speeds, then case by case quantities, margins, starts, stops, blows."""
         flat = [_results_of(one) for one in self.assessments]
         rows = []
         for key in dict.fromkeys(key for results in flat for key in results):
@@ -303,8 +299,7 @@ def _drive_inputs(drive: Drive | None) -> Iterator[Input]:
     if drive is None:
         return
     fields = {field.name: field for field in DRIVE_FIELDS}
-    start = STARTS[type(drive.starter)]
-    yield "drive.start", ("", "", start)
+    yield "drive.start", ("", "", STARTS[type(drive.starter)])
     for name, value in _parts(replace(drive, assumed=(), assumed_fields=())):
         last = name.rpartition(".")[2]
         if name.startswith("starter."):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -202,18 +203,8 @@ def jump_risk(
     blows = Blows(attractors, point, home, largest_impulse)
     turns = point.formulation.turns
     phases = 2.0 * np.pi * np.arange(PHASES * turns) / PHASES
-    every = np.arange(len(blows.rows))
-    if len(attractors.orbits) == 1:
-        few = phases[::LONE_STRIDE]
-        blows.least(np.repeat(every, few.size), np.tile(few, every.size))
-    least = np.full((every.size, phases.size), np.inf)
-    if len(attractors.orbits) > 1:
-        least = blows.least(
-            np.repeat(every, phases.size),
-            np.tile(phases, every.size),
-            lambda share: say("blows", 0.9 * share),
-        ).reshape(least.shape)
-    throws = [_throw(blows, int(row), phases, least[row]) for row in every]
+    least = _scanned(blows, phases, lambda share: say("blows", 0.9 * share))
+    throws = [_throw(blows, row, phases, least[row]) for row in range(len(blows.rows))]
     found = [throw for throw in throws if throw is not None]
     others = tuple(o for k, o in enumerate(attractors.orbits) if k != home)
     say("done", 1.0)
@@ -228,6 +219,21 @@ def jump_risk(
         _thresholds(blows, least),
         _notes(blows, others, found),
     )
+
+
+def _scanned(blows: Blows, phases: Real, tick: Callable[[float], None]) -> Real:
+    """The least share of each row that throws at each phase, (rows, P).
+
+    Where no other motion is known, few blows are to find one first.
+    """
+    every = np.arange(len(blows.rows))
+    few = phases[::LONE_STRIDE]
+    if len(blows.attractors.orbits) == 1:
+        blows.least(np.repeat(every, few.size), np.tile(few, every.size))
+    if len(blows.attractors.orbits) == 1:
+        return np.full((every.size, phases.size), np.inf)
+    rows, moments = np.repeat(every, phases.size), np.tile(phases, every.size)
+    return blows.least(rows, moments, tick).reshape(every.size, phases.size)
 
 
 def _checked_impulse(largest: object) -> float | None:

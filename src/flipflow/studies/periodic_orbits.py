@@ -264,10 +264,9 @@ class _Search:
         point = self.settling.solver_of(periods).solve(z, self.omega)
         if point is None:
             return
-        known = self._known(point.u, periods)
-        if known is None and self.settling.shortest(point) is not point:
+        if self._known(point.u, periods) is None and self.settling.shortest(point) is not point:
             return
-        kept = known or self._keep(point)
+        kept = self._keep(point)
         if self.settling.solver.system.symmetric and kept not in self.mirrored:
             self.mirrored += [kept, self._keep(self._mirrored(kept))]
 
