@@ -119,6 +119,15 @@ def test_a_pdf_has_its_size_its_words_and_its_fonts(tmp_path) -> None:
         assert said in words
 
 
+@poppler
+def test_a_letter_that_no_font_has_leaves_the_others_as_they_are(tmp_path) -> None:
+    """matplotlib keeps a font of boxes for every letter, which a whole name was set in."""
+    figure = replace(ff.figure(made("Branch"), width=WIDTH), subject="Sieb 筛分机, load case hot")
+    fonts = _told("pdffonts", figure.write(tmp_path / "it.pdf"))
+    assert "LastResort" not in fonts
+    assert "DejaVuSans" in fonts or "Liberation" in fonts or "Arial" in fonts
+
+
 def test_a_png_has_its_dots() -> None:
     figure = ff.figure(made("Branch"), width=WIDTH)
     content = printed(figure, "png")

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +19,7 @@ if TYPE_CHECKING:
 
 FAMILY = "DejaVu Sans"
 FILE = "DejaVuSans.ttf"
+LAST_RESORT = "LastResort"  # a font that draws a box for every letter there is
 # In pixels: capitals above the base line, half of that, letters below it, from line to line.
 ASCENT, MIDDLE, DESCENT, LINE_HEIGHT = 0.76 * FONT, 0.365 * FONT, 0.24 * FONT, 1.2 * FONT
 
@@ -41,6 +46,34 @@ def font_folder() -> Path:
     require_matplotlib()
     found = find_spec("matplotlib")
     return Path(str(found and found.origin)).parent / "mpl-data" / "fonts" / "ttf"
+
+
+@contextmanager
+def fonts_for_typst() -> Iterator[str]:
+    """A folder, for as long as it is needed, with the fonts that matplotlib keeps but one.
+
+    That one has every letter, so that typst sets a whole name in its boxes where one letter of
+    the name is Chinese, say.
+
+    Raises
+    ------
+    MissingExtra
+        When matplotlib is not installed.
+    """
+    # What typst still holds cannot be removed everywhere; the system does so later.
+    with tempfile.TemporaryDirectory(prefix="flipflow-", ignore_cleanup_errors=True) as folder:
+        for font in font_folder().glob("*.ttf"):
+            if not font.name.startswith(LAST_RESORT):
+                _put(font, Path(folder) / font.name)
+        yield folder
+
+
+def _put(font: Path, where: Path) -> None:
+    """A link, or a copy where links need a right."""
+    try:
+        where.symlink_to(font)
+    except OSError:
+        shutil.copyfile(font, where)
 
 
 def width_of(text: str) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flipflow.errors import required
-from flipflow.plotting.font import DESCENT, LINE_HEIGHT, font_folder, require_matplotlib
+from flipflow.plotting.font import DESCENT, LINE_HEIGHT, fonts_for_typst, require_matplotlib
 from flipflow.plotting.layout import CHARACTER, LABEL_ROW
 from flipflow.plotting.palette import COLOURS
 from flipflow.plotting.panels import PanelGrid
@@ -81,13 +81,15 @@ def typeset(svg: str, form: str, title: str, margin: float = 0.0) -> bytes:
     MissingExtra
         When typst or matplotlib is not installed.
     """
-    made = require_typst(f"A {form.upper()}")(
-        SOURCE.format(margin=margin).encode(),
-        format=form,
-        ppi=RESOLUTION,
-        font_paths=[str(font_folder())],
-        sys_inputs={"svg": svg, "title": title},
-    )
+    compiled = require_typst(f"A {form.upper()}")
+    with fonts_for_typst() as fonts:
+        made = compiled(
+            SOURCE.format(margin=margin).encode(),
+            format=form,
+            ppi=RESOLUTION,
+            font_paths=[fonts],
+            sys_inputs={"svg": svg, "title": title},
+        )
     return _resolved(made) if form == "png" else bytes(made)
 
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from flipflow.errors import InputError
-from flipflow.plotting.font import font_folder
+from flipflow.plotting.font import fonts_for_typst
 from flipflow.plotting.layout import POINT
 from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.print import require_typst
@@ -89,13 +89,15 @@ def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper
         "blocks": [_shown(block, height) for block in blocks],
     }
     source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()
-    content = require_typst()(
-        source,
-        format="pdf",
-        # Fonts of the machine are asked for letters that these have not, as Chinese ones.
-        font_paths=[str(font_folder())],
-        sys_inputs={"report": json.dumps(report)},
-    )
+    compiled = require_typst()
+    with fonts_for_typst() as fonts:
+        content = compiled(
+            source,
+            format="pdf",
+            # Fonts of the machine are asked for letters that these have not, as Chinese ones.
+            font_paths=[fonts],
+            sys_inputs={"report": json.dumps(report)},
+        )
     return bytes(content)
 
 
