@@ -12,8 +12,8 @@ from rich.console import Console
 
 import flipflow as ff
 from flipflow.periodic.orbit import Orbit
-from flipflow.report import first_page, summary
-from flipflow.report.blocks import Note, Table
+from flipflow.report import details, first_page, summary
+from flipflow.report.blocks import DrawingBlock, Note, Table
 from flipflow.report.registry import blocks_of
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import assess, verdict
@@ -54,6 +54,34 @@ def test_both_contact_speeds_are_said_where_gaps_differ(lopsided):
     sentence = first_page.contact_sentence(region)
     for side, word in ((1, "plus"), (-1, "minus")):
         assert f"{word} side at {region.contact_speeds[side] * RPM:.4g} rpm" in sentence
+
+
+@pytest.mark.parametrize(
+    ("gaps", "side", "other"),
+    [
+        ({"clearance_minus": math.inf}, "plus", "no stop on the other side"),
+        ({"clearance": math.inf, "clearance_minus": 6e-3}, "minus", "no stop on the plus side"),
+    ],
+)
+def test_a_side_without_stop_is_told_so(project, gaps, side, other):
+    """It was "not touched before", and its gap "inf mm"."""
+    screen = project.screen.replace(**gaps)
+    region = ff.operating_region(screen)
+    sentence = first_page.contact_sentence(region)
+    assert sentence.startswith(f"{side} side at {region.omega_cs * RPM:.4g} rpm (empty); ")
+    assert sentence.endswith("the other side has no stop.")
+    drawn = details.drawn_values(screen)
+    assert other in drawn.values()
+    assert not any("inf" in text for text in drawn.values())
+    found = assess(dataclasses.replace(project, screen=screen, load_cases=project.load_cases[:1]))
+    schematic = next(one for one in details.machine(found) if isinstance(one, DrawingBlock))
+    assert schematic.drawing.caption.endswith("(e+)." if side == "plus" else "below -e-.")
+
+
+def test_the_caption_of_a_machine_without_stop_tells_of_none():
+    found = assess(ff.load_project("ffs0827-linear"))
+    schematic = next(one for one in details.machine(found) if isinstance(one, DrawingBlock))
+    assert "stop" not in schematic.drawing.caption
 
 
 def test_equal_gaps_have_one_contact_speed(many):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from flipflow.io.check import Case, Check, Value, check_project
@@ -37,9 +38,22 @@ from flipflow.studies.assessment import Assessment, CaseAssessment
 
 SCHEMATIC = (
     "Along the screen surface: x1 is the main frame's motion, xf the floating frame's, and the "
-    "relative motion is x2 = x1 - xf. The stop on one side is touched when x2 exceeds the gap per "
-    "side (e), that on the other side when x2 falls below -e, or -e- where the gaps differ."
+    "relative motion is x2 = x1 - xf."
 )
+# By the sides that have a stop, plus and minus.
+TOUCHED = {
+    (True, True): (
+        " The stop on one side is touched when x2 exceeds the gap per side (e), that on the other "
+        "side when x2 falls below -e, or -e- where the gaps differ."
+    ),
+    (True, False): " The stop is touched when x2 exceeds the gap (e+).",
+    (False, True): " The stop is touched when x2 falls below -e-.",
+    (False, False): "",
+}
+NO_STOP = {
+    "clearance": "no stop on the plus side",
+    "clearance_minus": "no stop on the other side",
+}
 MACHINE_TITLE = "The machine"
 MODEL_LIMITS = (
     "Both frames are rigid bodies that move along the surface and, together, normal to it; they do "
@@ -69,7 +83,8 @@ def machine(assessment: Assessment) -> Iterator[Block]:
     screen = assessment.project.screen
     if _overflows(assessment):
         yield Heading(MACHINE_TITLE, 1, new_page=False)
-    yield DrawingBlock(Drawing("Schematic", SCHEMATIC, schematic(screen, drawn_values(screen))))
+    caption = SCHEMATIC + TOUCHED[_stopped(screen)]
+    yield DrawingBlock(Drawing("Schematic", caption, schematic(screen, drawn_values(screen))))
 
 
 @section(Assessment, Part.DETAILS, 20)
@@ -137,10 +152,20 @@ def _overflows(assessment: Assessment) -> bool:
     return bool(list(overleaf(assessment))) or packed(assessment)
 
 
+def _stopped(screen: FlipFlowScreen) -> tuple[bool, bool]:
+    """Which of both sides, plus and minus, has a stop."""
+    if not screen.has_stop:
+        return False, False
+    plus, minus = screen.stop().gaps
+    return math.isfinite(plus), math.isfinite(minus)
+
+
 def drawn_values(screen: FlipFlowScreen) -> dict[str, str]:
     """Text for the schematic, by field."""
     return {
-        name: f"{SYMBOLS.get(name, FIELD[name].symbol)} = "
+        name: NO_STOP[name]
+        if name in NO_STOP and math.isinf(value)
+        else f"{SYMBOLS.get(name, FIELD[name].symbol)} = "
         f"{shown(value, FIELD[name].file_unit, FIELD[name].unit)}"
         for name in MOTION_FIELDS
         if (value := getattr(screen, name)) is not None

@@ -291,10 +291,13 @@ def contact_sentence(region: OperatingRegion) -> str:
     if region.branch.system.symmetric or not speeds:
         return ""
     gaps = region.screen.stop().gaps
-    sides = (
+    sides = [
         f"{word} side {_touched(speeds.get(side), gap)}"
         for side, word, gap in ((1, "plus", gaps[0]), (-1, "minus", gaps[1]))
-    )
+        if math.isfinite(gap)
+    ]
+    if len(sides) == 1:
+        return f"{sides[0]} (empty); the other side has no stop."
     return f"{', '.join(sides)} (empty); w_cs is the last of them."
 
 
