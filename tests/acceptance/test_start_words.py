@@ -7,6 +7,7 @@ import math
 
 import flipflow as ff
 from flipflow.model.constants import RPM
+from flipflow.report import transients
 from flipflow.studies.drive_check import Demand, drive_findings, settled_speed
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.studies.start_sentence import does_it_start
@@ -64,3 +65,17 @@ def test_one_sentence_for_starts_that_differ(screen):
     assert part == f"{head}, then {0.99 * 850.0:.0f} rpm in case b."
     both = said_of(c=near, d=near)
     assert both == f"it comes near 850 rpm, then {0.98 * 850.0:.0f} rpm in every load case."
+
+
+def test_a_start_that_fails_is_not_drawn_as_a_coast_down(screen):
+    """The unbalance swings out, at its end a little backwards, and settles at no speed."""
+    run = ff.start_up(screen, given(1500.0), speed=WORKING)
+    omega = run.history.omega.copy()
+    omega[-1] = -1e-9
+    swung = dataclasses.replace(
+        run, history=dataclasses.replace(run.history, omega=omega), final_speed=-1e-9
+    )
+    assert ff.figure(swung).title == "Start"
+    case = CaseRuns("empty", swung.summary, None, {}, None, {})
+    (row,) = transients.cases_table(Transients(False, swung, None, None, {}, (case,))).rows
+    assert [cell.text for cell in row[:4]] == ["empty", "not started", "-", "-"]

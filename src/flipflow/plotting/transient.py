@@ -84,7 +84,8 @@ def _title(run: RunUp) -> str:
 
 
 def _falls(run: RunUp) -> bool:
-    return bool(run.history.omega[0] > run.history.omega[-1])
+    """Whether the speed comes down: a start that fails may end a little below 0, still swinging."""
+    return bool(run.history.omega[0] > max(run.history.omega[-1], 0.0))
 
 
 def _speed(run: RunUp, time: Axis) -> Panel:

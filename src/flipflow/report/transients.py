@@ -63,7 +63,7 @@ def start_and_stop_details(assessment: Assessment) -> Iterator[Block]:
     if not runs:
         return
     if found.cases:
-        yield _cases_table(found)
+        yield cases_table(found)
     if assessment.passing_table:
         yield _limits_table(assessment)
     notes = dict.fromkeys(note for run in runs for note in run.notes)
@@ -174,7 +174,7 @@ def _greatest(run: RunUp) -> str:
     return f"greatest: {', '.join(parts)}{along}"
 
 
-def _cases_table(found: Transients) -> Table:
+def cases_table(found: Transients) -> Table:
     """Start and coast-down of every load case."""
     columns = [Column("Load case"), Column("Start"), Column("at speed", "s", numeric=True)]
     columns.append(Column("settles at", "rpm", numeric=True))
@@ -202,7 +202,9 @@ def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
         for values in (case.peaks, case.peaks_of("stop"))
         for name, _, shown, unit in GREATEST
     ]
-    return cells(case.case, run.outcome, time, rpm(run.final_speed), *peaks)
+    # A shaft that is not turned over swings out: what is left of its speed means nothing.
+    settled = NOTHING if run.outcome == "not started" else rpm(run.final_speed)
+    return cells(case.case, run.outcome, time, settled, *peaks)
 
 
 def _limits_table(assessment: Assessment) -> Table:
