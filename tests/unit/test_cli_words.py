@@ -5,14 +5,16 @@ from __future__ import annotations
 import io
 import re
 from importlib import resources
+from itertools import pairwise
 
 import pytest
+from rich.cells import cell_len
 from rich.console import Console
 
 from flipflow.cli import app, simulate, startup
 from flipflow.errors import IncompleteError
 from flipflow.periodic.options import HarmonicBalance
-from flipflow.report.terminal import say
+from flipflow.report.terminal import HARD_BLANK, say
 from flipflow.studies.periodic_orbits import MOST_PERIODS
 from flipflow.studies.sensitivity import N_MOST
 from flipflow.transient.simulate import MOST_SAMPLES, SAMPLES_A_TURN
@@ -93,6 +95,19 @@ def test_a_number_stays_with_its_unit():
     assert max(map(len, lines)) <= 40
     assert not any(re.match(r"(mm|rpm|%|kg|g|kW)\b", line) for line in lines)
     assert "\N{NO-BREAK SPACE}" not in out.getvalue()
+    assert HARD_BLANK not in out.getvalue()
+
+
+def test_a_sentence_with_wide_letters_is_broken_once():
+    """Chinese letters are two columns wide: lines too long were broken again, after one word."""
+    out = io.StringIO()
+    console = Console(file=out, width=40, highlight=False, markup=False, emoji=False)
+    said = f"{'筛分机 ' * 12}at 850 rpm in every load case of the machine"
+    say(console, said)
+    lines = out.getvalue().splitlines()
+    assert " ".join(lines) == said
+    for line, following in pairwise(lines):
+        assert cell_len(f"{line} {following.split()[0]}") > 40 >= cell_len(line)
 
 
 def test_every_error_is_a_whole_sentence(command, monkeypatch):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 from functools import singledispatch
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ LONG_WORD = re.compile(r"\S{15,}")
 WITHIN = re.compile(r"\.(?=\w)")
 # A number and the unit behind it belong on one line.
 BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|deg|g|Hz|k?[NWJ]|kg m/s|k?g|mm|rad/s|rpm|s)(?![\w/]))")
-HARD_BLANK = "\N{NO-BREAK SPACE}"
+HARD_BLANK = "\ue000"  # stands for a blank at which no line is broken; a letter of no language
 STYLES = {
     "pass": "green",
     "attention": "bold yellow",
@@ -48,8 +47,11 @@ def show(block: Block, console: Console) -> None:
 
 def say(console: Console, text: str, style: str = "") -> None:
     """Print a sentence, broken between words but not between a number and its unit."""
-    tied = BEFORE_UNIT.sub(HARD_BLANK, text)
-    lines = textwrap.wrap(tied, console.width, break_long_words=False, break_on_hyphens=False)
+    from rich.text import Text as Words  # noqa: PLC0415
+
+    tied = BEFORE_UNIT.sub(HARD_BLANK, " ".join(text.split("\n")))
+    # Chinese letters are two columns wide, which textwrap does not know.
+    lines = (line.plain.rstrip() for line in Words(tied).wrap(console, console.width))
     console.print("\n".join(lines).replace(HARD_BLANK, " "), style=style or None)
 
 
