@@ -15,10 +15,13 @@ from flipflow.plotting.bars import energy_figure
 from flipflow.plotting.layout import arrange
 from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.plotly import described
+from flipflow.plotting.print import svg_alone
 from flipflow.plotting.response import case_names, cases_figure
 from flipflow.report.blocks import FigureBlock, Heading, Note, Table, Text
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess
+from flipflow.studies.compare import Comparison
+from svg_words import boxes_of
 
 CHROMIUM = shutil.which("chromium")
 READER = shutil.which("pdftotext")
@@ -76,6 +79,29 @@ def test_a_long_name_leaves_the_energy_chart_its_room(odd):
     words = [word for _, word in figure.panels[0].y.ticks]
     assert words[2].startswith("vollbeladen mit nassem")
     assert max(len(line) for word in words for line in word.splitlines()) <= 36
+
+
+def test_long_names_stay_within_every_figure(odd):
+    """Legends, titles of panels and words beside bars were cut off at the edge."""
+    longer = f"{LONG}, {LONG}"
+    names = (f"{longer}, A", f"{longer}, B")
+    loads = (ff.Load(name="empty"), *(ff.Load(name=name, stiffness_factor=1.2) for name in names))
+    project = dataclasses.replace(odd.project, load_cases=loads[1:], name=names[0])
+    found = assess(project)
+    twin = dataclasses.replace(found, project=dataclasses.replace(project, name=names[1]))
+    grid = {"clearance": [5e-3, 6e-3], "stop_stiffness": [7e6, 8e6]}
+    study = ff.study(project.screen, grid, ("stroke",), omega=project.speed, load_cases=loads[1:])
+    motions = {name: case.orbit for name, case in zip(names, found.cases, strict=True)}
+    drawn = (
+        Comparison(names, (found, twin)), found.region, study,
+        ff.loading(project.screen, loads[1]), ff.foundation_loads(motions),
+    )  # fmt: skip
+    for result in drawn:
+        figure = ff.figure(result)
+        boxes = boxes_of(svg_alone(figure))
+        told = [box.text for box in boxes if LONG[:20] in box.text]
+        assert told
+        assert all(box.left >= 0.0 and box.right <= figure.width for box in boxes), told
 
 
 def test_long_names_that_begin_alike_stay_apart():

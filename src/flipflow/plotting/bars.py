@@ -8,7 +8,7 @@ from dataclasses import replace
 from flipflow.model.numerals import rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.layout import within
+from flipflow.plotting.layout import NAME_LETTERS, short_names, within
 from flipflow.plotting.palette import CASES, HATCHES, case_colour
 from flipflow.plotting.panels import Axis, Band, Bar, Line, Note, Panel
 from flipflow.plotting.scales import RPM
@@ -23,7 +23,7 @@ TAKERS = {
     "normal": "isolation, normal direction (c1n)",
 }
 LEAST_KILOWATTS = 100.0  # W
-MOST_BARS, FAR_APART, NAME_LETTERS = 50, 20, 36
+MOST_BARS, FAR_APART = 50, 20
 LIMIT_WORDS = {"stability": "returns after a disturbance", "speed": "speed of the drive"}
 
 
@@ -61,8 +61,9 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
     lower, upper = max(region.lower * RPM, ends[0]), min(region.upper * RPM, ends[1])
     if lower < upper:
         bars.append(Bar(rows[1], heights[rows[1]], lower, upper, 0.6, "mark"))
+    shown = short_names([case.name for case in region.cases])
     for k, case in enumerate(region.cases):
-        bars += _case_bars(k, case, len(region.cases), heights)
+        bars += _case_bars(k, replace(case, name=shown[k]), len(region.cases), heights)
     few = len(region.cases) <= CASES
     if not few:
         bars = [replace(bar, legend=False) for bar in bars]

@@ -9,14 +9,14 @@ from flipflow.continuation.branch import Branch
 from flipflow.model.screen import Load
 from flipflow.plotting.curves import Curve
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.layout import LEGEND_ROW, legend_rows
+from flipflow.plotting.layout import LEGEND_ROW, legend_rows, short_names, within
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Line, Panel
 from flipflow.plotting.response import curve_traces
 from flipflow.plotting.scales import MM, RPM
 from flipflow.studies.compare import EMPTY, Comparison
 
-COLUMNS, MOST_PANELS, ROW = 2, 8, 205
+COLUMNS, MOST_PANELS, ROW, TITLE_LETTERS = 2, 8, 205, 40
 CAPTION = (
     "Half the peak-to-peak relative motion over speed; dashed: does not return after a small "
     "disturbance. Vertical line: working speed."
@@ -63,12 +63,13 @@ def _of_case(found: Comparison, name: str) -> tuple[list[tuple[int, Branch]], bo
 
 
 def _panel(found: Comparison, name: str, branches: Sequence[tuple[int, Branch]]) -> Panel:
+    names = short_names(found.names)
     curves = [(k, Curve.of(branch, "relative")) for k, branch in branches]
     traces = [
         trace
         for k, curve in curves
         for trace in curve_traces(
-            found.names[k], curve, curve.amplitude * MM, colour=case_colour(k),
+            names[k], curve, curve.amplitude * MM, colour=case_colour(k),
             symbol=case_symbol(k), bold=k == 0, legend=name == EMPTY,
         )
     ]  # fmt: skip
@@ -80,5 +81,5 @@ def _panel(found: Comparison, name: str, branches: Sequence[tuple[int, Branch]])
     return Panel(
         Axis("shaft speed", "rpm", (low * RPM, high * RPM)),
         Axis("amplitude", "mm", (0.0, HEADROOM * top * MM)),
-        traces=tuple(traces), lines=lines, title=name,
+        traces=tuple(traces), lines=lines, title=within(name, TITLE_LETTERS),
     )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flipflow.plotting.figure import Figure
+from flipflow.plotting.layout import NAME_LETTERS, within
 from flipflow.plotting.panels import Axis, Bar, Panel
 from flipflow.plotting.scales import KN
 from flipflow.studies.foundation_loads import Components, FoundationLoads
@@ -23,7 +24,8 @@ def foundation_figure(loads: FoundationLoads) -> Figure:
             if force is not None:
                 at = float(len(rows) - 1 - k) + 0.2 - 0.4 * place
                 bars.append(Bar(way, at, 0.0, force * KN, 0.36, colour, legend=k == 0))
-    ticks = tuple((float(len(rows) - 1 - k), name) for k, (name, _) in enumerate(rows))
+    words = (within(name, NAME_LETTERS, 2) for name, _ in rows)
+    ticks = tuple((float(len(rows) - 1 - k), word) for k, word in enumerate(words))
     top = 1.1 * max((bar.high for bar in bars), default=1.0)
     panel = Panel(
         Axis("greatest dynamic force", "kN", (0.0, top)),

@@ -20,7 +20,8 @@ LABEL_ROW, TITLE_ROW, LEGEND_ROW = 15, 17, 19
 BOTTOM, LEFT, RIGHT = 40, 58, 14
 NARROWEST = 60  # pixels of a panel
 BARE_GAP, ROW_GAP = 26, 48
-LEGEND_MARK = 42
+LEGEND_MARK, LEGEND_LETTERS = 42, 48
+NAME_LETTERS = 36  # of a line of words beside an axis
 LARGEST, SMALLEST, MARKS = 5.0, 0.8, 30  # marks in points; up to how many they are large
 SIDES = {0.0: "left", 1.0: "right"}  # flush ends of a horizontal line's label
 
@@ -133,6 +134,14 @@ def within(text: str, width: int, lines: int = 1) -> str:
     return "\n".join(
         textwrap.wrap(text, width, max_lines=lines, placeholder=" ...", break_on_hyphens=False)
     )
+
+
+def short_names(names: Sequence[str], letters: int = LEGEND_LETTERS) -> list[str]:
+    """Names in at most so many letters, all different; numbers tell apart what would be alike."""
+    shown = [within(name, letters) for name in names]
+    if len(set(shown)) == len(shown):
+        return shown
+    return [f"{k}: {within(name, letters - 3)}" for k, name in enumerate(names, start=1)]
 
 
 def legend_columns(figure: PanelGrid) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 
 from flipflow.plotting.family import BALANCE, beneath_traces, branch_traces, speed_axis_in_radians
 from flipflow.plotting.figure import Figure
+from flipflow.plotting.layout import LEGEND_LETTERS, within
 from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import MM
 from flipflow.studies.loading import LoadedMachine, Loading, RegionChange
@@ -56,7 +57,7 @@ def loading_figure(loading: Loading, title: str = "", beneath: Loading | None = 
 def _amplitudes(
     name: str, machine: LoadedMachine, loading: Loading, beneath: Loading | None, *, first: bool
 ) -> Panel:
-    word = loading.load.name or "loaded"
+    word = within(loading.load.name, LEGEND_LETTERS) or "loaded"
     under = None if beneath is None else beneath.with_stop
     pale = [
         trace

@@ -16,7 +16,13 @@ from flipflow.model.numerals import rpm
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.plotting.curves import Curve, Jump, is_jump
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.layout import LEGEND_ROW, legend_rows, within
+from flipflow.plotting.layout import (
+    LEGEND_LETTERS,
+    LEGEND_ROW,
+    legend_rows,
+    short_names,
+    within,
+)
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
 from flipflow.plotting.panels import Arrow, Axis, Band, Line, Panel, Trace
 from flipflow.plotting.scales import DEGREES, HZ, MINUS, MM, RPM, SPEEDS
@@ -35,7 +41,7 @@ KIND_SYMBOLS = {
 }  # fmt: skip
 BAND_POINTS = 300
 ROWS, ROW_HEIGHT = 5, 186  # of load cases one below the other on a page, pixels
-OTHER_CASES, LEGEND_LETTERS = "the other load cases", 48
+OTHER_CASES = "the other load cases"
 NEAR = 0.35
 NOWHERE = np.array([np.nan])
 MOST_COORDINATES = CASES
@@ -203,10 +209,7 @@ def case_names(names: Sequence[str]) -> list[str]:
     """
     if len(names) > CASES:
         return [within(names[0], LEGEND_LETTERS), *[OTHER_CASES] * (len(names) - 1)]
-    shown = [within(name, LEGEND_LETTERS) for name in names]
-    if len(set(shown)) == len(shown):
-        return shown
-    return [f"{k}: {within(name, LEGEND_LETTERS - 3)}" for k, name in enumerate(names, start=1)]
+    return short_names(names)
 
 
 def case_look(index: int, count: int) -> tuple[str, str | None]:

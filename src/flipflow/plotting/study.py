@@ -24,6 +24,7 @@ from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.figure import Figure
+from flipflow.plotting.layout import LEGEND_LETTERS, within
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace, cell_edges
 from flipflow.plotting.scales import MM
@@ -493,7 +494,8 @@ def _field_axis(study: Study, field: str, shown: Real) -> Axis:
 
 def _where(study: Study, one: Quantity | None) -> str:
     """Load case and speed of a panel."""
-    case = f"load case {study.cases[0]}" if len(study.cases) > 1 else ""
+    name = within(study.cases[0], LEGEND_LETTERS)
+    case = f"load case {name}" if len(study.cases) > 1 else ""
     whole = one is not None and one.of == "response"
     speed = "" if whole else speed_in_words(study.omega[0]).removeprefix(" ")
     return " ".join(filter(None, (case, speed)))
