@@ -303,3 +303,26 @@ def test_inputs_are_named_as_in_the_file_and_a_start_that_fails_is_a_result(star
     assert found.result("stop.foundation_force", "empty").changes
     tables = [block for block in main_changes(found) if isinstance(block, Table)]
     assert "Speed that the start reaches" in [row[0].text for row in tables[0].rows]
+
+
+def test_what_a_load_case_holds_is_called_as_in_the_machine_file(machine):
+    one, two = (
+        dataclasses.replace(
+            machine, load_cases=(ff.Load(name="wet", stiffness_factor=k, damping_factor=k,
+                                         main_mass=10.0 * k, floating_mass=20.0 * k),)
+        )
+        for k in (1.1, 1.2)
+    )  # fmt: skip
+    assert [row.key for row in ff.compare([one, two]).inputs] == [
+        "load case wet, shear_stiffness_factor",
+        "load case wet, shear_damping_factor",
+        "load case wet, material on the main frame",
+        "load case wet, material on the floating frame",
+    ]
+
+
+def test_a_machine_is_told_what_changes_in_it_alone(machine, wider):
+    """What another machine changes stood there, too, with nothing beside it."""
+    found = ff.compare([machine, wider, dataclasses.replace(machine, name="twin")])
+    (table,) = (one for one in main_changes(found) if isinstance(one, Table))
+    assert table.title == "B against A"

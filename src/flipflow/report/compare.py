@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from flipflow.io.units import in_unit, shown
 from flipflow.model.load_case import case_words
@@ -86,7 +87,7 @@ def main_changes(found: Comparison) -> Iterator[Block]:
         return
     yield Heading("What changes", 1, new_page=False)
     for k in range(1, len(found.names)):
-        rows = [row for row in found.results if _is_main(row) and row.changes]
+        rows = [row for row in found.results if _is_main(row) and _changes_in(row, k)]
         if rows:
             yield _changes(found, k, rows, f"{letter(k)} against {letter(0)}")
 
@@ -116,6 +117,11 @@ def _machine_columns(found: Comparison) -> tuple[Column, ...]:
         Column(letter(k), name if len(name) <= ONE_NAME else "", numeric=True)
         for k, name in enumerate(found.names)
     )
+
+
+def _changes_in(row: ResultChange, k: int) -> bool:
+    """Whether a machine differs from the first, whatever others do."""
+    return replace(row, values=(row.values[0], row.values[k])).changes
 
 
 def _is_main(row: ResultChange) -> bool:

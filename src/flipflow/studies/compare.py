@@ -46,6 +46,11 @@ REGION = (
 LOAD_UNITS: Mapping[str, tuple[str, str]] = {
     "main_mass": ("kg", "kg"), "floating_mass": ("kg", "kg"), "temperature": ("degC", "degC"),
 }  # fmt: skip
+# What the machine file calls what a load holds under another name.
+LOAD_WORDS: Mapping[str, str] = {
+    "stiffness_factor": "shear_stiffness_factor", "damping_factor": "shear_damping_factor",
+    "main_mass": "material on the main frame", "floating_mass": "material on the floating frame",
+}  # fmt: skip
 
 # Places in the machine file of what is no field of its tables.
 SCREEN_WORDS: Mapping[str, str] = {
@@ -323,7 +328,7 @@ def _load_inputs(loads: Sequence[Load]) -> Iterator[Input]:
         for name, value in _parts(load):
             if name != "name":
                 units = LOAD_UNITS.get(name, ("", ""))
-                yield f"load case {load.name}, {name}", (*units, value)
+                yield f"load case {load.name}, {LOAD_WORDS.get(name, name)}", (*units, value)
 
 
 def _input(field: Field | None, otherwise: str, value: Given) -> Input:
