@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
+import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.plotting.sensitivity import changes
+from flipflow.studies.sensitivity import OneAtATime
 
 
 def test_command(command, tmp_path):
@@ -27,6 +31,22 @@ def test_command(command, tmp_path):
     assert result.names == ("clearance", "floating_mass", "shear_stiffness")
     assert result.ends[1] == pytest.approx((294.5, 325.5))
     assert result.distributions[2] == ff.Normal(2.7e6, 9e4)
+
+
+def test_what_is_rounding_is_no_change():
+    """A gap that is not reached, whose ends differ in the last digit of the quantity alone."""
+    value, lost = 43.2e3, 43.2e3 - 43.2e3 * (1.0 - 2.0**-52)
+    one = OneAtATime(
+        machine=ff.load("ffs0827"), quantity="stop_force", names=("clearance", "main_mass"),
+        distributions=((5e-3, 6e-3), (900.0, 950.0)), omega=100.0, nominal=value,
+        at_low=np.array([value, value - 5e3]), at_high=np.array([value - lost, value + 5e3]),
+        own=(6e-3, 916.0),
+    )  # fmt: skip
+    low, high = changes(one, None)
+    assert low == pytest.approx([0.0, -5.0])
+    assert list(high) == [0.0, pytest.approx(5.0)]
+    without = dataclasses.replace(one, nominal=np.inf)
+    assert np.all(np.isneginf(changes(without, None)[0]))
 
 
 def test_command_over_speeds_and_for_whole_responses(command):

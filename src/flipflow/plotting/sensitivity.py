@@ -23,6 +23,7 @@ SHOWN: Mapping[str, float] = {
     "h": 1.0 / 3600.0, **dict.fromkeys(("", "N", "W", "K", "m/s", "rad"), 1.0),
 }  # fmt: skip
 INDEX_AXIS = (-0.05, 1.05)
+ROUNDING = 1e-12  # of a value
 
 
 def sensitivity_figure(result: Sensitivity) -> Figure:
@@ -77,8 +78,13 @@ def changes(result: Sensitivity | OneAtATime, at: int | None) -> tuple[Real, Rea
     scale = SHOWN[quantity_named(result.quantity, result.machine).shown_unit]
     pick = slice(None) if at is None else at
     nominal = np.asarray(result.nominal)[() if at is None else at]
-    low, high = result.at_low[pick], result.at_high[pick]
-    return (low - nominal) * scale, (high - nominal) * scale
+    low, high = (end[pick] - nominal for end in (result.at_low, result.at_high))
+    # What is nothing but rounding is no change, and has no sign.
+    least = ROUNDING * np.abs(nominal)
+    low, high = (
+        np.where(np.isfinite(end) & (np.abs(end) <= least), 0.0, end) for end in (low, high)
+    )
+    return low * scale, high * scale
 
 
 def _over_frequency(result: Sensitivity) -> Figure:
