@@ -143,6 +143,14 @@ def test_stop_pieces_and_one_sided_stop(project_of):
     assert screen.has_stop
 
 
+@pytest.mark.parametrize("written", ["infinite", "inf mm"])
+def test_how_no_stop_is_written_is_said(project_of, written):
+    """The template says how, and so does what refuses another word."""
+    assert '"inf" means no stop' in template()
+    with pytest.raises(InputError, match="for example '6 mm' or 'inf'"):
+        project_of(f'{SMALL}[stops]\nclearance = "6 mm"\nclearance_minus = "{written}"\n')
+
+
 def test_infinite_clearance_is_no_stop(project_of):
     for written in ('"inf"', "inf"):
         assert not project_of(f"{SMALL}[stops]\nclearance = {written}\n").screen.has_stop

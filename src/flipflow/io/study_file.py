@@ -33,7 +33,8 @@ STUDY = (
 )  # fmt: skip
 RANGE = ("from", "to", "values")
 IN_FILE = (
-    'write for example "5.4 mm..6.6 mm", "+-5 %", "+-0.5 mm", "310 kg +/- 4 kg" or a list of values'
+    'write for example "5.4 mm..6.6 mm", "+-5 %", "+-0.5 mm", "310 kg +/- 4 kg" or a list of at '
+    "least two values"
 )
 MOST_VALUES = 10_000  # of one field
 # What a machine is asked for where the file does not say.

@@ -166,7 +166,8 @@ def parse_quantity(
         )
     number, name = _parts(text)
     if not number:
-        raise InputError(field, written, f"{what} belongs here, for example {example!r}")
+        remedy = f"{what} belongs here, for example {example!r}"
+        raise InputError(field, written, f"{remedy} or 'inf'" if allow_infinite else remedy)
     value = _convert(number, name, unit, field=field, written=written, example=example)
     if not math.isfinite(value):
         raise InputError(field, written, f"give a finite value, for example {example!r}")

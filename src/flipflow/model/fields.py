@@ -172,7 +172,7 @@ FIELDS: tuple[Field, ...] = (
     ),
     Field(
         "clearance", "e", "m", "mm", "stops.clearance",
-        "Gap per side before a stop is touched; infinite means no stop.",
+        'Gap per side before a stop is touched; "inf" means no stop.',
         default=math.inf, plausible=(0.0, 0.1),
         example="6 mm", infinite=True,
     ),
