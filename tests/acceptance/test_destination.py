@@ -134,6 +134,33 @@ def test_a_link_in_the_folder_to_the_file_that_is_read_is_not_followed(
     assert (tmp_path / "own.toml").read_bytes() == before
 
 
+@pytest.mark.parametrize("name", FILES)
+def test_a_document_does_not_take_the_place_of_a_figure(command, at_work, tmp_path, name):
+    """One of both was lost, and both were said to be written."""
+    figure = next(one for one in FILES[name].split(", ") if not one.endswith(".json"))
+    at_work(lambda: pytest.fail("the work was begun"))
+    code, out, err = command(name, *QUICK[name], "-o", "out", "--json", f"out/../out/{figure}")
+    assert (code, out) == (2, "")
+    assert err.endswith("a file of --output may have this name, give it the ending .json.\n")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_document_in_the_place_of_that_of_the_folder_keeps_its_key(command, tmp_path):
+    """The same command was refused the second time, for the report had lost what made it."""
+    words = ("analyze", *QUICK["analyze"], "-o", "out", "--json", "out/results.json")
+    for _ in range(2):
+        code, _, err = command(*words)
+        assert code == 0, err
+    assert ff.open_result(tmp_path / "out" / "results.json").cases
+
+
+def test_a_link_to_a_folder_that_is_not_there_is_named(command, tmp_path):
+    (tmp_path / "x.json").symlink_to("gone/y.json")
+    code, _, err = command("check", "ffs0827", "--json", "x.json")
+    assert code == 4
+    assert f"there is no folder {str(tmp_path / 'gone')!r}" in err
+
+
 @pytest.mark.skipif(not FULL.exists(), reason="needs a device that is full")
 def test_a_document_for_a_full_disk_is_said(command):
     code, _, err = command("simulate", *QUICK["simulate"], "--json", str(FULL))

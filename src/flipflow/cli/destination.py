@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
-from flipflow.errors import Cancelled, FlipflowError, StoreError
+from flipflow.errors import Cancelled, FlipflowError, InputError, StoreError
 from flipflow.results.stage import Stage
 from flipflow.results.store import (
     checked_place,
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
     from flipflow.plotting.figure import Figure
 
+# Endings of figures and tables.
+OF_FOLDER = {".csv", ".html", ".nc", ".pdf", ".svg", ".toml", ".xlsx"}
 STOPPED, NOTHING = "Stopped by the user", "nothing is written"
 
 
@@ -66,6 +68,7 @@ class Destination:
             try:
                 refuse_input(json, self._reads, JSON)
                 checked_place(json, JSON)
+                self._refuse_figure(json)
             except FlipflowError:
                 self._remove_made()
                 raise
@@ -94,6 +97,14 @@ class Destination:
             raise self.stopped() from None
         if isinstance(error, StoreError) and told != str(error):
             raise StoreError(told) from None
+
+    def _refuse_figure(self, json: str) -> None:
+        """See that the document does not take the place of a figure or a table of the folder."""
+        place = Path(os.path.realpath(json))
+        beside = self.folder is not None and place.parent == Path(os.path.realpath(self.folder))
+        if beside and place.suffix in OF_FOLDER:
+            remedy = f"a file of {OUTPUT} may have this name, give it the ending .json"
+            raise InputError(JSON, json, remedy)
 
     def _remove_made(self) -> None:
         """Remove the folders that were made for files that do not come."""

@@ -83,6 +83,8 @@ class Stage:
         parts: list[tuple[Path, Path]] = []
         try:
             for target, content, field in self._elsewhere:
+                if self._is_aside(target):
+                    continue
                 parts += self._beside(target, content, field)
             exchanged = self._aside is not None and self._exchanged()
             if self._aside is not None and not exchanged:
@@ -133,6 +135,12 @@ class Stage:
             yield write_beside(place, content), place
         except OSError as error:
             raise refused(field, target, because(error)) from None
+
+    def _is_aside(self, target: str) -> bool:
+        """Whether the folder gets a file of this name, which says the same and more."""
+        place = Path(os.path.realpath(target))
+        own = self._aside is not None and place.parent == self._folder
+        return own and (self.aside / place.name).exists()
 
     def _exchanged(self) -> bool:
         """Whether the folder as it is to be has taken the place of the one that was."""

@@ -82,7 +82,9 @@ def checked_place(target: str | Path, field: str = "path") -> Path:
         return named
     place = Path(os.path.realpath(named))
     if not place.parent.is_dir():
-        why = f"it cannot be written (there is no folder {str(named.parent)!r})"
+        # A link may lead to a file in a folder that is not there.
+        missing = place.parent if named.parent.is_dir() else named.parent
+        why = f"it cannot be written (there is no folder {str(missing)!r})"
         raise refused(field, target, f"{why}, make it or name another")
     if not all(os.access(one, os.W_OK) for one in ([place] if mode else []) + [place.parent]):
         raise refused(field, target, "it may not be written, name a file in a folder you own")
