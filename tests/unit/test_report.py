@@ -8,6 +8,7 @@ import math
 import re
 import sys
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -18,6 +19,7 @@ from flipflow.model.quantities import quantities_of
 from flipflow.plotting.plotly import library
 from flipflow.report import first_page, summary, write_html
 from flipflow.report.blocks import Heading, Note, Table, Text, TitleBlock, Values, Verdict
+from flipflow.report.design import constraints_of_proposal
 from flipflow.report.html import html
 from flipflow.report.numbers import (
     bounds,
@@ -35,6 +37,7 @@ from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import assess
 
 LARGEST = 6e6
+DUTY = SimpleNamespace(bounds=ff.Limits(main_frame_acceleration=30.0))
 
 
 @pytest.fixture(scope="module")
@@ -251,3 +254,20 @@ def test_rows_fit_their_columns(assessment):
     for block in blocks_of(assessment):
         if isinstance(block, Table):
             assert {len(row) for row in block.rows} == {len(block.columns)}
+
+
+def test_a_gap_without_end_has_no_unit():
+    assert quantity(math.inf, "mm", "m") == "infinite"
+
+
+@pytest.mark.parametrize(("excess", "said"), [(1e-7, "0.00"), (-1e-7, "0.00"), (0.1, "-10.00")])
+def test_a_margin_that_is_used_up_has_no_sign(excess, said):
+    (row,) = (
+        row
+        for block in constraints_of_proposal(
+            SimpleNamespace(prices={}, excess={"main_frame_acceleration": excess}, duty=DUTY)
+        )
+        if isinstance(block, Table)
+        for row in block.rows
+    )
+    assert row[2].text == said

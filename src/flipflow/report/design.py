@@ -188,7 +188,8 @@ def _margin(name: str, excess: float) -> str:
         return NOTHING
     if name in (MOTION, EVEN, ALONE):
         return "met" if excess <= MET else "not met"
-    return f"{0.0 - 100.0 * excess:.2f}"
+    # Rounded before its sign is turned: what is used up to the last digits has a margin of 0.00.
+    return f"{0.0 - round(100.0 * excess, 2):.2f}"
 
 
 def _failing(found: Proposal) -> str:

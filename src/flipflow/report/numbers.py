@@ -33,7 +33,9 @@ def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool
         return NOTHING
     if with_unit and shown_unit == f"k{unit}" and 0.0 < abs(value) < LEAST_KILO:
         shown_unit = unit
-    text = number(in_unit(value, shown_unit, unit)) if math.isfinite(value) else number(value)
+    if math.isinf(value):
+        return number(value)
+    text = number(in_unit(value, shown_unit, unit))
     return f"{text} {shown_unit}".strip() if with_unit else text
 
 
