@@ -184,6 +184,23 @@ def test_many_machines_are_translucent_lines(linear):
     assert {item.get("opacity", 1.0) for item in whole} == {1.0, lines[256][0].opacity}
 
 
+def test_large_numbers_in_figures_of_a_study_have_no_exponent(linear):
+    """A stiffness that is held, levels of contours, and the ends of axes."""
+    scales = np.array([0.9, 1.0])
+    grid = ff.study(
+        linear,
+        {name: getattr(linear, name) * scales for name in ("eccentric_moment", "shear_damping")}
+        | {"isolation_stiffness": linear.isolation_stiffness * np.array([1.0, 50.0])},
+        "relative_amplitude", OMEGA,
+    )  # fmt: skip
+    machine = linear.replace(isolation_stiffness=50.0 * linear.isolation_stiffness)
+    held = map_figure(replace(grid, machine=machine))
+    assert "Held: k1, kN/m = 31500." in held.caption
+    notes = [note.text for panel in parallel_figure(grid).panels for note in panel.notes]
+    assert "31500" in notes
+    assert not any("e+" in text for text in notes)
+
+
 def test_what_a_report_of_several_cases_speeds_and_fields_says(linear):
     """Shading and colours are of every load case; what is held, or left out, is named."""
     m, k = linear.eccentric_moment, linear.shear_stiffness

@@ -19,7 +19,7 @@ from flipflow.errors import InputError, required
 from flipflow.model.arguments import checked_word
 from flipflow.model.fields import FIELD, symbol_of
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized, digits, rpm
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -296,7 +296,7 @@ def _contours(grid: _Grid, one: Quantity) -> Iterator[Trace]:
     if finite.size == 0 or finite.min() == finite.max():
         return
     for level in _round_levels(float(finite.min()), float(finite.max())):
-        yield _joined(f"{level:.4g}", grid.lines(z, level), "main", legend=False)
+        yield _joined(digits(level, 4), grid.lines(z, level), "main", legend=False)
 
 
 def _limit_contours(grid: _Grid, limits: Limits) -> Iterator[Trace]:
@@ -357,7 +357,7 @@ def _held_words(study: Study, shown: tuple[str, ...]) -> str:
 
 def _field_value(study: Study, field: str, value: object) -> str:
     if isinstance(value, float):
-        return f"{value * _field_scale(study, field):.4g}"
+        return digits(value * _field_scale(study, field), 4)
     return str(value)
 
 
@@ -462,8 +462,8 @@ def _end_notes(columns: Sequence[tuple[str, Real]]) -> Iterator[Note]:
     for k, (_, values) in enumerate(columns):
         finite = values[np.isfinite(values)]
         if finite.size:
-            yield Note(float(k), -0.06, f"{finite.min():.4g}", "center", "mark")
-            yield Note(float(k), 1.06, f"{finite.max():.4g}", "center", "mark")
+            yield Note(float(k), -0.06, digits(float(finite.min()), 4), "center", "mark")
+            yield Note(float(k), 1.06, digits(float(finite.max()), 4), "center", "mark")
 
 
 def _field_scale(study: Study, field: str) -> float:
