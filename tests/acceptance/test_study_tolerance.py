@@ -249,6 +249,21 @@ def test_a_list_has_no_cost_of_tolerances_and_notes_stand_once(linear):
     assert told.count(noted.notes[0]) == 1
 
 
+def test_a_share_of_too_few_machines_is_a_mark_not_a_line_of_one_point(linear):
+    """The figure was empty, and did not say why."""
+    limits = ff.Limits(relative_amplitude=(0.0, 1.0))
+    vary = {"shear_stiffness": (0.99 * linear.shear_stiffness, 1.01 * linear.shear_stiffness)}
+    shares = []
+    for n in (16, 256):
+        study = ff.study(linear, vary, "relative_amplitude", OMEGA, sampling=ff.Sample(n=n))
+        drawn = figure(ff.tolerance(study, limits))
+        (share,) = (one for one in drawn.panels[0].traces if one.name.startswith("share"))
+        shares.append((share.x.size, share.symbol, "Other factors need" in drawn.caption))
+    assert shares[0] == (1, "circle", True)
+    assert shares[1][0] > 1
+    assert shares[1][1:] == (None, False)
+
+
 def test_limits_that_were_not_looked_at_are_named():
     start = ff.PassingLimits(stop_force=9e3)
     limits = ff.Limits(stop_force=8e3, shear_strain=0.2, start=start)

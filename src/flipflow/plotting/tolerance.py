@@ -31,7 +31,11 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
         factors, share, low, high = np.ones(1), own[None], interval[:1], interval[1:]
     band = Trace("95 % confidence", factors, high, "case band", "case band", lower=low)
     met = limits_in_words(found.limits, found.checked)
-    line = Trace(f"share that meets {met}", factors, share, colour="relative", bold=True)
+    alone = factors.size == 1  # a list of machines, or too few of them to be weighted
+    line = Trace(
+        f"share that meets {met}", factors, share, colour="relative", bold=True,
+        symbol="circle" if alone else None,
+    )  # fmt: skip
     above = Panel(
         Axis("all tolerances times", ""), Axis("machines that pass", "%", (0.0, 102.0)),
         (band, line), lines=(Line("x", 1.0, "as given", "mark"),),
@@ -63,6 +67,8 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
             " Below: the same with one tolerance alone half as wide; a bar to the right is what "
             f"that would gain.{_noise_words(found, at, order)}"
         )
+    if alone:
+        caption += " Other factors need machines drawn at random, and more of them."
     title = f"What tolerances cost{speed_in_words(found.omega[at])}"
     return Figure(title, caption, panels, height=300 + 60 + 30 * len(order))
 
