@@ -463,3 +463,22 @@ def test_a_history_is_of_finite_numbers():
         values[-1] = np.inf
         with pytest.raises(InputError, match=rf"^{name} = .*give finite numbers"):
             dataclasses.replace(found, **{name: values})
+
+
+def test_a_coordinate_whose_name_netcdf_cannot_hold_is_refused_by_a_sentence(tmp_path) -> None:
+    """scipy writes names in Latin letters alone: it ended in a UnicodeEncodeError."""
+    stop = ff.ClearanceSpring([1.0], 29.0, 0.0, 1.26)
+    for name, told in (("Träger", None), ("筛机", "NetCDF has names in Latin letters alone")):
+        rig = ff.MechanicalSystem(
+            [[1.0]], [[0.1]], [[1.0]], [stop], ff.HarmonicForce([0.7]), coordinates={name: (1.0,)}
+        )
+        grid = np.linspace(-0.5, 0.5, 2)
+        found = ff.basins(rig, 0.5, {name: grid}, {name: grid})
+        for ending in ("json", "csv"):
+            ff.save(found, tmp_path / f"it.{ending}")
+        if told is None:
+            ff.save(found, tmp_path / "it.nc")
+        else:
+            with pytest.raises(InputError, match=told):
+                ff.save(found, tmp_path / "other.nc")
+    assert not (tmp_path / "other.nc").exists()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.errors import required
+from flipflow.errors import InputError, required
 from flipflow.io import spreadsheet
 from flipflow.io.labelled import Arrays, Variable
 from flipflow.model.constants import RPM
@@ -116,8 +116,22 @@ def csv_text(arrays: Arrays) -> str:
     return spreadsheet.csv_text(heads, zip(*(one.data.tolist() for _, one in columns), strict=True))
 
 
+def _is_latin(name: str) -> bool:
+    try:
+        name.encode("latin-1")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def netcdf_bytes(arrays: Arrays) -> bytes:
-    """All of it as classic NetCDF: text in UTF-8, a complex number as _real and _imag."""
+    """All of it as classic NetCDF: text in UTF-8, a complex number as _real and _imag.
+
+    Raises
+    ------
+    InputError
+        For names, of coordinates say, that scipy does not write: all but those in Latin letters.
+    """
     from scipy.io import netcdf_file  # noqa: PLC0415  only files need it
 
     content = io.BytesIO()
@@ -129,6 +143,10 @@ def netcdf_bytes(arrays: Arrays) -> bytes:
             for key, one in {**arrays.coordinates, **arrays.variables}.items()
             for name, part in _real_parts(key, one)
         }
+        for name in dict.fromkeys((*parts, *(dim for one in parts.values() for dim in one.dims))):
+            if not _is_latin(name):
+                remedy = "NetCDF has names in Latin letters alone, write .json or .csv"
+                raise InputError("name", name, remedy)
         coordinates = " ".join(name for name in arrays.coordinates if name in parts)
         for name, one in parts.items():
             values, dims = _classic(name, one)
