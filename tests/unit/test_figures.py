@@ -453,3 +453,11 @@ def test_the_last_turns_of_a_long_run_are_not_drawn_in_stairs():
     assert last
     for times in last:
         assert np.all(np.diff(times) > 0.0)
+
+
+def test_a_portrait_of_another_coordinate_is_none_of_the_relative_motion(orbit):
+    for drawn in (orbit, [orbit, orbit]):
+        assert "of the relative motion" in ff.figure(drawn).caption
+        assert "relative" not in ff.figure(drawn, coordinate="main").caption
+    rig = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], [], ff.HarmonicForce([0.7]))
+    assert "relative" not in ff.figure(ff.periodic_orbits(rig, 0.5)[0]).caption

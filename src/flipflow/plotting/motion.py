@@ -35,6 +35,7 @@ ORBITS = (
     "unbalance points along x."
 )
 PORTRAIT = "Velocity over displacement of the relative motion: one closed loop a turn."
+ANY_PORTRAIT = "Velocity over displacement: one closed loop a turn."
 
 
 def orbit_figure(orbit: Orbit, which: Coordinate | None = None) -> Figure:
@@ -56,7 +57,7 @@ def orbit_figure(orbit: Orbit, which: Coordinate | None = None) -> Figure:
     lines = gap_lines(orbit) if chosen == _across(orbit) else ()
     touched = bool(orbit.contact_intervals)
     said = CONTACT_WORDS if touched else NO_CONTACT if _stops(orbit) else NO_STOP
-    caption = f"{said} {PORTRAIT}"
+    caption = f"{said} {_portrait(chosen)}"
     title = f"Motion at {speed_of(orbit, orbit.omega)}"
     name = label(chosen)
     panels = (
@@ -91,7 +92,12 @@ def orbits_in_time_figure(orbits: Sequence[Orbit], which: Coordinate | None = No
         ),
     )  # fmt: skip
     title = f"Motions at {speed_of(orbits, orbits[0].omega)}"
-    return Figure(title, PORTRAIT, panels, columns=2, height=340, shares=(0.6, 0.4))
+    return Figure(title, _portrait(chosen), panels, columns=2, height=340, shares=(0.6, 0.4))
+
+
+def _portrait(chosen: Coordinate) -> str:
+    """What a phase portrait of a coordinate shows; its axis has the name."""
+    return PORTRAIT if chosen == "relative" else ANY_PORTRAIT
 
 
 def motions_figure(assessment: Assessment) -> Figure | None:
