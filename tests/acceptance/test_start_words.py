@@ -8,6 +8,7 @@ import math
 import flipflow as ff
 from flipflow.model.constants import RPM
 from flipflow.report import transients
+from flipflow.report.numbers import quantity
 from flipflow.studies.drive_check import Demand, drive_findings, settled_speed
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.studies.start_sentence import does_it_start
@@ -79,3 +80,28 @@ def test_a_start_that_fails_is_not_drawn_as_a_coast_down(screen):
     case = CaseRuns("empty", swung.summary, None, {}, None, {})
     (row,) = transients.cases_table(Transients(False, swung, None, None, {}, (case,))).rows
     assert [cell.text for cell in row[:4]] == ["empty", "not started", "-", "-"]
+
+
+def test_a_start_that_fails_hides_no_greater_force():
+    """Hanging it does not turn over; from another angle it does, and shakes sixty times as hard."""
+    project = dataclasses.replace(ff.load_project("ffs0827"), drive=given(1500.0))
+    found = ff.assess(project)
+    runs = found.transients
+    assert runs.start.outcome == "not started"
+    greatest = max(case.peaks_of("start")["foundation_force"].value for case in runs.cases)
+    assert greatest > 10.0 * runs.start.peaks["foundation_force"].value
+    assert runs.loudest.peaks["foundation_force"].value == greatest
+    loads = {one.name: one.peaks for one in found.foundation.runs}
+    (name,) = (one for one in loads if one.endswith("from another angle"))
+    assert loads[name].total >= 0.9 * greatest
+    words = transients.start_words(runs)
+    assert "greatest of all starts: main frame" in words
+    assert f"foundation {quantity(greatest, 'kN', 'N')}" in words
+
+
+def test_peaks_of_the_start_that_is_told_are_not_said_to_be_of_others(screen):
+    run = ff.start_up(screen, given(), speed=WORKING)
+    case = CaseRuns("empty", run.summary, None, run.peaks, None, {})
+    assert "; greatest: main frame" in transients.start_words(
+        Transients(False, run, None, None, {}, (case,))
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from flipflow.model.load_case import case_words
 from flipflow.model.numerals import capitalized, rpm
@@ -26,7 +26,7 @@ from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_
 from flipflow.studies.jump_risk import JumpRisk
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.studies.start_sentence import NO_SPEED, drive_words
-from flipflow.transient.run_up import RunUp
+from flipflow.transient.run_up import Peak, RunUp
 
 GREATEST = (
     ("main_amplitude", "main frame", "mm", "m"),
@@ -84,7 +84,10 @@ def start_words(found: Transients) -> str:
         first = f"does not pass {first}"
     else:
         first = f"passes {first} in {run.passing:.2g} s"
-    return f"{run.verdict}; {first}; {_greatest(run)} ({drive_words(found)})."
+    peaks = found.peaks
+    own = all(run.peaks[name] == peak for name, peak in peaks.items() if name in run.peaks)
+    what = "greatest" if own else "greatest of all starts"
+    return f"{run.verdict}; {first}; {what}: {_greatest(run, peaks)} ({drive_words(found)})."
 
 
 def coast_words(found: Transients) -> str:
@@ -92,7 +95,7 @@ def coast_words(found: Transients) -> str:
     run = found.coast_down
     if run is None:
         return f"not checked: {found.reasons['coast_down']}."
-    return f"{run.verdict}; {_greatest(run)}."
+    return f"{run.verdict}; greatest: {_greatest(run, run.peaks)}."
 
 
 def jump_lines(found: Transients) -> Iterator[Text]:
@@ -164,14 +167,14 @@ def _least_lump(risk: JumpRisk) -> str:
     return f"a lump of {number(lump.size)} kg that lands on the {lump.frame} frame does so, too"
 
 
-def _greatest(run: RunUp) -> str:
+def _greatest(run: RunUp, peaks: Mapping[str, Peak]) -> str:
     """Greatest amplitude of the main frame and force on the foundation, each with its speed."""
     parts = []
     for name, what, shown, unit in GREATEST:
-        if peak := run.peaks.get(name):
+        if peak := peaks.get(name):
             parts.append(f"{what} {quantity(peak.value, shown, unit)} at {rpm(peak.omega)} rpm")
     along = "" if run.history.normal is not None else ", along the surface only"
-    return f"greatest: {', '.join(parts)}{along}"
+    return f"{', '.join(parts)}{along}"
 
 
 def cases_table(found: Transients) -> Table:

@@ -57,5 +57,10 @@ def starts_from_rest(
 
 def badness(run: RunUp) -> tuple[int, float]:
     """A key by which the worst start comes first."""
+    return WORST_FIRST.index(run.outcome), -foundation_force(run)
+
+
+def foundation_force(run: RunUp) -> float:
+    """The greatest force of a run on the foundation in N; 0 where none is known."""
     force = run.peaks.get("foundation_force")
-    return WORST_FIRST.index(run.outcome), -(force.value if force is not None else 0.0)
+    return 0.0 if force is None else force.value

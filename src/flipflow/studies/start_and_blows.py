@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,7 @@ from flipflow.studies.drive_check import (
     power_that_passes,
     power_words,
 )
-from flipflow.studies.held_angles import badness, starts_from_rest
+from flipflow.studies.held_angles import badness, foundation_force, starts_from_rest
 from flipflow.studies.jump_risk import JumpRisk, jump_risk
 from flipflow.transient.chosen_drive import default_drive, fitted_drive
 from flipflow.transient.run_up import Outcome, Peak, RunSummary, RunUp
@@ -92,6 +92,11 @@ class Transients:
         The load case of ``start``.
     findings
         What is wrong with the drive.
+    loudest
+        Of all starts from every angle and in every load case the one with the greatest force on the
+        foundation, where that is not ``start``: a start that fails may end before it shakes much.
+    loudest_case
+        The load case of ``loudest``.
     """
 
     assumed: bool
@@ -102,6 +107,15 @@ class Transients:
     cases: tuple[CaseRuns, ...] = ()
     case: str = "empty"
     findings: tuple[Finding, ...] = ()
+    loudest: RunUp | None = None
+    loudest_case: str = ""
+
+    @property
+    def peaks(self) -> Mapping[str, Peak]:
+        """The greatest peaks of all starts, by name."""
+        if self.cases:
+            return _greatest(one.peaks for one in self.cases)
+        return {} if self.start is None else self.start.peaks
 
     @property
     def failed(self) -> tuple[CaseRuns, ...]:
@@ -220,19 +234,24 @@ def _case(name: str, runs: _Runs, jump: JumpRisk | str, nothing: Mapping[str, st
         reasons["coast_down"] = NOT_REACHED
     if isinstance(jump, str):
         reasons["jump"] = jump
-    peaks: dict[str, Peak] = {}
-    for run in runs.starts:
-        for key, peak in run.peaks.items():
-            if key not in peaks or peak.value > peaks[key].value:
-                peaks[key] = peak
     return CaseRuns(
         name,
         runs.starts[0].summary if runs.starts else None,
         None if runs.coast_down is None else runs.coast_down.summary,
-        peaks,
+        _greatest(run.peaks for run in runs.starts),
         None if isinstance(jump, str) else jump,
         reasons,
     )
+
+
+def _greatest(several: Iterable[Mapping[str, Peak]]) -> dict[str, Peak]:
+    """The greatest peak of each name."""
+    found: dict[str, Peak] = {}
+    for peaks in several:
+        for key, peak in peaks.items():
+            if key not in found or peak.value > found[key].value:
+                found[key] = peak
+    return found
 
 
 def _worst(
@@ -244,6 +263,10 @@ def _worst(
     """The worst of all cases, with its motion."""
     starts = {name: one.starts[0] for name, one in runs.items() if one.starts}
     case = min(starts, key=lambda name: badness(starts[name]), default=cases[0].case)
+    every = [(name, run) for name, one in runs.items() for run in one.starts]
+    loudest_case, loudest = max(every, key=lambda one: foundation_force(one[1]), default=("", None))
+    if loudest is starts.get(case):
+        loudest_case, loudest = "", None
     coasts = [one.coast_down for one in runs.values() if one.coast_down is not None]
     reasons = dict(nothing)
     if not coasts:
@@ -255,18 +278,14 @@ def _worst(
     return Transients(
         not _known(project),
         starts.get(case),
-        max(coasts, key=lambda run: -badness_down(run), default=None),
+        max(coasts, key=foundation_force, default=None),
         jump,
         reasons,
         cases,
         case,
+        loudest=loudest,
+        loudest_case=loudest_case,
     )
-
-
-def badness_down(run: RunUp) -> float:
-    """Minus the greatest force on the foundation of a coast-down in N."""
-    force = run.peaks.get("foundation_force")
-    return 0.0 if force is None else -force.value
 
 
 def _known(project: Project) -> bool:
