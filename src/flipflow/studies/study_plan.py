@@ -362,7 +362,10 @@ def _differentiated(
     keys = {slope_key(one.name): one.name for one in asked}
     for one in asked if names else ():
         if not on_lanes(machine, one):
-            remedy = "many machines at once do not tell how it moves; ask an orbit or a fold for it"
+            remedy = (
+                "many machines at once do not tell how it moves; name quantities without it, and "
+                "ask an orbit or a fold for it"
+            )
             raise InputError("derivatives", one.name, remedy)
         if one.name in keys:
             remedy = f"that is what the derivatives of {keys[one.name]} are called, leave one out"
