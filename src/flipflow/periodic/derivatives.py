@@ -94,6 +94,16 @@ class MotionDerivatives:
         return self._slopes_of(self.problem)
 
     @cached_property
+    def scale(self) -> Real:
+        """What is of one size in each component of the state, (2 N,).
+
+        Coordinates may have units of their own, metres beside radians, which their masses tell;
+        rates are larger than displacements by omega.
+        """
+        sizes = 1.0 / np.sqrt(np.diag(self.solver.system.M))
+        return np.concatenate([sizes, self.omega * sizes])
+
+    @cached_property
     def state(self) -> Real:
         """z_p of the state at t = 0, (2 N, P + 1).
 
@@ -103,8 +113,7 @@ class MotionDerivatives:
             At a fold.
         """
         J, D = self.residual_slopes
-        n = self.solver.system.size
-        scale = np.repeat([1.0, self.omega], n)
+        scale = self.scale
         sizes = np.linalg.svd(J * scale / scale[:, None], compute_uv=False)
         if not sizes[-1] > SINGULAR * max(sizes[0], 1.0):
             raise IncompleteError(FOLDED)

@@ -148,7 +148,7 @@ def _spring(motion: TiltedMotion, number: object) -> int:
 def _of_fold(point: SpecialPoint, parameters: Sequence[Named], slopes: MotionDerivatives) -> Real:
     """l r_p of the residual, (P + 1,): l the left vector of the eigenvalue +1."""
     J, D = slopes.residual_slopes
-    scale = np.repeat([1.0, point.omega], J.shape[0] // 2)
+    scale = slopes.scale
     left, sizes, _ = np.linalg.svd(J * scale / scale[:, None])
     null = np.count_nonzero(sizes < NULL * max(float(sizes[0]), 1.0))
     if null != 1:
