@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -232,3 +233,25 @@ def test_machines_that_are_hardly_uneven(pull: float, order: int) -> None:
     )
     branch = ff.frequency_response(machine, (0.3, 6.0))
     assert branch.complete, branch.status
+
+
+@pytest.mark.parametrize(
+    ("number", "law", "omega", "word"),
+    [
+        (10, "undamped-rebound", 1.9335034, "contact begin"),
+        (6, "compression-only", 0.9235096, "contact end"),
+    ],
+)
+def test_a_contact_at_a_corner_has_the_word_of_the_motion_without_it(number, law, omega, word):
+    """It was that of the side on which the corner was reached, by chance of the phase."""
+    system, interval = draw()(61, number, law=law)
+    for phase in (0.0, 0.9, 2.1, 3.3, 4.6):
+        given = system.excitation
+        turned = replace(given, vector=given.vector * np.exp(1j * phase))
+        branch = ff.frequency_response(replace(system, excitation=turned), interval)
+        (corner,) = (
+            point
+            for point in branch.special_points
+            if point.kind.startswith("contact") and abs(point.omega - omega) < 1e-6
+        )
+        assert corner.kind == word, phase

@@ -360,9 +360,21 @@ def _refine(solver: Solver, traced: Traced, test: Test, p: int, low: float, high
         share, point = _zero_between(solver, traced, test, p, low, high)
     kind = test.kind
     if kind == CONTACT_BEGIN:
-        deeper = test.values[p + 1] > 0.0 if high == 1.0 else test.values[p] < 0.0
-        kind = CONTACT_BEGIN if deeper == (point.omega_tangent > 0.0) else CONTACT_END
+        deeper = bool(test.values[p + 1] > 0.0 if high == 1.0 else test.values[p] < 0.0)
+        kind = CONTACT_BEGIN if deeper == _rises(traced, p, point, deeper) else CONTACT_END
     return Found(kind, p, share, point, test.spring, test.side)
+
+
+def _rises(traced: Traced, p: int, point: Point, deeper: bool) -> bool:
+    """Whether omega rises along the branch where a contact comes or goes within step p.
+
+    Where the branch turns back at a corner the tangent there may be that of either side: the motion
+    without the contact says whether one begins as the speed rises.
+    """
+    sides = traced.tangent[p : p + 2, -1]
+    if sides[0] * sides[1] < 0.0:
+        return bool(sides[0 if deeper else 1] > 0.0)
+    return point.omega_tangent > 0.0
 
 
 def _known_zero(
