@@ -10,6 +10,7 @@ from flipflow.batch.reasons import FOUND, REFUSED, UNSTABLE
 from flipflow.model.quantities import quantity_named
 from flipflow.studies.lane_values import lane_values
 from flipflow.studies.quantity_values import MOTION_VALUES, Working
+from judge import close
 
 pytestmark = pytest.mark.numerical
 FIELDS = (
@@ -224,3 +225,24 @@ def test_any_machine_with_a_system_of_its_own():
         for k, at in enumerate((30, 140)):
             if why[row, k] == FOUND:
                 assert found[row, k] == pytest.approx(up[at], rel=1e-6)
+
+
+def test_a_jump_on_the_way_leads_where_it_leads_however_far_the_speed_ahead():
+    """Folds at 0.43 rad/s leave the motion at 1.41 as it is; which one was found hung on phases."""
+    stop = ff.ClearanceSpring([1.0], 107.646, 8.957, -0.623, np.inf, law="compression-only")
+    second = ff.ClearanceSpring([1.0], 7.258, 2.548, 8.052, law="undamped-rebound")
+    push = -1.03 * (0.8581 + 0.5135j), 1.03 * (-0.1172 + 0.5399j), 1.03 * (-0.0903 + 0.1786j)
+    speeds = [0.3117, 1.4094]
+    for phase in (0.0, 0.5, 1.0, 3.5, 4.0):
+        first, third = (
+            ff.HarmonicForce([push[k] * np.exp(1j * order * phase)], order)
+            for k, order in enumerate((1, 3))
+        )
+        base = ff.MovingBase(push[2] * np.exp(2j * phase), [0.01675], [3.35e-4], 2)
+        machine = ff.MechanicalSystem(
+            [[0.6795]], [[0.04606]], [[0.7333]], (stop, second), (first, third, base),
+            static_force=[-4.1207],
+        )  # fmt: skip
+        expected = ff.frequency_response(machine, (0.15, 1.4094)).orbit_from_below(1.4094)
+        found = ff.study(machine, {"forcing": [1.0, 1.001]}, "amplitude[0]", speeds)
+        close(f"at {phase}", found.values["amplitude[0]"][0, 0, 1], expected.amplitude(0), rel=1e-6)

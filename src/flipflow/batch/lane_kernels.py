@@ -34,6 +34,8 @@ from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
 from flipflow.periodic.shooting import Shooting
 
+BEHIND = 1e-3  # share of a frequency at which a motion ends, behind which the next one is sought
+LEAPS = 8  # from motion to motion on the way to one frequency
 OCTAVES = 3  # away from a frequency at which a machine is let settle where it does not there
 
 
@@ -119,8 +121,10 @@ def run_lane(
                 problem = problem_of(machine, half, length)
                 begun = start_without_contact(problem, work, omega[f], rising)
         reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
+        if begun and not lost and not reached:
+            jumps += 1
+            reached, half = leapt(machine, work, omega[f], length, even, half)
         if not reached:
-            jumps += 1 if begun and not lost else 0
             reached, half = settled(machine, work, omega[f], length, even)
             if f == 0 and not reached:
                 reached, half = led(machine, work, omega[f], length, even, rising)
@@ -179,6 +183,28 @@ def settled(
             return True, True
     set_out(work, PUSH if even else 0.0)
     return settle(problem_of(machine, False, length), work, omega), False
+
+
+@kernel
+def leapt(
+    machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool, half: bool
+) -> tuple[bool, bool]:
+    """Go on to omega from what the machine settles into right behind the end of its motion.
+
+    Let go at once at a frequency far ahead it may settle into a motion that no jump leads to.
+    """
+    for _ in range(LEAPS):
+        end = work.omega[0]
+        if abs(omega - end) <= BEHIND * end:
+            break
+        beyond = end * (1.0 + math.copysign(BEHIND, omega - end))
+        reached, half_there = settled(machine, work, beyond, length, even)
+        if not reached:
+            break
+        half = half_there
+        if follow(problem_of(machine, half, length), work, omega):
+            return True, half
+    return False, half
 
 
 @kernel
