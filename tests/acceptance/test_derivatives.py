@@ -25,7 +25,6 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies import derivatives
 from flipflow.studies.quantity_values import Working
-from judge import close
 
 pytestmark = pytest.mark.numerical
 LAWS = get_args(ContactLaw)
@@ -599,25 +598,3 @@ def test_a_doubling_at_a_corner_has_no_derivative() -> None:
     assert np.isfinite(smooth[0].sensitivity(["forcing"])).all()
     with pytest.raises(ff.IncompleteError, match=r"no multiplier is -1"):
         corners[0].sensitivity(["forcing"])
-
-
-def test_a_coordinate_may_have_a_unit_of_its_own(screen):
-    """With 0.1 um beside metres every motion was told to stand at a fold."""
-    system = screen.system()
-    unit = np.diag([1.0, 1e-7])
-    (spring,), force = system.springs, system.excitation
-    other = ff.MechanicalSystem(
-        unit @ system.M @ unit, unit @ system.C @ unit, unit @ system.K @ unit,
-        (dataclasses.replace(spring, direction=unit @ spring.direction),),
-        ff.Unbalance(unit @ force.vector), {"relative": unit @ system.coordinates["relative"]},
-    )  # fmt: skip
-    names = ["springs[0].clearance", "springs[0].stiffness", "forcing", "omega"]
-    branches = [ff.frequency_response(one, (100.0, 215.0)) for one in (system, other)]
-    plain, mixed = (
-        branch.orbits_at(120.0)[0].sensitivity("relative_amplitude", names) for branch in branches
-    )
-    for name, got, expected in zip(names, mixed, plain, strict=True):
-        close(f"slope of {name}", got, expected, rel=1e-6)
-    plain, mixed = (branch.folds[0].sensitivity(names[:3]) for branch in branches)
-    for name, got, expected in zip(names, mixed, plain, strict=False):
-        close(f"slope of a fold, {name}", got, expected, rel=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -184,3 +185,25 @@ def test_what_nothing_excites_once_a_turn_has_no_phase(order: int) -> None:
     assert np.isnan(orbit.sensitivity(("phase", 0), ["forcing"])).all()
     study = ff.study(system, {"forcing": np.array([1.0, 1.0])}, "phase[0]", omega=0.35)
     assert np.isnan(study.values["phase[0]"]).all()
+
+
+def test_a_coordinate_may_have_a_unit_of_its_own(screen):
+    """With 0.1 um beside metres every motion was told to stand at a fold."""
+    system = screen.system()
+    unit = np.diag([1.0, 1e-7])
+    (spring,), force = system.springs, system.excitation
+    other = ff.MechanicalSystem(
+        unit @ system.M @ unit, unit @ system.C @ unit, unit @ system.K @ unit,
+        (replace(spring, direction=unit @ spring.direction),),
+        ff.Unbalance(unit @ force.vector), {"relative": unit @ system.coordinates["relative"]},
+    )  # fmt: skip
+    names = ["springs[0].clearance", "springs[0].stiffness", "forcing", "omega"]
+    branches = [ff.frequency_response(one, (100.0, 215.0)) for one in (system, other)]
+    plain, mixed = (
+        branch.orbits_at(120.0)[0].sensitivity("relative_amplitude", names) for branch in branches
+    )
+    for name, got, expected in zip(names, mixed, plain, strict=True):
+        close(f"slope of {name}", got, expected, rel=1e-6)
+    plain, mixed = (branch.folds[0].sensitivity(names[:3]) for branch in branches)
+    for name, got, expected in zip(names, mixed, plain, strict=False):
+        close(f"slope of a fold, {name}", got, expected, rel=1e-6)
