@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 import functools
 import gc
+import importlib
 import pickle
+import pkgutil
 import shutil
 import signal
 import subprocess
@@ -53,7 +55,12 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """The collector of garbage looks no more at modules and tests, which live to the end."""
+    """Every module is loaded, and the collector of garbage looks no more at what lives to the end.
+
+    A module that is first loaded by a test would keep what the test has replaced for a moment.
+    """
+    for one in pkgutil.walk_packages(ff.__path__, f"{ff.__name__}."):
+        importlib.import_module(one.name)
     gc.collect()
     gc.freeze()
 

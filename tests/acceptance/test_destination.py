@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 import os
-import pkgutil
 import shutil
 import signal
 import subprocess
@@ -15,7 +14,6 @@ from pathlib import Path
 import pytest
 
 import flipflow as ff
-from flipflow import cli
 from flipflow.errors import InputError
 from flipflow.paper.reproduce import reproduce
 
@@ -57,9 +55,9 @@ def at_work(monkeypatch):
         def begun(*_words):
             act()
 
-        # All of them: one that is first imported now would keep what stands here for a moment.
-        names = [one.name for one in pkgutil.iter_modules(cli.__path__, f"{cli.__name__}.")]
-        for module in map(importlib.import_module, names):
+        modules = [importlib.import_module(f"flipflow.cli.{name}") for name in QUICK]
+        monkeypatch.setattr("flipflow.cli.progress.progress", begun)
+        for module in modules:
             if hasattr(module, "progress"):
                 monkeypatch.setattr(module, "progress", begun)
 
