@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -61,6 +62,22 @@ def test_a_closed_terminal_is_said_where_it_can_be(tmp_path):
 def test_a_terminal_that_is_not_utf8_shows_what_it_can(code):
     told = run("check", "ffs0827", capture_output=True, env=os.environ | {"PYTHONIOENCODING": code})
     assert told.returncode == 0, told.stderr
+
+
+@pytest.mark.parametrize("code", ["ascii", "latin-1", "cp1252"])
+def test_letters_that_a_terminal_has_not_are_escaped(code, tmp_path):
+    """A traceback of a UnicodeEncodeError stood there; the JSON document stays one."""
+    name, place = "M\u0142yn \u2013 \U0001f3ed", tmp_path / "mill.toml"
+    text = bundled_text("ffs0827").replace('name = "FFS0827"', f'name = "{name}"', 1)
+    place.write_text(text, encoding="utf-8")
+    env = os.environ | {"PYTHONIOENCODING": code}
+    given = {"capture_output": True, "env": env, "encoding": code}
+    told = run("check", str(place), **given)
+    assert told.returncode == 0, told.stderr
+    assert "M\\u0142yn" in told.stdout
+    told = run("check", str(place), "--json", "-", **given)
+    assert told.returncode == 0, told.stderr
+    assert name in json.dumps(json.loads(told.stdout), ensure_ascii=False)
 
 
 LONG = {

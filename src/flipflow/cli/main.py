@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import atexit
+import codecs
 import errno
 import gc
 import io
@@ -18,6 +19,7 @@ from types import FrameType
 STOPPED_CODE = 130
 OBJECTS = 50_000  # made since garbage was last looked for
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+ESCAPED = "flipflow-escaped"  # how letters are shown that an encoding has not
 AGAIN = 0.02  # seconds until a dropped interrupt is raised again
 
 
@@ -25,6 +27,7 @@ def main() -> None:
     """Run the command line; an error is one sentence on stderr and the exit code of its class."""
     sys.stdout = sys.stdout or Closed()
     sys.stderr = sys.stderr or Closed()
+    _show_what_it_can(sys.stdout)
     # At the usual pace a fourteenth of an analysis goes into looking for garbage that is not there.
     gc.set_threshold(OBJECTS, 50, 50)
     # Nor is there any at the end, where Python takes a tenth of an analysis to look once more.
@@ -48,6 +51,21 @@ class Closed(io.TextIOBase):
     def fileno(self) -> int:
         """Say that it is closed."""
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+
+def _show_what_it_can(stream: object) -> None:
+    """Escape letters that the encoding of a terminal or a pipe has not, in place of an error."""
+    if isinstance(stream, io.TextIOWrapper) and codecs.lookup(stream.encoding).name != "utf-8":
+        codecs.register_error(ESCAPED, _escaped)
+        stream.reconfigure(errors=ESCAPED)
+
+
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    r"""Letters as \uXXXX: so a JSON document on the terminal stays one."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    digits = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass").hex()
+    return "".join(f"\\u{digits[k : k + 4]}" for k in range(0, len(digits), 4)), error.end
 
 
 def _say_stopped(outcome: str) -> None:
