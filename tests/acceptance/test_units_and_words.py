@@ -84,6 +84,14 @@ def test_carried_material_is_questioned_too(changed):
         changed(('material = "30 kg/m^2"', 'material = "1.200 kg"'))
 
 
+def test_carried_material_in_any_unit_of_mass(changed):
+    """In pounds it was refused as no mass per area, where the masses of the frames are taken so."""
+    case = changed(('material = "30 kg/m^2"', 'material = "140 lb"')).load_cases[2]
+    assert case.main_mass + case.floating_mass == pytest.approx(63.503, rel=1e-5)
+    area = changed(('material = "30 kg/m^2"', 'material = "6 lb/ft^2"')).load_cases[2]
+    assert area.main_mass + area.floating_mass == pytest.approx(2.16 * 29.2946, rel=1e-5)
+
+
 def test_a_total_that_looks_like_one_piece_is_questioned(changed):
     words = (
         ('stiffness = "2700 kN/m"', 'stiffness = "0.38 kN/mm"'),

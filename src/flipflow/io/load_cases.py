@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from flipflow.errors import InputError
 from flipflow.io.layout import LOAD_FIELDS, MATERIAL, MATERIAL_PER_AREA, SECTIONS, refuse_unknown
-from flipflow.io.units import measured
+from flipflow.io.units import converts
 from flipflow.io.values import LEFT_OUT, Notes, Table, read_number, read_text
 from flipflow.model.screen import FlipFlowScreen, Load, TemperatureOf, as_cool_as_air
 
@@ -80,7 +80,7 @@ def _material(table: Table, label: str, screen: FlipFlowScreen) -> dict[str, flo
             )
         return {}
     name = f"{label}, material"
-    if isinstance(material, str) and measured(material) == "kg":
+    if isinstance(material, str) and converts(material, MATERIAL.unit):
         mass = read_number(material, MATERIAL, label=name)
     else:
         per_area = read_number(material, MATERIAL_PER_AREA, label=name)

@@ -203,6 +203,19 @@ def measured(text: str) -> str | None:
     return next((si for si, (_, _, known) in _UNITS.items() if name and name in known), None)
 
 
+def converts(text: str, unit: str) -> bool:
+    """Whether the unit of the quantity in ``text`` is one of ``unit``, also beside the table."""
+    _, name = _parts(_BLANKS.sub(" ", text).strip())
+    other = measured(text)
+    if other is not None or not _SAFE_UNIT.fullmatch(name):
+        return other == unit
+    try:
+        _pint_factor(name, unit, field="", written=text, example="")
+    except InputError:
+        return False
+    return True
+
+
 def with_three_decimals(written: object) -> tuple[str, str] | None:
     """A quantity such as "6.800 kg" read both ways: "6.8 kg" and "6800 kg"; else None."""
     text = written.strip() if isinstance(written, str) else ""
