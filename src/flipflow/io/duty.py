@@ -15,6 +15,7 @@ from flipflow.errors import InputError, required
 from flipflow.io.layout import SPEED, refuse_unknown
 from flipflow.io.load_cases import read_load_cases
 from flipflow.io.project import read_limits
+from flipflow.io.study_file import IN_FILE as RANGES
 from flipflow.io.study_file import (
     chosen_cases,
     flat_keys,
@@ -25,11 +26,12 @@ from flipflow.io.study_file import (
 )
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Notes, Table, read_number
-from flipflow.io.vary import PLUS_MINUS, field_named
+from flipflow.io.vary import EACH, PLUS_MINUS, field_named
 from flipflow.model.duty import OBJECTIVES, Duty, SpringType
+from flipflow.model.fields import FIELD
 from flipflow.model.limits import LIMIT_FIELDS, Limits
 from flipflow.model.project import Project
-from flipflow.model.vary import Choice
+from flipflow.model.vary import Choice, Normal
 
 SECTIONS = (
     "format", "machine", "duty", "free", "scatter", "limits", "load_cases", "catalogue",
@@ -39,6 +41,15 @@ DUTY = (
 )  # fmt: skip
 CATALOGUE = ("file", "pieces")
 CHOICES = "choices"
+CHOSEN = 'write for example "2 mm..9 mm", "+-5 %" or { choices = ["4 mm", "6 mm"] }'
+# Where an argument of a duty stands in the file.
+IN_FILE: Mapping[str, tuple[str, str]] = {
+    "target": ("duty", "relative_amplitude"),
+    **{key: ("duty", key) for key in ("tolerance", "speed", "temperatures", "prefer")},
+    "pieces": ("catalogue", "pieces"),
+}
+# Sections of fields, by the word before a field that a duty refuses.
+OF_FIELDS: Mapping[str, str] = {"vary": "free", "free": "free", "scatter": "scatter"}
 # Columns of a catalogue: unit in SI, and whether it must be there.
 COLUMNS: Mapping[str, tuple[str, bool]] = {
     "stiffness": ("N/m", True),
@@ -75,22 +86,43 @@ def load_duty(path: str | os.PathLike[str], *, force: bool = False) -> Duty:
     table = section_of(tables, "duty")
     refuse_unknown(table, DUTY, place="duty.")
     springs, pieces = _catalogue(section_of(tables, "catalogue"), source.path)
-    return Duty(
-        project=project,
-        target=_quantity(table, "relative_amplitude", unit="m", example="7 mm"),
-        tolerance=_quantity(table, "tolerance", unit="m", example="0.5 mm"),
-        speed=_speed(table, project),
-        free=_free(section_of(tables, "free"), project),
-        load_cases=_load_cases(tables, table, project),
-        temperatures=_temperatures(table),
-        scatter=_scatter(section_of(tables, "scatter")),
-        limits=_limits(tables, project),
-        catalogue=springs,
-        pieces=pieces,
-        prefer=_prefer(table),
-        seed=whole_number(table.get("seed", 0), "duty.seed", 0, 2**31 - 1),
-        name=source.name,
-    )
+    values: dict[str, Any] = {
+        "project": project,
+        "target": _quantity(table, "relative_amplitude", unit="m", example="7 mm"),
+        "tolerance": _quantity(table, "tolerance", unit="m", example="0.5 mm"),
+        "speed": _speed(table, project),
+        "free": _free(section_of(tables, "free"), project),
+        "load_cases": _load_cases(tables, table, project),
+        "temperatures": _temperatures(table),
+        "scatter": _scatter(section_of(tables, "scatter")),
+        "limits": _limits(tables, project),
+        "catalogue": springs,
+        "pieces": pieces,
+        "prefer": _prefer(table),
+        "seed": whole_number(table.get("seed", 0), "duty.seed", 0, 2**31 - 1),
+        "name": source.name,
+    }
+    try:
+        return Duty(**values)
+    except InputError as error:
+        raise _as_in_file(error, tables) from None
+
+
+def _as_in_file(error: InputError, tables: Table) -> InputError:
+    """What a duty refuses, by its place in the file and as it is written there, not in SI."""
+    section, _, name = error.field.partition(" ")
+    if section in OF_FIELDS and name in FIELD:
+        section = OF_FIELDS[section]
+        words = (name, FIELD[name].key, FIELD[name].key.rpartition(".")[2])
+        for key, written in flat_keys(section_of(tables, section)).items():
+            if key.removesuffix(f".{CHOICES}").removesuffix(EACH) in words:
+                return InputError(f"{section}.{key}", written, error.remedy)
+    if error.field not in IN_FILE:
+        return error
+    section, key = IN_FILE[error.field]
+    given = section_of(tables, section).get(key, error.value)
+    one = isinstance(given, list) and error.value in given  # a word of a list
+    return InputError(f"{section}.{key}", error.value if one else given, error.remedy)
 
 
 def _quantity(table: Table, key: str, *, unit: str, example: str) -> float:
@@ -115,10 +147,22 @@ def _free(table: Mapping[str, Any], project: Project) -> dict[str, Any]:
     for key, written in flat_keys(table).items():
         name, last = key.rpartition(".")[::2]
         if last == CHOICES:
-            (field, values) = next(iter(varied_field(name, written, project).items()))
-            found[field] = Choice(tuple(float(one) for one in values))  # type: ignore[attr-defined]
+            (field, values) = next(iter(_varied(name, written, project).items()))
+            found[field] = Choice(tuple(float(one) for one in values))
         else:
-            found |= varied_field(key, written, project)
+            found |= _varied(key, written, project)
+    return found
+
+
+def _varied(key: str, written: object, project: Project) -> dict[str, Any]:
+    """A field that may be chosen and its values; what a study draws at random is no choice."""
+    try:
+        found = varied_field(key, written, project, "free")
+    except InputError as error:
+        remedy = CHOSEN if error.remedy == RANGES else error.remedy
+        raise InputError(error.field, error.value, remedy) from None
+    if any(isinstance(one, Normal) for one in found.values()):
+        raise InputError(f"free.{key}", written, CHOSEN)
     return found
 
 
@@ -126,10 +170,18 @@ def _scatter(table: Mapping[str, Any]) -> dict[str, float]:
     found = {}
     for key, written in flat_keys(table).items():
         label = f"scatter.{key}"
-        name = field_named(key, key).name
+        name = _field_of(key, label, written)
         share = written.strip().removeprefix(PLUS_MINUS) if isinstance(written, str) else written
         found[name] = parse_quantity(share, "", field=label, example="15 %")
     return found
+
+
+def _field_of(key: str, label: str, written: object) -> str:
+    """Name of a field by one of its words."""
+    try:
+        return field_named(key, key).name
+    except InputError as error:
+        raise InputError(label, written, error.remedy) from None
 
 
 def _temperatures(table: Table) -> tuple[float, ...]:
@@ -145,7 +197,7 @@ def _load_cases(tables: Table, table: Table, project: Project) -> tuple[Any, ...
     """Load cases of the duty's own, else those of the machine's that it names, else all."""
     own = tables.get("load_cases")
     if own is None:
-        return chosen_cases(table, project)
+        return chosen_cases(table, project, "duty")
     if "load_cases" in table:
         remedy = "[[load_cases]] stand in this file, too; leave one of the two out"
         raise InputError("duty.load_cases", table["load_cases"], remedy)
@@ -262,8 +314,17 @@ def _rows(path: Path) -> list[list[Any]]:
         apart = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
         rows = csv.reader(lines, delimiter=apart)
         return [row for row in rows if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError("catalogue.file", str(path), f"it cannot be read, {error}") from None
+    except FileNotFoundError:
+        remedy = "there is no such file, it is looked for beside the duty file"
+        raise InputError("catalogue.file", path.name, remedy) from None
+    except UnicodeDecodeError:
+        remedy = "it is not UTF-8 text, save the file as UTF-8"
+        raise InputError("catalogue.file", path.name, remedy) from None
+    except OSError as error:
+        remedy = f"it cannot be read ({error.strerror})"
+        raise InputError("catalogue.file", path.name, remedy) from None
+    except csv.Error as error:
+        raise InputError("catalogue.file", path.name, f"it cannot be read, {error}") from None
 
 
 def _sheet_rows(path: Path) -> list[list[Any]]:

@@ -149,9 +149,11 @@ def flat_keys(table: Mapping[str, Any], within: str = "") -> dict[str, Any]:
     return flat
 
 
-def varied_field(key: str, written: object, project: Project) -> dict[str, object]:
-    """A field and how it varies."""
-    label = f"vary.{key}"
+def varied_field(
+    key: str, written: object, project: Project, section: str = "vary"
+) -> dict[str, object]:
+    """A field and how it varies; ``section`` of the file is where it stands."""
+    label = f"{section}.{key}"
     try:
         if isinstance(written, str):
             return read_vary([f"{key}={written}"], project.screen)
@@ -257,18 +259,18 @@ def _speeds(table: Table, project: Project) -> Real:
     return np.array([project.speed])
 
 
-def chosen_cases(table: Table, project: Project) -> tuple[Load, ...]:
-    """The load cases that the file names, else all of the machine's."""
+def chosen_cases(table: Table, project: Project, section: str = "study") -> tuple[Load, ...]:
+    """The load cases that a section of the file names, else all of the machine's."""
     if "load_cases" not in table:
         return project.load_cases
     known = {load.name: load for load in project.load_cases}
-    written = table["load_cases"]
+    written, label = table["load_cases"], f"{section}.load_cases"
     if not isinstance(written, list) or not written:
-        raise InputError("study.load_cases", written, 'give a list of names, ["empty", "hot"]')
+        raise InputError(label, written, 'give a list of names, ["empty", "hot"]')
     for one in written:
         if one not in known:
             remedy = f"the machine has no such load case, choose of {', '.join(map(repr, known))}"
-            raise InputError("study.load_cases", one, remedy)
+            raise InputError(label, one, remedy)
     return tuple(known[one] for one in written)
 
 
