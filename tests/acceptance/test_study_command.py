@@ -313,6 +313,15 @@ def test_a_terminal_sees_the_time_left(here):
         (('"5.4 mm..6.6 mm"', '["5 mm"]'), ("vary.clearance", "a list of at least two values")),
         (('"5.4 mm..6.6 mm"', '["5 mm", "6 kg"]'), ("vary.clearance", "6 kg")),
         (('"5.4 mm..6.6 mm"', '{from = "5 mm", to = "6 mm"}'), ("vary.clearance.values",)),
+        (('"5.4 mm..6.6 mm"', '"+/-3 %"'), ("vary.clearance = '+/-3 %'", "the mean before")),
+        (
+            ('"5.4 mm..6.6 mm"', '{from = "6 mm", to = "5 mm", values = 3}'),
+            ("vary.clearance = {'from': '6 mm', 'to': '5 mm'}", "reversed"),
+        ),
+        (
+            ("seed = 4", 'speeds = {from = "16 Hz", to = "9 Hz", values = 3}'),
+            ("study.speeds = {'from': '16 Hz', 'to': '9 Hz'}", "reversed"),
+        ),
         (("samples = 32", "samples = 1"), ("study.samples = 1",)),
         (("samples = 32", 'sampling = "grid"'), ("study.seed", "draws nothing")),
         (("seed = 4", "seed = -4"), ("study.seed = -4",)),
@@ -343,6 +352,17 @@ def test_bad_files(command, here, change, words):
     for word in words:
         assert word in err
     assert not (here / "bad.zarr").exists()
+
+
+@pytest.mark.parametrize("word", ["grid", "list"])
+def test_a_range_has_no_values_to_combine(command, here, word):
+    """It was told by the words of Python, an Interval that needs an array."""
+    (here / "bad.toml").write_text(
+        f'machine = "ffs0827"\n[vary]\nclearance = "5 mm..6 mm"\n[study]\nsampling = "{word}"\n'
+    )
+    code, _, err = command("study", "bad.toml")
+    assert code == 2
+    assert f"study.sampling = '{word}': clearance is a range, give a list of values" in err
 
 
 @pytest.mark.parametrize(

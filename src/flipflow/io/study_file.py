@@ -17,7 +17,7 @@ from flipflow.io.project import load_project, refuse_other_files
 from flipflow.io.source import Source, bundled_names, read_source
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Table, read_number
-from flipflow.io.vary import EXAMPLE, field_named, read_vary
+from flipflow.io.vary import EXAMPLE, REVERSED, field_named, read_vary
 from flipflow.model.fields import FIELD
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, BranchWord
@@ -166,10 +166,18 @@ def varied_field(
     if isinstance(written, dict):
         refuse_unknown(written, RANGE, place=f"{label}.")
         low, high = (_number(label, written.get(end, LEFT_OUT), field.name) for end in RANGE[:2])
-        count = whole_number(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
-        return {field.name: np.linspace(low, high, count)}
+        return {field.name: _evenly(low, high, written, label)}
     numbers = [_number(label, one, field.name) for one in _list(label, written)]
     return {field.name: np.array(numbers)}
+
+
+def _evenly(low: float, high: float, written: Mapping[str, Any], label: str) -> Real:
+    """Values evenly over a range that is written ``{from = ..., to = ..., values = ...}``."""
+    if not low < high:
+        ends = {end: written[end] for end in RANGE[:2]}
+        raise InputError(label, ends, REVERSED)
+    count = whole_number(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
+    return np.linspace(low, high, count)
 
 
 def _number(label: str, written: object, name: str) -> float:
@@ -240,11 +248,10 @@ def _speeds(table: Table, project: Project) -> Real:
         written, label = table["speeds"], "study.speeds"
         if isinstance(written, dict):
             refuse_unknown(written, RANGE, place=f"{label}.")
-            ends = [
+            low, high = (
                 read_number(written.get(end, LEFT_OUT), SPEED, label=label) for end in RANGE[:2]
-            ]
-            count = whole_number(written.get("values", LEFT_OUT), f"{label}.values", 2, MOST_VALUES)
-            return np.linspace(ends[0], ends[1], count)
+            )
+            return _evenly(low, high, written, label)
         if not isinstance(written, list) or not written:
             remedy = (
                 'give a list, ["600 rpm", "850 rpm"], or {from = "9 Hz", to = "16 Hz", values = 8}'
@@ -283,6 +290,10 @@ def _sampling(table: Table, vary: Mapping[str, object]) -> str | Sample | None:
     if word in get_args(Listed):
         for key, written in drawn.items():
             raise InputError(f"study.{key}", written, f"a {word} draws nothing, leave it out")
+        for name, given in vary.items():
+            if not isinstance(given, (np.ndarray, Choice)):
+                remedy = f"{name} is a range, give a list of values, or {{from, to, values}}"
+                raise InputError("study.sampling", word, remedy)
         return str(word)
     n = whole_number(drawn.get("samples", 1024), "study.samples", 2, 2**24)
     seed = whole_number(drawn.get("seed", 0), "study.seed", 0, 2**63 - 1)

@@ -13,6 +13,7 @@ from flipflow.model.vary import Normal, variations
 
 OPTION = "--vary"
 EXAMPLE = 'write for example "clearance=5.4 mm..6.6 mm"'
+REVERSED = "the range is empty or reversed, give the lower end first"
 PLUS_MINUS, SPREAD, EACH = "+-", "+/-", "_each"
 BY_KEY: Mapping[str, Field] = {field.key: field for field in FIELD.values()}
 WORDS = ", ".join(key for key, field in BY_KEY.items() if not field.whole)
@@ -86,7 +87,7 @@ def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen, count: 
         raise InputError(OPTION, word, f"{field.name} is counted, vary what has values between")
     given = _range(field, text, word, screen, count)
     if isinstance(given, tuple) and not given[0] < given[1]:
-        raise InputError(OPTION, word, "the range is empty or reversed, give the lower end first")
+        raise InputError(OPTION, word, REVERSED)
     try:
         variations({field.name: given}, screen)
     except InputError as error:
@@ -97,6 +98,11 @@ def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen, count: 
 def _range(field: Field, text: str, word: str, screen: FlipFlowScreen, count: float) -> object:
     if text.startswith(PLUS_MINUS):
         return _about(field, text.removeprefix(PLUS_MINUS).strip(), word, screen, count)
+    if text.startswith(SPREAD):
+        remedy = (
+            f'give the mean before "{SPREAD}", or write "{PLUS_MINUS}" about the machine\'s value'
+        )
+        raise InputError(OPTION, word, remedy)
     if SPREAD in text:
         mean, std = (count * _number(field, part) for part in text.split(SPREAD, 1))
         if not std > 0.0:
