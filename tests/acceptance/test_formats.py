@@ -241,6 +241,21 @@ def test_the_pdf_has_its_paper_its_own_fonts_and_no_bitmap(printed, assessed, pa
 
 
 @poppler
+@poppler
+def test_names_of_the_machine_file_are_whole_words(assessed, printed):
+    """A letter without width stood between all letters: nothing was found, and words were cut."""
+    text = subprocess.run(
+        [POPPLER, printed("bundled", "a4"), "-"], capture_output=True, check=True
+    ).stdout.decode()  # fmt: skip
+    values = next(
+        block for block in blocks_of(assessed("bundled"))
+        if isinstance(block, Table) and block.title == "Values of the machine file"
+    )  # fmt: skip
+    words = text.split()
+    assert [row[0].text for row in values.rows if row[0].text not in words] == []
+    assert "\u200b" not in text
+
+
 def test_texts_of_users_are_no_markup(hostile, tmp_path):
     (tmp_path / "report.pdf").write_bytes(pdf(hostile))
     text = " ".join(word.text for _, _, w in pages(tmp_path / "report.pdf") for word in w)
