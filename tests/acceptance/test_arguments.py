@@ -49,6 +49,19 @@ def test_what_makes_no_sense_is_one_sentence(screen, call, told):
     assert told in str(caught.value)
 
 
+def test_a_kind_of_point_that_there_is_not_is_refused(screen):
+    """Of "folds" there were none, without a word, where the branch has two of kind "fold"."""
+    branch = ff.frequency_response(screen, (100.0, 130.0))
+    assert branch.points_of("fold") == branch.folds == ()
+    over = ff.continue_orbit(branch.orbits_at(120.0)[0], "clearance", (5.9e-3, 6.1e-3))
+    assert over.points_of("cusp") == ()
+    for one in (branch, over):
+        with pytest.raises(InputError, match=r"kind = 'folds': choose one of fold, contact begin"):
+            one.points_of("folds")
+    with pytest.raises(InputError, match=r"omega = '1146 rpm': give a number in rad/s, the branch"):
+        branch.orbits_at("1146 rpm")
+
+
 def test_a_limit_on_speed_outside_the_speeds_analysed_is_said(screen):
     region = ff.operating_region(screen, ff.Limits(speed=(1000.0, 2000.0)))
     assert region.feasible == ()

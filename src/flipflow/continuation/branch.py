@@ -17,7 +17,7 @@ from scipy.optimize import brentq, minimize_scalar
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
 from flipflow.continuation.refinement import SHARE_TOLERANCE
-from flipflow.continuation.special_points import FOLD
+from flipflow.continuation.special_points import FOLD, KINDS
 from flipflow.dynamics.motion import phase_of
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import (
@@ -25,7 +25,7 @@ from flipflow.model.arguments import (
     checked_kind,
     checked_number,
     checked_speed,
-    checked_text,
+    checked_word,
 )
 from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
@@ -223,8 +223,14 @@ class Branch(Frozen, Result):
         )
 
     def points_of(self, kind: str) -> tuple[SpecialPoint, ...]:
-        """Special points of one kind, in branch order."""
-        checked_text("kind", kind)
+        """Special points of one kind, in branch order.
+
+        Raises
+        ------
+        InputError
+            For a word that is no kind.
+        """
+        checked_word("kind", kind, KINDS)
         return tuple(point for point in self.special_points if point.kind == kind)
 
     def amplitude(self, which: Coordinate) -> Real:
@@ -263,7 +269,7 @@ class Branch(Frozen, Result):
         if self.omega.size == 0:
             raise IncompleteError(f"The branch has no points. {self.status.value}")
         ends = [*self.omega.tolist(), *(fold.omega for fold in self.folds)]
-        remedy = f"the branch runs from {min(ends):.6g} to {max(ends):.6g} rad/s"
+        remedy = f"give a number in rad/s, the branch runs from {min(ends):.6g} to {max(ends):.6g}"
         if not min(ends) <= checked_number("omega", omega, remedy) <= max(ends):
             raise InputError("omega", omega, remedy)
         solver, omega = self.formulation.solver(), float(omega)

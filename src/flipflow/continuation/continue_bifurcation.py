@@ -17,13 +17,14 @@ from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.continue_field import checked_bounds, course_over
 from flipflow.continuation.correction import QUICK, SHARP, Course
-from flipflow.continuation.curve_points import CUSP, GRAZES, TURNING, curve_points, pair_sum
+from flipflow.continuation.curve_points import GRAZES, TURNING, curve_points, pair_sum
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
 from flipflow.continuation.field_solver import FieldPoint, FieldSolver, Sought
 from flipflow.continuation.refinement import FOLD as OF_FOLD
 from flipflow.continuation.special_points import (
     CONTACT_BEGIN,
     CONTACT_END,
+    CUSP,
     DOUBLING,
     FOLD,
     NEIMARK_SACKER,

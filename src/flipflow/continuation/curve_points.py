@@ -21,6 +21,7 @@ from flipflow.compiled.eigen import eigenvalues
 from flipflow.continuation.field_solver import FieldPoint, FieldSolver
 from flipflow.continuation.refinement import FOLD as OF_FOLD
 from flipflow.continuation.special_points import (
+    CUSP,
     DOUBLING,
     FOLD,
     NEIMARK_SACKER,
@@ -33,7 +34,7 @@ from flipflow.continuation.varied import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import has_unit_pair, neimark_sacker
 
-CUSP, TURNING, GRAZES = "cusp", "turning point", "grazing"
+TURNING, GRAZES = "turning point", "grazing"
 # What a second condition of the same kind is called.
 TWICE = {
     SADDLE_NODE: "1:1 resonance",

@@ -11,8 +11,8 @@ from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.orbit_row import OrbitRow
-from flipflow.continuation.special_points import FOLD
-from flipflow.model.arguments import checked_text
+from flipflow.continuation.special_points import CUSP, FOLD, KINDS
+from flipflow.model.arguments import checked_word
 from flipflow.model.screen import unit_in
 from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
@@ -82,6 +82,13 @@ class FieldBranch(OrbitRow):
         return self.points_of(FOLD)
 
     def points_of(self, kind: str) -> tuple[FieldSpecialPoint, ...]:
-        """Special points of one kind, in branch order."""
-        checked_text("kind", kind)
+        """Special points of one kind, in branch order.
+
+        Raises
+        ------
+        InputError
+            For a word that is no kind.
+        """
+        own = (point.kind for point in self.special_points)
+        checked_word("kind", kind, tuple(dict.fromkeys((*KINDS, CUSP, *own))))
         return tuple(point for point in self.special_points if point.kind == kind)

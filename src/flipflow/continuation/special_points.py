@@ -49,6 +49,8 @@ QUARTERS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a step at which a suspected 
 FOLD, BRANCH_POINT = "fold", "branch point"
 CONTACT_BEGIN, CONTACT_END = "contact begin", "contact end"
 SYMMETRY, DOUBLING, NEIMARK_SACKER = "symmetry breaking", "period doubling", "Neimark-Sacker"
+KINDS = (FOLD, CONTACT_BEGIN, CONTACT_END, SYMMETRY, DOUBLING, NEIMARK_SACKER, BRANCH_POINT)
+CUSP = "cusp"  # of a curve of folds
 STABILITY_CHANGES = (FOLD, BRANCH_POINT, SYMMETRY, DOUBLING, NEIMARK_SACKER)
 
 
