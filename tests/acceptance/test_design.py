@@ -23,7 +23,7 @@ from flipflow.io.units import parse_quantity
 from flipflow.model.constants import RPM
 from flipflow.model.fields import FIELD
 from flipflow.report.blocks import Table
-from flipflow.report.design import machine_of_proposal
+from flipflow.report.design import constraints_of_proposal, machine_of_proposal
 from flipflow.studies.candidates import Space
 from flipflow.studies.design_search import polish
 from judge import close
@@ -142,6 +142,9 @@ def test_an_impossible_duty_says_what_excludes_what(tmp_path, monkeypatch):
     assert "relative amplitude asked and shear strain exclude each other" in words
     found = ff.open_result("out/proposal.json")
     assert not found.possible
+    # None is proved: it was said to lie before the end of its polish, where it leaves a jump.
+    told = list(constraints_of_proposal(replace(found, prices={})))
+    assert told[0].caption.endswith("is told of a machine that is proved; this one is not.")
     # Between the 10 mm that the springs allow and the 11.7 mm that are asked at least.
     assert 10e-3 < found.chosen.amplitude[0] < 11.7e-3
     assert ff.load("out/machine.toml") == found.screen

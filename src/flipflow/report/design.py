@@ -136,7 +136,9 @@ def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
         "Of the relative amplitude 1 % of the target more to each side; of an end 1 % of its "
         "interval."
     )
-    if not priced:
+    if not priced and found.assessment is None:
+        caption = "What a constraint costs is told of a machine that is proved; this one is not."
+    elif not priced:
         caption = (
             "What a constraint costs is told of a machine that its polish ends at; this one lies "
             "before, where it leaves another motion or the jump far enough away."
