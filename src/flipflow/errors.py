@@ -31,7 +31,7 @@ def _revived(kind: type[FlipflowError], args: tuple[object, ...]) -> FlipflowErr
 
 
 class Shown(str):
-    """A value that cannot travel between processes, as the words that a sentence shows of it."""
+    """The words that a sentence shows of a value: one that cannot travel between processes."""
 
     __slots__ = ()
 
@@ -131,7 +131,9 @@ _WORDS = _Words()
 
 def _shown(value: object) -> str:
     """A value on one line, shortened."""
-    if isinstance(value, (str, bytes)):
+    if isinstance(value, Shown):
+        text = str(value)
+    elif isinstance(value, (str, bytes)):
         text = repr(value[:WIDTH])
     elif isinstance(value, numbers.Number):
         text = _number(value)

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
-from flipflow.errors import InputError
+from flipflow.errors import InputError, Shown
 from flipflow.model.constants import GRAVITY
 
 _TURN = 2.0 * math.pi
@@ -151,7 +151,7 @@ def parse_quantity(
     if isinstance(written, (int, float)) and not isinstance(written, bool):
         return _bare(written, unit, field, example, allow_infinite=allow_infinite)
     if not isinstance(written, str):
-        raise InputError(field, _toml(written), f"{what} belongs here, for example {example!r}")
+        raise InputError(field, as_toml(written), f"{what} belongs here, for example {example!r}")
     if len(written) > MOST_WRITTEN:
         remedy = f"{what} has at most {MOST_WRITTEN} characters, for example {example!r}"
         raise InputError(field, written, remedy)
@@ -248,9 +248,9 @@ def _bare(written: float, unit: str, field: str, example: str, *, allow_infinite
     return value
 
 
-def _toml(value: object) -> object:
-    """Show a value as the file has it."""
-    return str(value).lower() if isinstance(value, bool) else value
+def as_toml(value: object) -> object:
+    """A value as a sentence shows it: a boolean as the file has it, without quotes."""
+    return Shown(str(value).lower()) if isinstance(value, bool) else value
 
 
 def _normal(unit: str) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from flipflow.errors import InputError
 from flipflow.io.layout import Entry, each_of, entry_of
-from flipflow.io.units import parse_quantity, shown
+from flipflow.io.units import as_toml, parse_quantity, shown
 from flipflow.model.fields import FIELD, Field
 
 Table = Mapping[str, object]
@@ -189,10 +189,9 @@ def _two_ends(written: object, of: Field) -> str:
 def _counted(written: object, of: Field, name: str) -> object:
     """Refuse text where pieces are counted; a ratio may be text, "20 %"."""
     if of.whole and (isinstance(written, bool) or not isinstance(written, (int, float))):
-        literal = str(written).lower() if isinstance(written, bool) else written
-        raise InputError(
-            name, literal, f"write a whole number without quotes, for example {of.example}"
-        )
+        quotes = " without quotes" if isinstance(written, str) else ""
+        remedy = f"write a whole number{quotes}, for example {of.example}"
+        raise InputError(name, as_toml(written), remedy)
     return written
 
 
