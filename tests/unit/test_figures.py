@@ -265,6 +265,11 @@ def test_rows_of_the_legend_are_as_high_as_they_are_laid_out(assessment):
     assert legend["tracegroupgap"] == 0
 
 
+def test_thousands_are_not_set_apart_in_a_page(assessment):
+    """plotly.js set them apart in numbers with decimals alone: "3,040.5" beside "3041"."""
+    assert described(cases_figure(assessment))["layout"]["separators"] == "."
+
+
 def test_start_and_coast_down_stand_side_by_side(rig):
     runs = rig.transients.start, rig.transients.coast_down
     figure = run_ups_figure(runs)

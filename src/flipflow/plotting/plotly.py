@@ -155,6 +155,8 @@ def _frame(figure: PanelGrid) -> Json:
         "legend": {"orientation": "h", "x": 0, "y": 1, "yanchor": "top", "xanchor": "left",
                    "bgcolor": "rgba(255,255,255,0)", "itemsizing": "trace",
                    "tracegroupgap": 0},
+        # A point and nothing between thousands: plotly.js writes "3,040.5" beside "3041" else.
+        "separators": ".",
         "shapes": [], "annotations": [],
     }  # fmt: skip
 
