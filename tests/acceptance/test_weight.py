@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -78,3 +79,17 @@ def test_contact_closed_at_rest() -> None:
     assert screen.stop().gaps[0] < 0.0
     branch = ff.frequency_response(screen, (20.0, 120.0))
     assert branch.complete, branch.status
+
+
+def test_a_stop_that_pulls_is_no_touch_of_the_other() -> None:
+    """The damper of one stop pulls before it lets go; the other one is never touched."""
+    screen = ff.load("ffs0827").replace(clearance_minus=9e-3, stop_damping=30e3)
+    project = dataclasses.replace(
+        ff.load_project("ffs0827"), screen=screen, load_cases=(ff.Load(),), speed=85.0
+    )
+    (case,) = ff.assess(project).cases
+    assert case.orbit is not None
+    assert {one.side for one in case.orbit.contact_intervals} == {1}
+    assert case.orbit.stop_force().min() < -1e3
+    assert case.gaps.force_minus == 0.0
+    close("other side", case.gaps.force_plus, case.orbit.stop_force_peak(), rel=1e-12)

@@ -90,8 +90,11 @@ def _forces(screen: FlipFlowScreen, orbit: Orbit) -> tuple[float, float]:
     if not screen.has_stop:
         return 0.0, 0.0
     t, _ = orbit.motion.samples(SAMPLES)
-    force = orbit.stop_force(0, t)
-    sides = np.array([force.max(), -force.min()]).clip(0.0)
+    force = np.abs(orbit.stop_force(0, t))
+    # The sign tells no side: a damper that engages at once pulls before its stop lets go.
+    plus, minus = screen.stop().gaps
+    beyond = orbit.displacement("relative", t) > 0.5 * (plus - minus)
+    sides = np.array([force.max(initial=0.0, where=one) for one in (beyond, ~beyond)])
     # The greater is known to the last digit.
     sides[sides.argmax()] = orbit.stop_force_peak()
     return float(sides[0]), float(sides[1])
