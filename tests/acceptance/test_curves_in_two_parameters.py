@@ -444,3 +444,20 @@ def test_a_fold_that_runs_into_its_grazing_ends_there() -> None:
     for gap, folds in ((0.99 * ends, 2), (1.01 * ends, 0)):
         beside = ff.frequency_response(screen.replace(clearance=gap), (20.0, 300.0)).folds
         assert sum(abs(fold.omega - speed) < 0.5 for fold in beside) == folds, gap
+
+
+def test_no_turn_where_a_parameter_has_no_part() -> None:
+    """A stop that is not touched moves no fold, whose speed then stands still but for rounding."""
+    first = ff.ClearanceSpring([1.0, 0.0], 100.0, 1.0, 1.0, np.inf)
+    other = ff.ClearanceSpring([1.0, 0.0], 100.0, 1.0, np.inf, 1.6)
+    machine = ff.MechanicalSystem(
+        np.eye(2), 0.03 * K, K, (first, other), ff.HarmonicForce([0.0, 0.1])
+    )
+    fold = min(ff.frequency_response(machine, (0.5, 0.8)).folds, key=lambda one: one.omega)
+    gap = "springs[1].clearance_minus"
+    curve = ff.continue_bifurcation(fold, (gap, "omega"), ((0.7, 4.0), (0.4, 0.9)))
+    touched = curve.along(gap) < 1.0 + 1e-6
+    assert touched.any()
+    close("speed", np.ptp(curve.omega[~touched]), 0.0, abs=1e-12)
+    turns = [one.values[0] for one in curve.points_of("turning point")]
+    assert all(value < 1.0 + 1e-6 for value in turns), turns

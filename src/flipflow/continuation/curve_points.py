@@ -47,6 +47,7 @@ RESONANCES = {"1:1 resonance": 2.0, "1:2 resonance": -2.0, "1:3 resonance": -1.0
               "1:4 resonance": 0.0}  # fmt: skip
 JUMP = 1e-3  # a test above this share of its values at the ends has jumped there
 NOISE = 1e-8  # share of a parameter by which it changes in a step, below which it stands still
+SAME = 1e-12  # share of a parameter within which two of its values are one
 EVEN = 1e-9  # depth, as a share of the motion, below which another gap is grazed, too
 PARALLEL = 1e-3  # share of the largest tangent in a parameter below which the curve stands still
 
@@ -63,7 +64,12 @@ def curve_points(solver: FieldSolver, traced: Traced) -> tuple[list[Found], list
     ]
     found, notes = zeros_of(tests, solver, traced)
     by_kind = {(test.kind, test.spring, test.side): test for test in tests}
-    kept = [one for one in found if not _jumps(by_kind[one.kind, one.spring, one.side], one)]
+    kept = [
+        one
+        for one in found
+        if not _jumps(by_kind[one.kind, one.spring, one.side], one)
+        and (one.kind != TURNING or _turns_back(traced, one))
+    ]
     return _with_cusps(solver, traced, kept), notes
 
 
@@ -182,6 +188,21 @@ def _jumps(test: Test, found: Found) -> bool:
     if "Neimark-Sacker" in test.kind and not _has_pair(found.point):
         return True
     return abs(test.evaluate(found.point)) > JUMP * ends.max()
+
+
+def _turns_back(traced: Traced, found: Found) -> bool:
+    """Whether the parameter in which a curve turns lies on one side of its value there.
+
+    Where it stands still, or nearly so, its share in the tangent changes sign by rounding alone. A
+    point that is no further from the turn than rounding tells no side, and the one beyond it does.
+    """
+    point = cast("FieldPoint", found.point)
+    at, values = (point.beside, traced.u[:, -1]) if found.side == 1 else (point.value, traced.omega)
+    away = values - at
+    away[np.abs(away) <= SAME * abs(at)] = 0.0
+    before, after = away[: found.index + 1][-2:][::-1], away[found.index + 1 :][:2]
+    sides = [np.sign(part[part != 0.0][:1]).sum() for part in (before, after)]
+    return bool(sides[0] * sides[1] > 0.0)
 
 
 def _has_pair(point: Point) -> bool:
