@@ -265,7 +265,12 @@ def test_a_margin_that_is_used_up_has_no_sign(excess, said):
     (row,) = (
         row
         for block in constraints_of_proposal(
-            SimpleNamespace(prices={}, excess={"main_frame_acceleration": excess}, duty=DUTY)
+            SimpleNamespace(
+                prices={},
+                excess={"main_frame_acceleration": excess},
+                duty=DUTY,
+                assessment=None,
+            )
         )
         if isinstance(block, Table)
         for row in block.rows
