@@ -25,10 +25,10 @@ from flipflow.batch.slope_readings import (
 )
 from flipflow.batch.vector_slopes import vector_slopes
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
-from flipflow.compiled.eigen import eigenvector, real_schur
+from flipflow.compiled.eigen import Schur, eigenvector, real_schur
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import run_flow
 from flipflow.dynamics.parameter_tangent import Columns, carry_starts
@@ -61,21 +61,21 @@ def slope_lanes(
                 continue
             half = wanted.even and is_even(machine) and found.leaning[lane, f] == 0
             problem = problem_of(machine, half, length)
-            if not state_slopes(problem, columns, omega[f], work, found, out, lane, f):
-                continue
             z = found.state[lane, f]
+            if not state_slopes(problem, columns, omega[f], z, work, out.state[lane, f]):
+                continue
             torn = grazes(problem, work, omega[f], wanted, z, True)
             if wanted.multipliers and not grazes(problem, work, omega[f], wanted, z, False):
-                multiplier_slopes(problem, columns, omega[f], work, found, out, lane, f)
+                mu = found.multiplier[lane, f]
+                multiplier_slopes(problem, columns, omega[f], mu, work, out.multiplier[lane, f])
             if not torn:
                 read_slopes(problem, columns, omega[f], asked, wanted, work, out, lane, f)
 
 
 @kernel
 def state_slopes(
-    problem: Shooting, columns: Columns, omega: float, work: SlopeWork, found: Found, out: Slopes,
-    lane: int, f: int,
-) -> bool:  # fmt: skip
+    problem: Shooting, columns: Columns, omega: float, z: Real, work: SlopeWork, slopes: Real
+) -> bool:
     """Derivatives of the state at phase 0 and at the starts of the segments, and of their limits.
 
     The columns from zero and the tangent map are carried together; what the state itself brings is
@@ -84,7 +84,7 @@ def state_slopes(
     machine, own, flow = problem.machine, work.lane, work.lane.shooting.flow
     size, turn = work.T.shape[0], problem.fraction * 2.0 * math.pi / omega
     for k in range(size):
-        flow.z[k] = found.state[lane, f, k]
+        flow.z[k] = z[k]
     if run_flow(machine, flow, omega, 0.0, turn, own.shooting.rate) != status.OK:
         return False
     segments = flow.segments[0]
@@ -97,7 +97,12 @@ def state_slopes(
     if not lu_factor(own.A, own.pivot):
         return False
     for p in range(work.state.shape[1]):
-        solve_state(problem, work, segments, p, out.state[lane, f])
+        solve_state(
+            problem.sign, own.A, own.pivot, own.r, segments, p, work.starts, work.tangents,
+            work.state,
+        )  # fmt: skip
+        for k in range(size if p < slopes.shape[1] else 0):
+            slopes[k, p] = work.state[k, p]
     for e in range(segments):
         set_end(machine, columns, e, omega, work)
         set_shifts(machine, flow, e, omega, columns, work.ended, work.shift[e + 1], work.columns)
@@ -105,23 +110,24 @@ def state_slopes(
 
 
 @kernel
-def solve_state(problem: Shooting, work: SlopeWork, segments: int, p: int, state: Real) -> None:
-    """z_p = -(M - I)^-1 phi_p of one parameter, omega among them.
+def solve_state(
+    sign: float, A: Real, pivot: Int, r: Real, segments: int, p: int, starts: Real, tangents: Real,
+    state: Real,
+) -> None:  # fmt: skip
+    """z_p = -(M - I)^-1 phi_p of one parameter, omega among them, with M - I factored in A.
 
     It is added to the columns at the start of each segment.
     """
-    own, size, parameters = work.lane, work.T.shape[0], work.row.shape[0]
+    size = r.shape[0]
     for k in range(size):
-        own.r[k] = -problem.sign * work.starts[segments, k, p]
-    lu_solve(own.A, own.pivot, own.r)
+        r[k] = -sign * starts[segments, k, p]
+    lu_solve(A, pivot, r)
     for k in range(size):
-        work.state[k, p] = own.r[k]
-        if p < parameters:
-            state[k, p] = own.r[k]
+        state[k, p] = r[k]
     for e in range(segments + 1):
         for k in range(size):
             for s in range(size):
-                work.starts[e, k, p] += work.tangents[e, k, s] * own.r[s]
+                starts[e, k, p] += tangents[e, k, s] * r[s]
 
 
 @kernel
@@ -144,9 +150,8 @@ def grazes(
 
 @kernel
 def multiplier_slopes(
-    problem: Shooting, columns: Columns, omega: float, work: SlopeWork, found: Found, out: Slopes,
-    lane: int, f: int,
-) -> None:  # fmt: skip
+    problem: Shooting, columns: Columns, omega: float, mu: Complex, work: SlopeWork, slopes: Complex
+) -> None:
     """Derivatives of the multipliers of a whole turn: d mu = l dM r of left and right vectors."""
     schur, size, mirrored = work.lane.schur, work.T.shape[0], problem.sign < 0.0
     vary_map(problem.machine, columns, omega, work)
@@ -155,20 +160,20 @@ def multiplier_slopes(
             schur.T[i, j] = problem.sign * work.T[i, j]
     if not real_schur(schur, True):
         return
-    set_basis(work)
+    set_basis(schur, work.vectors, work.basis)
     if not lu_factor(work.basis, work.pivot):
         return
     k = 0
     while k < size:
         pair = schur.value[k].imag != 0.0
         for p in range(work.row.shape[0]):
-            slope = problem.sign * eigenvalue_slope(work, k, pair, p)
-            if mirrored:
-                slope *= 2.0 * schur.value[k]
-            set_multiplier(work, mirrored, k, slope, found, out, lane, f, p)
+            slope = eigenvalue_slope(
+                work.maps[p], work.vectors, work.basis, work.pivot, work.lane.r, k, pair
+            )
+            slope *= 2.0 * problem.sign * schur.value[k] if mirrored else problem.sign
+            set_multiplier(schur.value, mirrored, k, slope, mu, slopes[:, p])
             if pair:
-                slope = slope.conjugate()
-                set_multiplier(work, mirrored, k + 1, slope, found, out, lane, f, p)
+                set_multiplier(schur.value, mirrored, k + 1, slope.conjugate(), mu, slopes[:, p])
         k += 2 if pair else 1
 
 
@@ -187,38 +192,40 @@ def vary_map(machine: MachineArrays, columns: Columns, omega: float, work: Slope
 
 
 @kernel
-def set_basis(work: SlopeWork) -> None:
+def set_basis(schur: Schur, vectors: Real, basis: Real) -> None:
     """Eigenvectors of the map as columns, and once more to be factored."""
-    schur, size = work.lane.schur, work.T.shape[0]
+    size = vectors.shape[0]
     k = 0
     while k < size:
         eigenvector(schur, k)
         pair = schur.value[k].imag != 0.0
         for i in range(size):
-            work.vectors[i, k] = schur.scale[i] * schur.vector[i].real
+            vectors[i, k] = schur.scale[i] * schur.vector[i].real
             if pair:
-                work.vectors[i, k + 1] = schur.scale[i] * schur.vector[i].imag
+                vectors[i, k + 1] = schur.scale[i] * schur.vector[i].imag
         k += 2 if pair else 1
     for i in range(size):
         for j in range(size):
-            work.basis[i, j] = work.vectors[i, j]
+            basis[i, j] = vectors[i, j]
 
 
 @kernel
-def eigenvalue_slope(work: SlopeWork, k: int, pair: bool, p: int) -> complex:
-    """l dT r of eigenvalue k and parameter p, with the rows of the inverse basis as l."""
-    own, size, basis = work.lane, work.T.shape[0], work.basis
+def eigenvalue_slope(
+    change: Real, vectors: Real, basis: Real, pivot: Int, r: Real, k: int, pair: bool
+) -> complex:
+    """l dT r of eigenvalue k and one parameter's dT, with the rows of the inverse basis as l."""
+    size = r.shape[0]
     entries = (0.0, 0.0, 0.0, 0.0)
     for c in range(2 if pair else 1):
         for i in range(size):
-            own.r[i] = 0.0
+            r[i] = 0.0
             for j in range(size):
-                own.r[i] += work.maps[p, i, j] * work.vectors[j, k + c]
-        lu_solve(basis, work.pivot, own.r)
+                r[i] += change[i, j] * vectors[j, k + c]
+        lu_solve(basis, pivot, r)
         if c == 0:
-            entries = (own.r[k], own.r[k + 1] if pair else 0.0, 0.0, 0.0)
+            entries = (r[k], r[k + 1] if pair else 0.0, 0.0, 0.0)
         else:
-            entries = (entries[0], entries[1], own.r[k], own.r[k + 1])
+            entries = (entries[0], entries[1], r[k], r[k + 1])
     if not pair:
         return complex(entries[0], 0.0)
     return complex(0.5 * (entries[0] + entries[3]), 0.5 * (entries[2] - entries[1]))
@@ -226,11 +233,10 @@ def eigenvalue_slope(work: SlopeWork, k: int, pair: bool, p: int) -> complex:
 
 @kernel
 def set_multiplier(
-    work: SlopeWork, squared: bool, k: int, slope: complex, found: Found, out: Slopes, lane: int,
-    f: int, p: int,
-) -> None:  # fmt: skip
+    value: Complex, squared: bool, k: int, slope: complex, known: Complex, slopes: Complex
+) -> None:
     """Write the derivative of eigenvalue k where that multiplier stands; none of a double one."""
-    value, size = work.lane.schur.value, work.T.shape[0]
+    size = value.shape[0]
     largest, nearest = 0.0, math.inf
     for i in range(size):
         largest = max(largest, abs(value[i]))
@@ -241,10 +247,10 @@ def set_multiplier(
     mu = value[k] * value[k] if squared else value[k]
     place, off = 0, math.inf
     for i in range(size):
-        away = abs(found.multiplier[lane, f, i] - mu)
+        away = abs(known[i] - mu)
         if away < off:
             place, off = i, away
-    out.multiplier[lane, f, place, p] = slope
+    slopes[place] = slope
 
 
 @kernel
@@ -253,15 +259,18 @@ def read_slopes(
     work: SlopeWork, out: Slopes, lane: int, f: int,
 ) -> None:  # fmt: skip
     """Derivatives of all readings of the motion whose flow is recorded."""
-    machine, flow = problem.machine, work.lane.shooting.flow
+    machine = problem.machine
     turn = problem.fraction * 2.0 * math.pi / omega
     for g in range(asked.coordinate.shape[0]):
-        coordinate_slopes(problem, columns, omega, asked.coordinate, g, work, out, lane, f)
+        upper, lower = out.high[lane, f, g], out.low[lane, f, g]
+        coordinate_slopes(problem, columns, omega, asked.coordinate, g, work, upper, lower)
     for j in range(machine.direction.shape[0]):
         force_slopes(machine, columns, omega, j, work, out.force[lane, f, j])
-    contact_slopes(machine, columns, omega, turn, work, out, lane, f)
+    share, approach = out.share[lane, f], out.approach[lane, f]
+    contact_slopes(machine, columns, omega, turn, work, share, approach)
     if wanted.means:
-        mean_slopes(machine, flow, columns, omega, turn, asked, work, out, lane, f)
+        first, square = out.first[lane, f], out.square[lane, f]
+        mean_slopes(machine, columns, omega, turn, asked, work, first, square)
     which = lane if asked.linear.shape[0] > 1 else 0
     for q in range(asked.linear.shape[1]):
         vector_slopes(

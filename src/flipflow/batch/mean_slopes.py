@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flipflow.batch.lane_readings import Asked
-from flipflow.batch.slope_readings import AT_END, Slopes, SlopeWork, move_to
+from flipflow.batch.slope_readings import AT_END, Place, SlopeWork, move_to
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import exponential
@@ -18,11 +18,11 @@ MOST_HALVES = 60  # of the first of them, towards the start
 
 @kernel
 def mean_slopes(
-    machine: MachineArrays, flow: Flow, columns: Columns, omega: float, turn: float, asked: Asked,
-    work: SlopeWork, out: Slopes, lane: int, f: int,
+    machine: MachineArrays, columns: Columns, omega: float, turn: float, asked: Asked,
+    work: SlopeWork, first: Complex, square: Real,
 ) -> None:  # fmt: skip
     """Derivatives of first harmonics and of mean squares of rates, part by part."""
-    first, square = out.first[lane, f], out.square[lane, f]
+    flow = work.lane.shooting.flow
     for p in range(work.row.shape[0]):
         for g in range(first.shape[0]):
             first[g, p] = 0j
@@ -69,23 +69,23 @@ def add_part(
         move_to(machine, columns, e, omega, t, work)
         weight = (end - begin) * work.weight[node] / turn
         turned = 2.0 * weight * exponential(-1j * (omega * (flow.start[e] + t)))
-        add_means(asked, turned, 2.0 * weight, work, first, square)
+        add_means(asked, turned, 2.0 * weight, work.place, first, square)
 
 
 @kernel
 def add_means(
-    asked: Asked, turned: complex, weight: float, work: SlopeWork, first: Complex, square: Real
+    asked: Asked, turned: complex, weight: float, place: Place, first: Complex, square: Real
 ) -> None:
     """What one node adds to the derivatives of harmonics and mean squares."""
-    n, parameters = work.z.shape[0] // 2, work.U.shape[1]
+    n, parameters = place.z.shape[0] // 2, place.U.shape[1]
     for g in range(first.shape[0]):
         for p in range(parameters):
             for k in range(n):
-                first[g, p] += turned * (asked.coordinate[g, k] * work.U[k, p])
+                first[g, p] += turned * (asked.coordinate[g, k] * place.U[k, p])
     for g in range(square.shape[0]):
         rate = 0.0
         for k in range(n):
-            rate += asked.squared[g, k] * work.z[n + k]
+            rate += asked.squared[g, k] * place.z[n + k]
         for p in range(parameters):
             for k in range(n):
-                square[g, p] += weight * rate * asked.squared[g, k] * work.U[n + k, p]
+                square[g, p] += weight * rate * asked.squared[g, k] * place.U[n + k, p]

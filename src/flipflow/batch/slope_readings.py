@@ -74,12 +74,32 @@ class Slopes(NamedTuple):
     multiplier: Complex  # (L, F, 2 N, P) in the order of those found
 
 
+class Place(NamedTuple):
+    """A place of the motion that is read."""
+
+    U: Real  # (2 N, P) derivatives of the state
+    acceleration: Real  # (N, P) and of the accelerations
+    z: Real  # (2 N,) state
+    rate: Real  # (2 N,) and its rate
+
+
+class Summits(NamedTuple):
+    """The greatest value in each part of a turn."""
+
+    height: Real  # (2 E,)
+    when: Real  # (2 E,) since the start of the segment
+    at_end: Int  # (2 E,) 1 where it stands at an end of the part
+    side: Real  # (2 E,) +1 or -1 times the coordinate
+
+
 class SlopeWork(NamedTuple):
     """Scratch of one thread for flows of up to E segments."""
 
     lane: LaneWork
     reading: ReadingWork
     columns: ColumnWork
+    place: Place
+    summits: Summits
     state: Real  # (2 N, P + 1) on its way over the turn, the last column that of omega
     ended: Real  # (2 N, P + 1) at the end of a segment, before a change of contact there
     starts: Real  # (E + 1, 2 N, P + 1) at the starts of the segments, and at the end of the flow
@@ -87,14 +107,6 @@ class SlopeWork(NamedTuple):
     shift: Real  # (E + 1, P + 1) of their limits
     T: Real  # (2 N, 2 N) tangent map
     maps: Real  # (P + 1, 2 N, 2 N) its derivatives, or (0, ...) where none are asked for
-    U: Real  # (2 N, P) at the place that is read
-    acceleration: Real  # (N, P) there
-    z: Real  # (2 N,) state there
-    rate: Real  # (2 N,) and its rate
-    height: Real  # (2 E,) summits of the parts of a turn
-    when: Real  # (2 E,) since the start of the segment
-    at_end: Int  # (2 E,) 1 where it stands at an end of the part
-    side: Real  # (2 E,) +1 or -1 times the coordinate
     row: Real  # (P,)
     node: Real  # (K,) of Gauss' rule on (0, 1)
     weight: Real  # (K,)
@@ -115,6 +127,18 @@ def new_slope_work(
         lane=lane,
         reading=new_reading_work(lane.shooting.flow, machine, asked),
         columns=new_column_work(machine, parameters),
+        place=Place(
+            U=np.zeros((size, parameters)),
+            acceleration=np.zeros((n, parameters)),
+            z=np.zeros(size),
+            rate=np.zeros(size),
+        ),
+        summits=Summits(
+            height=np.zeros(2 * segments),
+            when=np.zeros(2 * segments),
+            at_end=np.zeros(2 * segments, np.int64),
+            side=np.zeros(2 * segments),
+        ),
         state=np.zeros((size, parameters + 1)),
         ended=np.zeros((size, parameters + 1)),
         starts=np.zeros((segments + 1, size, parameters + 1)),
@@ -122,14 +146,6 @@ def new_slope_work(
         shift=np.zeros((segments + 1, parameters + 1)),
         T=np.zeros((size, size)),
         maps=np.zeros((parameters + 1 if maps else 0, size, size)),
-        U=np.zeros((size, parameters)),
-        acceleration=np.zeros((n, parameters)),
-        z=np.zeros(size),
-        rate=np.zeros(size),
-        height=np.zeros(2 * segments),
-        when=np.zeros(2 * segments),
-        at_end=np.zeros(2 * segments, np.int64),
-        side=np.zeros(2 * segments),
         row=np.zeros(parameters),
         node=0.5 * (node + 1.0),
         weight=0.5 * weight,
@@ -170,22 +186,21 @@ def move_to(
     machine: MachineArrays, columns: Columns, e: int, omega: float, t: float, work: SlopeWork
 ) -> None:
     """State, rate and derivatives of the state at a time since the start of segment e."""
-    flow = work.lane.shooting.flow
-    for k in range(work.U.shape[0]):
-        for p in range(work.U.shape[1]):
-            work.U[k, p] = work.starts[e, k, p]
-    advance_columns(machine, flow, e, omega, columns, t, work.U, work.columns)
-    segment_state(machine, flow, e, omega, t, work.z, work.rate)
+    flow, place = work.lane.shooting.flow, work.place
+    for k in range(place.U.shape[0]):
+        for p in range(place.U.shape[1]):
+            place.U[k, p] = work.starts[e, k, p]
+    advance_columns(machine, flow, e, omega, columns, t, place.U, work.columns)
+    segment_state(machine, flow, e, omega, t, place.z, place.rate)
 
 
 @kernel
 def coordinate_slopes(
     problem: Shooting, columns: Columns, omega: float, coordinate: Real, g: int, work: SlopeWork,
-    out: Slopes, lane: int, f: int,
+    upper: Real, lower: Real,
 ) -> None:  # fmt: skip
     """Derivatives of the extremes of one coordinate; its mirror image is as high and as low."""
     machine, mirrored = problem.machine, problem.sign < 0.0
-    upper, lower = out.high[lane, f, g], out.low[lane, f, g]
     set_extremes(machine, columns, omega, coordinate, g, True, mirrored, work, upper)
     if not mirrored:
         set_extremes(machine, columns, omega, coordinate, g, False, True, work, lower)
@@ -202,58 +217,58 @@ def set_extremes(
 
     A flow of one segment is looked at in halves, in each of which a summit may be as high.
     """
-    flow, motion = work.lane.shooting.flow, work.reading.coordinate
-    segments = flow.segments[0]
-    parts = 2 if segments == 1 else 1
-    for place in range(parts * segments):
-        e = place // parts
-        begin, duration = (place % parts) * flow.length[e] / parts, flow.length[e] / parts
+    flow, motion, summits = work.lane.shooting.flow, work.reading.coordinate, work.summits
+    parts = 2 if flow.segments[0] == 1 else 1
+    places = parts * flow.segments[0]
+    for part in range(places):
+        e = part // parts
+        begin, duration = (part % parts) * flow.length[e] / parts, flow.length[e] / parts
         count = segment_motion(machine, flow, e, omega, coordinate, motion)
         delay(motion, count, g, begin)
         prepare_search(motion, count)
         least, most, at_least, at_most = extremes(motion, count, g, duration)
         low = lower and (not upper or -least > most)
-        work.side[place] = -1.0 if low else 1.0
+        summits.side[part] = -1.0 if low else 1.0
         at = at_least if low else at_most
-        note_summit(work, place, -least if low else most, at, begin, duration)
+        note_summit(summits, part, -least if low else most, at, begin, duration)
     first = True
-    for place in range(parts * segments):
-        if not is_summit(work, place, parts * segments):
+    for part in range(places):
+        if not is_summit(summits, part, places):
             continue
-        move_to(machine, columns, place // parts, omega, work.when[place], work)
+        move_to(machine, columns, part // parts, omega, summits.when[part], work)
         for p in range(row.shape[0]):
             work.row[p] = 0.0
             for k in range(machine.direction.shape[1]):
-                work.row[p] += work.side[place] * coordinate[g, k] * work.U[k, p]
+                work.row[p] += summits.side[part] * coordinate[g, k] * work.place.U[k, p]
         keep(row, first, work.row)
         first = False
 
 
 @kernel
 def note_summit(
-    work: SlopeWork, place: int, height: float, at: float, begin: float, duration: float
+    summits: Summits, part: int, height: float, at: float, begin: float, duration: float
 ) -> None:
     """Write down the highest value in a part of the flow, and whether it stands at an end of it."""
-    work.height[place], work.when[place] = height, begin + at
+    summits.height[part], summits.when[part] = height, begin + at
     at_end = at <= 0.0 or at >= duration * (1.0 - AT_END)
-    work.at_end[place] = 1 if at_end else 0
+    summits.at_end[part] = 1 if at_end else 0
 
 
 @kernel
-def is_summit(work: SlopeWork, place: int, places: int) -> bool:
+def is_summit(summits: Summits, part: int, parts: int) -> bool:
     """Whether a part's highest value is that of the flow, or as high.
 
     An end of a part that hardly reaches it belongs to the summit beside, unless that is an end,
     too.
     """
     best = 0
-    for other in range(places):
-        if work.height[other] > work.height[best]:
+    for other in range(parts):
+        if summits.height[other] > summits.height[best]:
             best = other
-    top = work.height[best]
-    if work.height[place] < top - TIED * abs(top):
+    top = summits.height[best]
+    if summits.height[part] < top - TIED * abs(top):
         return False
-    return place == best or work.at_end[place] == 0 or work.at_end[best] != 0
+    return part == best or summits.at_end[part] == 0 or summits.at_end[best] != 0
 
 
 @kernel
@@ -279,20 +294,21 @@ def force_slopes(
     machine: MachineArrays, columns: Columns, omega: float, j: int, work: SlopeWork, row: Real
 ) -> None:
     """Derivatives of the greatest force of stop j; 0 without contact."""
-    flow, motion, touched = work.lane.shooting.flow, work.reading.stop, False
+    flow, motion, summits = work.lane.shooting.flow, work.reading.stop, work.summits
+    touched = False
     for e in range(flow.segments[0]):
-        note_summit(work, e, 0.0, 0.5 * flow.length[e], 0.0, flow.length[e])
+        note_summit(summits, e, 0.0, 0.5 * flow.length[e], 0.0, flow.length[e])
         if kind(machine.stops, j, flow.regimes[e, j]) != 0:
             count = segment_motion(machine, flow, e, omega, machine.direction, motion)
             height, at = force_peak(machine, flow, motion, count, e, j)
-            note_summit(work, e, height, at, 0.0, flow.length[e])
+            note_summit(summits, e, height, at, 0.0, flow.length[e])
             touched = touched or height > 0.0
     first = True
     for p in range(row.shape[0]):
         row[p] = 0.0
     for e in range(flow.segments[0]):
-        if touched and is_summit(work, e, flow.segments[0]):
-            set_force(machine, columns, e, omega, j, work.when[e], work)
+        if touched and is_summit(summits, e, flow.segments[0]):
+            set_force(machine, columns, e, omega, j, summits.when[e], work)
             keep(row, first, work.row)
             first = False
 
@@ -304,27 +320,28 @@ def set_force(
 ) -> None:  # fmt: skip
     """Derivatives of the size of the force of stop j at a time of segment e into work.row."""
     flow, stops, n = work.lane.shooting.flow, machine.stops, machine.direction.shape[1]
+    place = work.place
     move_to(machine, columns, e, omega, t, work)
-    force, rate = stop_force(machine, flow, e, j, work.z), 0.0
+    force, rate = stop_force(machine, flow, e, j, place.z), 0.0
     regime = flow.regimes[e, j]
     k = stiffness_share(stops, j, regime) * stops.stiffness[j]
     c = damping_share(stops, j, regime) * stops.damping[j]
     for s in range(n):
-        rate += machine.direction[j, s] * (k * work.rate[s] + c * work.rate[n + s])
+        rate += machine.direction[j, s] * (k * place.rate[s] + c * place.rate[n + s])
     sign = -1.0 if force < 0.0 else 1.0
     for p in range(work.row.shape[0]):
-        slope = force_slope(machine, flow, columns, e, j, p, work)
+        slope = force_slope(machine, flow, columns, e, j, p, place.z)
         for s in range(n):
-            slope += machine.direction[j, s] * (k * work.U[s, p] + c * work.U[n + s, p])
-        work.row[p] = sign * (slope + rate * shifted(flow, work, e, t, p))
+            slope += machine.direction[j, s] * (k * place.U[s, p] + c * place.U[n + s, p])
+        work.row[p] = sign * (slope + rate * shifted(flow, work.shift, e, t, p))
 
 
 @kernel
-def shifted(flow: Flow, work: SlopeWork, e: int, t: float, p: int) -> float:
+def shifted(flow: Flow, shift: Real, e: int, t: float, p: int) -> float:
     """How the time of a summit moves that stands at a limit of segment e; 0 within it."""
     if t <= 0.0:
-        return float(work.shift[e, p])
-    return float(work.shift[e + 1, p]) if t >= flow.length[e] * (1.0 - AT_END) else 0.0
+        return float(shift[e, p])
+    return float(shift[e + 1, p]) if t >= flow.length[e] * (1.0 - AT_END) else 0.0
 
 
 @kernel
@@ -341,9 +358,9 @@ def stop_force(machine: MachineArrays, flow: Flow, e: int, j: int, z: Real) -> f
 
 @kernel
 def force_slope(
-    machine: MachineArrays, flow: Flow, columns: Columns, e: int, j: int, p: int, work: SlopeWork
+    machine: MachineArrays, flow: Flow, columns: Columns, e: int, j: int, p: int, z: Real
 ) -> float:
-    """Derivative of the force of stop j in segment e at the fixed state in work.z."""
+    """Derivative of the force of stop j in segment e at a fixed state."""
     stops, regime, n = machine.stops, flow.regimes[e, j], machine.direction.shape[1]
     f_k, f_c = stiffness_share(stops, j, regime), damping_share(stops, j, regime)
     if columns.touches[p, 5] == 0 or (f_k == 0.0 and f_c == 0.0):
@@ -351,10 +368,10 @@ def force_slope(
     depth, rate = -signed_gap(stops, j, regime), 0.0
     turned, turned_rate = -gap_slope(columns, j, regime, p), 0.0
     for s in range(n):
-        depth += machine.direction[j, s] * work.z[s]
-        rate += machine.direction[j, s] * work.z[n + s]
-        turned += columns.direction[p, j, s] * work.z[s]
-        turned_rate += columns.direction[p, j, s] * work.z[n + s]
+        depth += machine.direction[j, s] * z[s]
+        rate += machine.direction[j, s] * z[n + s]
+        turned += columns.direction[p, j, s] * z[s]
+        turned_rate += columns.direction[p, j, s] * z[n + s]
     spring = columns.stop_stiffness[p, j] * depth + stops.stiffness[j] * turned
     damper = columns.stop_damping[p, j] * rate + stops.damping[j] * turned_rate
     return float(f_k * spring + f_c * damper)
@@ -363,28 +380,28 @@ def force_slope(
 @kernel
 def contact_slopes(
     machine: MachineArrays, columns: Columns, omega: float, turn: float, work: SlopeWork,
-    out: Slopes, lane: int, f: int,
+    share: Real, row: Real,
 ) -> None:  # fmt: skip
-    """Derivatives of shares of contact, and of the greatest speed at which one begins."""
-    flow, share = work.lane.shooting.flow, out.share[lane, f]
-    row, fastest, first = out.approach[lane, f], 0.0, True
+    """Derivatives of shares of contact (m, P), and of the greatest speed at which one begins."""
+    flow, place, height = work.lane.shooting.flow, work.place, work.summits.height
+    fastest, first = 0.0, True
     for p in range(row.shape[0]):
         row[p] = 0.0
         for j in range(share.shape[0]):
             share[j, p] = 0.0
     for e in range(flow.segments[0]):
-        work.height[e] = 0.0
+        height[e] = 0.0
         for j in range(share.shape[0]):
             if kind(machine.stops, j, flow.regimes[e, j]) != 0:
                 for p in range(row.shape[0]):
                     share[j, p] += (work.shift[e + 1, p] - work.shift[e, p]) / turn
         spring = flow.spring[e]
         if spring >= 0 and flow.regimes[e, spring] == 0:
-            end_segment(machine, flow, e, omega, work.z, work.rate)
-            work.height[e] = abs(speed_at(machine, spring, work.z))
-        fastest = max(fastest, work.height[e])
+            end_segment(machine, flow, e, omega, place.z, place.rate)
+            height[e] = abs(speed_at(machine, spring, place.z))
+        fastest = max(fastest, height[e])
     for e in range(flow.segments[0]):
-        if fastest > 0.0 and work.height[e] >= fastest * (1.0 - TIED):
+        if fastest > 0.0 and height[e] >= fastest * (1.0 - TIED):
             set_approach(machine, columns, e, omega, work)
             keep(row, first, work.row)
             first = False

@@ -6,6 +6,7 @@ import math
 
 from flipflow.batch.lane_readings import set_vector
 from flipflow.batch.slope_readings import (
+    Place,
     SlopeWork,
     delay,
     force_slope,
@@ -33,25 +34,25 @@ def vector_slopes(
     work: SlopeWork, row: Real,
 ) -> None:  # fmt: skip
     """Derivatives of the greatest length of a vector; a flow of one segment in halves."""
-    flow, motion, longer = work.lane.shooting.flow, work.reading.vector, False
-    segments = flow.segments[0]
-    parts = 2 if segments == 1 else 1
-    for place in range(parts * segments):
-        e = place // parts
-        begin, duration = (place % parts) * flow.length[e] / parts, flow.length[e] / parts
+    flow, motion, summits = work.lane.shooting.flow, work.reading.vector, work.summits
+    parts, longer = 2 if flow.segments[0] == 1 else 1, False
+    places = parts * flow.segments[0]
+    for part in range(places):
+        e = part // parts
+        begin, duration = (part % parts) * flow.length[e] / parts, flow.length[e] / parts
         count = set_vector(machine, flow, motion, e, omega, linear, along, across)
         delay(motion, count, 0, begin)
         delay(motion, count, 1, begin)
         height, at = longest(motion, count, duration)
-        note_summit(work, place, height, at, begin, duration)
+        note_summit(summits, part, height, at, begin, duration)
         longer = longer or height > 0.0
     first = True
     for p in range(row.shape[0]):
         row[p] = 0.0
-    for place in range(parts * segments):
-        if not (longer and is_summit(work, place, parts * segments)):
+    for part in range(places):
+        if not (longer and is_summit(summits, part, places)):
             continue
-        e, t = place // parts, work.when[place]
+        e, t = part // parts, summits.when[part]
         set_length(
             machine, columns, e, omega, t, linear, along, across, linear_slope, along_slope,
             across_slope, work,
@@ -68,7 +69,7 @@ def set_length(
 ) -> None:  # fmt: skip
     """Derivatives of a vector's length at a time of segment e into work.row."""
     flow, n = work.lane.shooting.flow, machine.direction.shape[1]
-    motion = work.reading.vector
+    motion, place = work.reading.vector, work.place
     count = set_vector(machine, flow, motion, e, omega, linear, along, across)
     half_square, rate = length_at(motion, count, t)
     length = math.sqrt(2.0 * half_square)
@@ -78,45 +79,46 @@ def set_length(
         one += (motion.amplitude[0, i] * grown).real
         two += (motion.amplitude[1, i] * grown).real
     move_to(machine, columns, e, omega, t, work)
-    set_accelerations(machine, columns, e, omega, flow.start[e] + t, work)
+    set_accelerations(machine, flow, columns, e, omega, flow.start[e] + t, place)
     turned = exponential(1j * (omega * (flow.start[e] + t)))
     for p in range(work.row.shape[0]):
         slope = one * (along_slope[p] * turned).real + two * (across_slope[p] * turned).real
         for k in range(n):
-            part = linear[0, k] * work.U[k, p] + linear[1, k] * work.U[n + k, p]
-            part += linear[2, k] * work.acceleration[k, p]
-            part += linear_slope[0, k, p] * work.z[k] + linear_slope[1, k, p] * work.z[n + k]
-            part += linear_slope[2, k, p] * work.rate[n + k]
+            part = linear[0, k] * place.U[k, p] + linear[1, k] * place.U[n + k, p]
+            part += linear[2, k] * place.acceleration[k, p]
+            part += linear_slope[0, k, p] * place.z[k] + linear_slope[1, k, p] * place.z[n + k]
+            part += linear_slope[2, k, p] * place.rate[n + k]
             slope += one * part
-        work.row[p] = (slope + rate * shifted(flow, work, e, t, p)) / length
+        work.row[p] = (slope + rate * shifted(flow, work.shift, e, t, p)) / length
 
 
 @kernel
 def set_accelerations(
-    machine: MachineArrays, columns: Columns, e: int, omega: float, t: float, work: SlopeWork
-) -> None:
+    machine: MachineArrays, flow: Flow, columns: Columns, e: int, omega: float, t: float,
+    place: Place,
+) -> None:  # fmt: skip
     """Derivatives of the accelerations, by the equation of motion, at the place that is read."""
-    flow, n, U = work.lane.shooting.flow, machine.direction.shape[1], work.U
+    n, U = machine.direction.shape[1], place.U
     for p in range(U.shape[1]):
         for k in range(n):
             total = columns.static[p, k]
             for s in range(n):
                 total -= machine.stiffness[k, s] * U[s, p] + machine.damping[k, s] * U[n + s, p]
-                total -= columns.stiffness[p, k, s] * work.z[s]
-                total -= columns.damping[p, k, s] * work.z[n + s]
-                total -= columns.inertia[p, k, s] * work.rate[n + s]
+                total -= columns.stiffness[p, k, s] * place.z[s]
+                total -= columns.damping[p, k, s] * place.z[n + s]
+                total -= columns.inertia[p, k, s] * place.rate[n + s]
             for x in range(machine.power.shape[0]):
                 turning = 1j * (machine.order[machine.wave[x]] * omega * t)
                 push = omega ** machine.power[x] * columns.push[p, x, k]
                 total += (push * exponential(turning)).real
-            work.acceleration[k, p] = total
+            place.acceleration[k, p] = total
         for j in range(machine.direction.shape[0]):
-            add_stop(machine, flow, columns, e, j, p, work)
+            add_stop(machine, flow, columns, e, j, p, place)
 
 
 @kernel
 def add_stop(
-    machine: MachineArrays, flow: Flow, columns: Columns, e: int, j: int, p: int, work: SlopeWork
+    machine: MachineArrays, flow: Flow, columns: Columns, e: int, j: int, p: int, place: Place
 ) -> None:
     """What stop j adds to the derivatives of the accelerations."""
     stops, regime, n = machine.stops, flow.regimes[e, j], machine.direction.shape[1]
@@ -124,9 +126,9 @@ def add_stop(
         return
     k = stiffness_share(stops, j, regime) * stops.stiffness[j]
     c = damping_share(stops, j, regime) * stops.damping[j]
-    slope = force_slope(machine, flow, columns, e, j, p, work)
+    slope = force_slope(machine, flow, columns, e, j, p, place.z)
     for s in range(n):
-        slope += machine.direction[j, s] * (k * work.U[s, p] + c * work.U[n + s, p])
-    force = stop_force(machine, flow, e, j, work.z)
+        slope += machine.direction[j, s] * (k * place.U[s, p] + c * place.U[n + s, p])
+    force = stop_force(machine, flow, e, j, place.z)
     for s in range(n):
-        work.acceleration[s, p] -= machine.reach[j, s] * slope + columns.reach[p, j, s] * force
+        place.acceleration[s, p] -= machine.reach[j, s] * slope + columns.reach[p, j, s] * force
