@@ -1,19 +1,22 @@
 """Many machines in one call: solutions a second, with what bounds them.
 
-    python benchmarks/lanes.py [--machines 2000] [--speeds 100] [--threads 2] [--seed N]
+    python benchmarks/lanes.py [--machines 2000] [--speeds 100] [--threads 2] [--seed N] [--peers]
 
 Counted are lanes with contact only; each has its multipliers and its last Newton step, amplitude,
 stop force and share of contact. Beside them in the same run: derivatives of states and readings,
 and of multipliers, with respect to ten parameters; a loop of the package's own single solutions;
-and scipy's event-located integration with Newton around it.
+scipy's event-located integration of some turns; and, with ``--peers``, responses at H = 3 by
+pyHarm-os in its environment of ``peers/setup.sh``.
 """
 
 import argparse
 import statistics
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy_flow import carried
+from speed import HERE, peer_run
 
 import flipflow as ff
 from flipflow.batch.lane_columns import lane_columns
@@ -75,12 +78,38 @@ def derivative_ratios(batch, machine, columns, omega):
     return 1.0 + slopes / alone, 1.0 + maps / alone
 
 
+def one_by_one(machine, columns, peers):
+    """The same by loops, as a second of processor; pyHarm-os where there is a folder of it."""
+    few = 20
+    ff.periodic_orbits(machine, omega=120.0)  # compiled beforehand
+    ff.frequency_response(machine, omega=(5.0, 250.0))
+    clock = time.process_time()
+    for row in range(few):
+        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
+        ff.periodic_orbits(alone, omega=120.0)
+    print(f"periodic_orbits, one by one {few / (time.process_time() - clock):20,.1f}")
+    clock = time.process_time()
+    for row in range(few):
+        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
+        ff.frequency_response(alone, omega=(5.0, 250.0))
+    print(f"whole responses, one by one {few / (time.process_time() - clock):20,.1f}")
+    clock = time.process_time()
+    for row in range(TRIED):
+        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
+        carried(alone.system(), np.zeros(4), 120.0, TURNS, 1e-9, 1e-12)
+    print(f"scipy, {TURNS} turns from rest {TRIED / (time.process_time() - clock):24,.2f}")
+    row = peers and peer_run(peers, "pyHarm-os", 3)
+    if row:
+        print(f"pyHarm-os, points of a response {row['points'] / row['seconds']:20,.1f}")
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--machines", type=int, default=2000)
     parser.add_argument("--speeds", type=int, default=100)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=int(time.time()))
+    parser.add_argument("--peers", type=Path, nargs="?", const=HERE / ".envs")
     given = parser.parse_args()
     machine = ff.load("ffs0827")
     columns = drawn(machine, given.machines, given.seed)
@@ -101,24 +130,7 @@ def main():
         slopes, maps = derivative_ratios(batch, machine, columns, omega)
         label = f"with derivatives, {name}"
         print(f"{label:42s} {slopes:.2f} times as long, of multipliers too {maps:.2f}")
-    few = 20
-    ff.periodic_orbits(machine, omega=120.0)  # compiled beforehand
-    ff.frequency_response(machine, omega=(5.0, 250.0))
-    clock = time.process_time()
-    for row in range(few):
-        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
-        ff.periodic_orbits(alone, omega=120.0)
-    print(f"periodic_orbits, one by one {few / (time.process_time() - clock):20,.1f}")
-    clock = time.process_time()
-    for row in range(few):
-        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
-        ff.frequency_response(alone, omega=(5.0, 250.0))
-    print(f"whole responses, one by one {few / (time.process_time() - clock):20,.1f}")
-    clock = time.process_time()
-    for row in range(TRIED):
-        alone = machine.replace(**{name: column[row] for name, column in columns.items()})
-        carried(alone.system(), np.zeros(4), 120.0, TURNS, 1e-9, 1e-12)
-    print(f"scipy, {TURNS} turns from rest {TRIED / (time.process_time() - clock):24,.2f}")
+    one_by_one(machine, columns, given.peers)
 
 
 if __name__ == "__main__":

@@ -135,18 +135,26 @@ def period_of_flow(machine, runs):
     return row | each | {"quartiles": scaled, "target": 4e-6}
 
 
+def peer_run(folder, name, harmonics):
+    """A response of FFS0827 by a peer at its best setting; None where it is not installed."""
+    environment, script = PEERS[name]
+    python = folder / environment / "bin" / "python"
+    if not python.exists():
+        print(f"{name}: no environment, see peers/README.md", file=sys.stderr)
+        return None
+    command = [python, HERE / "peers" / script, "--harmonics", str(harmonics)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
 def peer_runs(folder, ours):
     """Each peer that is installed, by its best setting, and how many times longer it took."""
     rows = {}
-    for name, (environment, script) in PEERS.items():
-        python = folder / environment / "bin" / "python"
-        if not python.exists():
-            print(f"{name}: no environment, see peers/README.md", file=sys.stderr)
-            continue
+    for name in PEERS:
         for harmonics in (3, 9):
-            command = [python, HERE / "peers" / script, "--harmonics", str(harmonics)]
-            done = subprocess.run(command, capture_output=True, text=True, check=True)
-            row = json.loads(done.stdout)
+            row = peer_run(folder, name, harmonics)
+            if row is None:
+                break
             if row.get("seconds"):
                 row["times_ours"] = row["seconds"] / ours[f"H={harmonics}"]["seconds"]
             rows[f"{name} H={harmonics}"] = row
