@@ -290,7 +290,8 @@ def loads_of(cases: tuple[CaseAssessment, ...], found: Transients | None) -> Fou
     runs = {}
     if found is not None:
         named = {f"start ({found.case})": found.start, "coast-down": found.coast_down}
-        named[f"start ({found.loudest_case}), from another angle"] = found.loudest
+        angle = ", from another angle" if found.loudest_case == found.case else ""
+        named[f"start ({found.loudest_case}){angle}"] = found.loudest
         runs = {name: run for name, run in named.items() if run is not None}
     return foundation_loads(motions, runs) if motions or runs else None
 
