@@ -4,7 +4,8 @@
 
 Each stage is what lanes call, repeated on the motion of FFS0827 reached from below. Where speeds
 lie close a lane needs Newton's step, multipliers, guess and readings once each; a machine that has
-no neighbour needs the modes of its contact states, too, and Newton's step some times.
+no neighbour needs the modes of its contact states, too, and Newton's step some times. Derivatives
+are those with respect to the ten parameters of lanes.py.
 """
 
 import argparse

@@ -13,7 +13,7 @@ from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes,
 from flipflow.batch.variants import batches
 from flipflow.model.parameters import with_values
 from flipflow.model.quantities import quantities_for, quantity_named
-from flipflow.studies.lane_values import lane_values, on_lanes, slope_key
+from flipflow.studies.lane_values import lane_values, on_lanes, slope_key, with_own
 from flipflow.studies.quantity_values import MOTION_VALUES
 
 pytestmark = pytest.mark.numerical
@@ -74,20 +74,27 @@ def test_every_quantity_of_a_screen(screen, law, gap):
                 same(found[slope_key(one.name)][row, k], wanted, rtol=1e-7, unit=unit)
 
 
+def solved(machine, columns, omega, names):
+    """Motions and their derivatives, those of multipliers among them."""
+    system, P = machine.system(), len(names)
+    (batch,), _ = batches(machine, columns)
+    changes = lane_columns(machine, columns, batch, names)
+    asked = nothing_asked(system.size, omega.size)
+    found, _ = solve_lanes(batch, omega, asked, nearby_motions(system, system, omega))
+    none = np.zeros((1, omega.size, 0, P), complex)
+    wanted = SlopesAsked(
+        linear=np.zeros((1, 0, 3, system.size, P)), along=none, across=none, means=False,
+        multipliers=True, even=changes.keeps_mirror,
+        corner=np.zeros(len(system.springs), np.int64),
+    )  # fmt: skip
+    return found, solve_slopes(batch, changes.solved, omega, asked, wanted, found)
+
+
 @pytest.mark.parametrize("gap", [None, 4e-3])
 def test_states_multipliers_and_shares_of_contact(screen, gap):
     machine = screen.replace(clearance_minus=gap)
     columns, omega = drawn(machine, FIELDS, 3, seed=8), np.array([120.0, 150.0])
-    (batch,), _ = batches(machine, columns)
-    asked = nothing_asked(2, 2)
-    system, changes = machine.system(), lane_columns(machine, columns, batch, FIELDS)
-    found, _ = solve_lanes(batch, omega, asked, nearby_motions(system, system, omega))
-    none = np.zeros((1, 2, 0, len(FIELDS)), complex)
-    wanted = SlopesAsked(
-        linear=np.zeros((1, 0, 3, 2, len(FIELDS))), along=none, across=none, means=False,
-        multipliers=True, even=changes.keeps_mirror, corner=np.zeros(1, np.int64),
-    )  # fmt: skip
-    slopes = solve_slopes(batch, changes.solved, omega, asked, wanted, found)
+    found, slopes = solved(machine, columns, omega, FIELDS)
     for row in range(3):
         alone = machine.replace(**{name: float(column[row]) for name, column in columns.items()})
         branch = ff.frequency_response(alone, omega=SPAN)
@@ -163,6 +170,37 @@ def test_machines_that_nobody_chose(seed, compared):
             slope = found[slope_key(one.name)][row, 0]
             same(slope * factor, wanted, rtol=1e-6, floor=1e-12)
             compared[seed] += np.isfinite(wanted).sum() * bool(orbit.touches)
+
+
+def multipliers_compared(seed):
+    """How many multipliers of a drawn machine that touches a stop move as those of it alone."""
+    rng = np.random.default_rng([seed, 1])
+    omega = float(rng.uniform(0.3, 3.0))
+    machine = drawn_system(rng, omega)
+    names = ["forcing"]
+    for j, spring in enumerate(machine.springs):
+        names += [f"springs[{j}].stiffness", f"springs[{j}].damping"]
+        names += [f"springs[{j}].clearance"] if spring.clearance > 0.0 else []
+    columns = with_own(machine, {"forcing": np.ones(1)}, names)
+    found, slopes = solved(machine, columns, np.array([omega]), names)
+    if found.reason[0, 0] != FOUND:
+        return 0  # reaches no motion of one period
+    compared, state = 0, found.state[0, 0]
+    for orbit in ff.periodic_orbits(machine, omega=omega):
+        if not np.allclose(orbit.state, state, rtol=0.0, atol=1e-7 * np.abs(state).max()):
+            continue
+        own = told(orbit, "multipliers", names)
+        for mu, slope in zip(found.multiplier[0, 0], slopes.multiplier[0, 0], strict=True):
+            place = np.abs(orbit.multipliers - mu).argmin()
+            if np.isfinite(own[place]).all():
+                size = np.abs(own).max()
+                np.testing.assert_allclose(slope, own[place], rtol=0.0, atol=1e-9 * size)
+                compared += bool(orbit.touches)
+    return compared
+
+
+def test_multipliers_of_machines_that_nobody_chose():
+    assert sum(multipliers_compared(seed) for seed in range(16)) >= 30
 
 
 def test_enough_of_them_touch_a_stop(compared):

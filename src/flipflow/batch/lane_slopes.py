@@ -13,6 +13,7 @@ from flipflow.batch.lane_kernels import Found, machine_of, problem_of
 from flipflow.batch.lane_path import forget, is_even
 from flipflow.batch.lane_readings import Asked
 from flipflow.batch.mean_slopes import mean_slopes
+from flipflow.batch.multiplier_slopes import multiplier_slopes
 from flipflow.batch.reasons import FOUND
 from flipflow.batch.slope_readings import (
     Slopes,
@@ -25,14 +26,13 @@ from flipflow.batch.slope_readings import (
 )
 from flipflow.batch.vector_slopes import vector_slopes
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
-from flipflow.compiled.eigen import Schur, eigenvector, real_schur
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import run_flow
 from flipflow.dynamics.parameter_tangent import Columns, carry_starts
-from flipflow.dynamics.parameter_variation import APART, carry_variation, set_shifts
+from flipflow.dynamics.parameter_variation import set_shifts
 from flipflow.periodic.near_grazing import GRAZES, near_grazing_of
 from flipflow.periodic.shooting import Shooting
 
@@ -66,8 +66,11 @@ def slope_lanes(
                 continue
             torn = grazes(problem, work, omega[f], wanted, z, True)
             if wanted.multipliers and not grazes(problem, work, omega[f], wanted, z, False):
-                mu = found.multiplier[lane, f]
-                multiplier_slopes(problem, columns, omega[f], mu, work, out.multiplier[lane, f])
+                multiplier_slopes(
+                    machine, work.lane.shooting.flow, omega[f], columns, problem.sign, work.shift,
+                    work.tangents, found.multiplier[lane, f], work.lane.schur, work.multiplier,
+                    work.columns, out.multiplier[lane, f],
+                )  # fmt: skip
             if not torn:
                 read_slopes(problem, columns, omega[f], asked, wanted, work, out, lane, f)
 
@@ -82,7 +85,7 @@ def state_slopes(
     added to the columns when it is known.
     """
     machine, own, flow = problem.machine, work.lane, work.lane.shooting.flow
-    size, turn = work.T.shape[0], problem.fraction * 2.0 * math.pi / omega
+    size, turn = own.r.shape[0], problem.fraction * 2.0 * math.pi / omega
     for k in range(size):
         flow.z[k] = z[k]
     if run_flow(machine, flow, omega, 0.0, turn, own.shooting.rate) != status.OK:
@@ -96,12 +99,11 @@ def state_slopes(
         work.starts[segments, i, work.row.shape[0]] -= own.shooting.rate[i] * turn / omega
     if not lu_factor(own.A, own.pivot):
         return False
-    for p in range(work.state.shape[1]):
-        solve_state(
-            problem.sign, own.A, own.pivot, own.r, segments, p, work.starts, work.tangents,
-            work.state,
-        )  # fmt: skip
-        for k in range(size if p < slopes.shape[1] else 0):
+    solve_states(
+        problem.sign, own.A, own.pivot, own.r, segments, work.starts, work.tangents, work.state
+    )
+    for k in range(size):
+        for p in range(slopes.shape[1]):
             slopes[k, p] = work.state[k, p]
     for e in range(segments):
         set_end(machine, columns, e, omega, work)
@@ -110,24 +112,27 @@ def state_slopes(
 
 
 @kernel
-def solve_state(
-    sign: float, A: Real, pivot: Int, r: Real, segments: int, p: int, starts: Real, tangents: Real,
+def solve_states(
+    sign: float, A: Real, pivot: Int, r: Real, segments: int, starts: Real, tangents: Real,
     state: Real,
 ) -> None:  # fmt: skip
-    """z_p = -(M - I)^-1 phi_p of one parameter, omega among them, with M - I factored in A.
+    """z_p = -(M - I)^-1 phi_p of all parameters, omega among them, with M - I factored in A.
 
-    It is added to the columns at the start of each segment.
+    They are added to the columns at the start of each segment.
     """
-    size = r.shape[0]
-    for k in range(size):
-        r[k] = -sign * starts[segments, k, p]
-    lu_solve(A, pivot, r)
-    for k in range(size):
-        state[k, p] = r[k]
+    size, count = state.shape
+    for p in range(count):
+        for k in range(size):
+            r[k] = -sign * starts[segments, k, p]
+        lu_solve(A, pivot, r)
+        for k in range(size):
+            state[k, p] = r[k]
     for e in range(segments + 1):
         for k in range(size):
             for s in range(size):
-                starts[e, k, p] += tangents[e, k, s] * r[s]
+                entry = tangents[e, k, s]
+                for p in range(count):
+                    starts[e, k, p] += entry * state[s, p]
 
 
 @kernel
@@ -146,111 +151,6 @@ def grazes(
         if min(room, depth) < GRAZES * large:
             return True
     return False
-
-
-@kernel
-def multiplier_slopes(
-    problem: Shooting, columns: Columns, omega: float, mu: Complex, work: SlopeWork, slopes: Complex
-) -> None:
-    """Derivatives of the multipliers of a whole turn: d mu = l dM r of left and right vectors."""
-    schur, size, mirrored = work.lane.schur, work.T.shape[0], problem.sign < 0.0
-    vary_map(problem.machine, columns, omega, work)
-    for i in range(size):
-        for j in range(size):
-            schur.T[i, j] = problem.sign * work.T[i, j]
-    if not real_schur(schur, True):
-        return
-    set_basis(schur, work.vectors, work.basis)
-    if not lu_factor(work.basis, work.pivot):
-        return
-    k = 0
-    while k < size:
-        pair = schur.value[k].imag != 0.0
-        for p in range(work.row.shape[0]):
-            slope = eigenvalue_slope(
-                work.maps[p], work.vectors, work.basis, work.pivot, work.lane.r, k, pair
-            )
-            slope *= 2.0 * problem.sign * schur.value[k] if mirrored else problem.sign
-            set_multiplier(schur.value, mirrored, k, slope, mu, slopes[:, p])
-            if pair:
-                set_multiplier(schur.value, mirrored, k + 1, slope.conjugate(), mu, slopes[:, p])
-        k += 2 if pair else 1
-
-
-@kernel
-def vary_map(machine: MachineArrays, columns: Columns, omega: float, work: SlopeWork) -> None:
-    """The tangent map over the turn into work.T, its derivatives into work.maps."""
-    for i in range(work.T.shape[0]):
-        for j in range(work.T.shape[0]):
-            work.T[i, j] = 1.0 if i == j else 0.0
-            for p in range(work.maps.shape[0]):
-                work.maps[p, i, j] = 0.0
-    carry_variation(
-        machine, work.lane.shooting.flow, omega, columns, work.state, work.starts, work.shift,
-        work.T, work.maps, work.columns,
-    )  # fmt: skip
-
-
-@kernel
-def set_basis(schur: Schur, vectors: Real, basis: Real) -> None:
-    """Eigenvectors of the map as columns, and once more to be factored."""
-    size = vectors.shape[0]
-    k = 0
-    while k < size:
-        eigenvector(schur, k)
-        pair = schur.value[k].imag != 0.0
-        for i in range(size):
-            vectors[i, k] = schur.scale[i] * schur.vector[i].real
-            if pair:
-                vectors[i, k + 1] = schur.scale[i] * schur.vector[i].imag
-        k += 2 if pair else 1
-    for i in range(size):
-        for j in range(size):
-            basis[i, j] = vectors[i, j]
-
-
-@kernel
-def eigenvalue_slope(
-    change: Real, vectors: Real, basis: Real, pivot: Int, r: Real, k: int, pair: bool
-) -> complex:
-    """l dT r of eigenvalue k and one parameter's dT, with the rows of the inverse basis as l."""
-    size = r.shape[0]
-    entries = (0.0, 0.0, 0.0, 0.0)
-    for c in range(2 if pair else 1):
-        for i in range(size):
-            r[i] = 0.0
-            for j in range(size):
-                r[i] += change[i, j] * vectors[j, k + c]
-        lu_solve(basis, pivot, r)
-        if c == 0:
-            entries = (r[k], r[k + 1] if pair else 0.0, 0.0, 0.0)
-        else:
-            entries = (entries[0], entries[1], r[k], r[k + 1])
-    if not pair:
-        return complex(entries[0], 0.0)
-    return complex(0.5 * (entries[0] + entries[3]), 0.5 * (entries[2] - entries[1]))
-
-
-@kernel
-def set_multiplier(
-    value: Complex, squared: bool, k: int, slope: complex, known: Complex, slopes: Complex
-) -> None:
-    """Write the derivative of eigenvalue k where that multiplier stands; none of a double one."""
-    size = value.shape[0]
-    largest, nearest = 0.0, math.inf
-    for i in range(size):
-        largest = max(largest, abs(value[i]))
-        if i != k:
-            nearest = min(nearest, abs(value[i] - value[k]))
-    if nearest < APART * largest:
-        return
-    mu = value[k] * value[k] if squared else value[k]
-    place, off = 0, math.inf
-    for i in range(size):
-        away = abs(known[i] - mu)
-        if away < off:
-            place, off = i, away
-    slopes[place] = slope
 
 
 @kernel

@@ -15,11 +15,8 @@ import numpy as np
 
 from flipflow.batch.lane_kernels import Found
 from flipflow.batch.lane_path import LaneWork, new_lane_work
-from flipflow.batch.lane_readings import (
-    Asked,
-    ReadingWork,
-    new_reading_work,
-)
+from flipflow.batch.lane_readings import Asked, ReadingWork, new_reading_work
+from flipflow.batch.multiplier_slopes import MultiplierWork, new_multiplier_work
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
@@ -98,6 +95,7 @@ class SlopeWork(NamedTuple):
     lane: LaneWork
     reading: ReadingWork
     columns: ColumnWork
+    multiplier: MultiplierWork
     place: Place
     summits: Summits
     state: Real  # (2 N, P + 1) on its way over the turn, the last column that of omega
@@ -105,19 +103,12 @@ class SlopeWork(NamedTuple):
     starts: Real  # (E + 1, 2 N, P + 1) at the starts of the segments, and at the end of the flow
     tangents: Real  # (E + 1, 2 N, 2 N) tangent map up to there
     shift: Real  # (E + 1, P + 1) of their limits
-    T: Real  # (2 N, 2 N) tangent map
-    maps: Real  # (P + 1, 2 N, 2 N) its derivatives, or (0, ...) where none are asked for
     row: Real  # (P,)
     node: Real  # (K,) of Gauss' rule on (0, 1)
     weight: Real  # (K,)
-    vectors: Real  # (2 N, 2 N) eigenvectors, those of a pair as real and imaginary part
-    basis: Real  # (2 N, 2 N) the same, factored
-    pivot: Int  # (2 N,)
 
 
-def new_slope_work(
-    machine: MachineArrays, asked: Asked, parameters: int, stop: Int, *, maps: bool
-) -> SlopeWork:
+def new_slope_work(machine: MachineArrays, asked: Asked, parameters: int, stop: Int) -> SlopeWork:
     """Scratch for lanes like a given machine."""
     lane = new_lane_work(machine, stop)
     n = machine.direction.shape[1]
@@ -127,6 +118,7 @@ def new_slope_work(
         lane=lane,
         reading=new_reading_work(lane.shooting.flow, machine, asked),
         columns=new_column_work(machine, parameters),
+        multiplier=new_multiplier_work(size, parameters),
         place=Place(
             U=np.zeros((size, parameters)),
             acceleration=np.zeros((n, parameters)),
@@ -144,14 +136,9 @@ def new_slope_work(
         starts=np.zeros((segments + 1, size, parameters + 1)),
         tangents=np.zeros((segments + 1, size, size)),
         shift=np.zeros((segments + 1, parameters + 1)),
-        T=np.zeros((size, size)),
-        maps=np.zeros((parameters + 1 if maps else 0, size, size)),
         row=np.zeros(parameters),
         node=0.5 * (node + 1.0),
         weight=0.5 * weight,
-        vectors=np.zeros((size, size)),
-        basis=np.zeros((size, size)),
-        pivot=np.zeros(size, np.int64),
     )
 
 

@@ -158,7 +158,7 @@ def solve_slopes(
 
     def chunk(part: slice, stop: Int) -> None:
         if not hasattr(own, "work"):
-            own.work = new_slope_work(nominal, asked, parameters, stop, maps=wanted.multipliers)
+            own.work = new_slope_work(nominal, asked, parameters, stop)
         slope_lanes(
             batch.arrays, columns, part.start, part.stop, speeds_in_order, length, asked, wanted,
             own.work, found, slopes,

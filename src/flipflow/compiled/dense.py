@@ -13,6 +13,18 @@ INVERSE_STEPS = 3  # of inverse iteration, each a solve: right to a factor of 2 
 
 
 @kernel
+def multiply(A: NDArray[np.float64], B: NDArray[np.float64], C: NDArray[np.float64]) -> None:
+    """The first columns of C become A B."""
+    for i in range(A.shape[0]):
+        for c in range(B.shape[1]):
+            C[i, c] = 0.0
+        for k in range(A.shape[1]):
+            entry = A[i, k]
+            for c in range(B.shape[1]):
+                C[i, c] += entry * B[k, c]
+
+
+@kernel
 def lu_factor(A: NDArray[np.float64], pivot: NDArray[np.int64]) -> bool:
     """Replace A by its LU factors with row pivoting; False when a pivot vanishes."""
     n = A.shape[0]

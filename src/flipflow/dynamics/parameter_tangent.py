@@ -22,6 +22,7 @@ import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
+from flipflow.compiled.dense import multiply
 from flipflow.dynamics.contact_search import exponential, reciprocal
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
@@ -64,6 +65,7 @@ class ColumnWork(NamedTuple):
     speed: Complex  # (R, N) W of the velocities
     acceleration: Complex  # (R, N) W of the accelerations
     amplitude: Complex  # (R,) modal amplitudes of a tangent
+    outer: Complex  # (N, N) a left vector times what it takes
     gain: Complex  # (R, P) what the modes gain over a segment
     free: Real  # (2 N, 2 N) exp(A t)
     moved: Real  # (2 N, 2 N + P + 1) columns on their way
@@ -87,6 +89,7 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
         speed=np.zeros((R, n), np.complex128),
         acceleration=np.zeros((R, n), np.complex128),
         amplitude=np.zeros(R, np.complex128),
+        outer=np.zeros((n, n), np.complex128),
         gain=np.zeros((R, parameters), np.complex128),
         free=np.zeros((R, R)),
         moved=np.zeros((R, R + parameters + 1)),
@@ -127,7 +130,7 @@ def drift_integral(a: complex, e_a: complex, t: float) -> complex:
 
 
 @kernel
-def _prepare(
+def divided_differences(
     machine: MachineArrays, flow: Flow, e: int, omega: float, t: float, work: ColumnWork
 ) -> None:
     """Divided differences of all rates after ``t`` in segment e."""
@@ -172,16 +175,9 @@ def _prepare_free(flow: Flow, slot: int, work: ColumnWork) -> None:
 @kernel
 def carry_freely(U: Real, work: ColumnWork) -> None:
     """U = exp(A t) U."""
-    size, columns = U.shape
-    for k in range(size):
-        for c in range(columns):
-            work.moved[k, c] = 0.0
-        for s in range(size):
-            entry = work.free[k, s]
-            for c in range(columns):
-                work.moved[k, c] += entry * U[s, c]
-    for k in range(size):
-        for c in range(columns):
+    multiply(work.free, U, work.moved)
+    for k in range(U.shape[0]):
+        for c in range(U.shape[1]):
             U[k, c] = work.moved[k, c]
 
 
@@ -236,107 +232,99 @@ def _spread_steady(
 
 
 @kernel
-def mode_gain(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    i: int,
-    p: int,
-    driven: float,
+def mode_gains(
+    machine: MachineArrays, flow: Flow, e: int, omega: float, columns: Columns, driven: float,
     work: ColumnWork,
-) -> complex:
-    """What mode i gains by parameter p: of the motion itself (driven 1) or of a tangent (0)."""
-    n, slot = work.place.shape[1], flow.slot[e]
-    left, touches = flow.modes.left, columns.touches
-    total = 0j
-    if touches[p, 0] != 0:
-        total -= _pressed(left, slot, i, columns.inertia, p, work.acceleration)
-    if touches[p, 1] != 0:
-        total -= _pressed(left, slot, i, columns.damping, p, work.speed)
-    if touches[p, 2] != 0:
-        total -= _pressed(left, slot, i, columns.stiffness, p, work.place)
-    if driven != 0.0 and touches[p, 3] != 0:
-        for r in range(n):
-            total += left[slot, i, n + r] * columns.static[p, r] * work.still[i]
-    if driven != 0.0 and touches[p, 4] != 0:
-        total += _driven_gain(machine, flow, e, omega, columns, i, p, work)
-    if touches[p, 5] != 0:
+) -> None:  # fmt: skip
+    """What the modes gain by each parameter: of the motion itself (driven 1), of a tangent (0)."""
+    slot = flow.slot[e]
+    for i in range(flow.modes.mode_count[slot]):
+        for p in range(work.gain.shape[1]):
+            work.gain[i, p] = 0j
+        _add_pressed(flow, slot, i, columns.inertia, columns.touches, 0, work.acceleration, work)
+        _add_pressed(flow, slot, i, columns.damping, columns.touches, 1, work.speed, work)
+        _add_pressed(flow, slot, i, columns.stiffness, columns.touches, 2, work.place, work)
         for j in range(machine.direction.shape[0]):
-            total -= _stop_gain(machine, flow, e, columns, i, j, p, driven, work)
-    return total
+            _add_stop_gains(machine, flow, e, i, columns, j, driven, work)
+        if driven != 0.0:
+            _add_driven_gains(machine, flow, e, i, omega, columns, work)
 
 
 @kernel(inline=True)
-def _driven_gain(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    omega: float,
-    columns: Columns,
-    i: int,
-    p: int,
+def _add_pressed(
+    flow: Flow, slot: int, i: int, change: Real, touches: Int, which: int, spread: Complex,
     work: ColumnWork,
-) -> complex:
-    """The share of the excitation in ``_gain``."""
-    n, slot, total = work.place.shape[1], flow.slot[e], 0j
-    for x in range(machine.power.shape[0]):
-        w, scale = machine.wave[x], omega ** machine.power[x]
-        for r in range(n):
-            one = columns.push[p, x, r]
-            push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
-            total += flow.modes.left[slot, i, n + r] * push * scale
-    return total
-
-
-@kernel(inline=True)
-def _pressed(left: Complex, slot: int, i: int, change: Real, p: int, spread: Complex) -> complex:
-    """l_i (0, A_p W_i) of a matrix that changes by A_p."""
-    n, total = spread.shape[1], 0j
+) -> None:  # fmt: skip
+    """The share -l_i (0, A_p W_i) of a matrix that changes by A_p in ``mode_gains``."""
+    n = spread.shape[1]
     for r in range(n):
-        push = 0j
+        left = flow.modes.left[slot, i, n + r]
         for s in range(n):
-            one, by = spread[i, s], change[p, r, s]
-            push += complex(by * one.real, by * one.imag)
-        total += left[slot, i, n + r] * push
-    return total
+            work.outer[r, s] = left * spread[i, s]
+    for p in range(work.gain.shape[1]):
+        if touches[p, which] == 0:
+            continue
+        along, across = 0.0, 0.0
+        for r in range(n):
+            for s in range(n):
+                along += change[p, r, s] * work.outer[r, s].real
+                across += change[p, r, s] * work.outer[r, s].imag
+        work.gain[i, p] -= complex(along, across)
 
 
-@kernel
-def _stop_gain(
-    machine: MachineArrays,
-    flow: Flow,
-    e: int,
-    columns: Columns,
-    i: int,
-    j: int,
-    p: int,
-    driven: float,
+@kernel(inline=True)
+def _add_driven_gains(
+    machine: MachineArrays, flow: Flow, e: int, i: int, omega: float, columns: Columns,
     work: ColumnWork,
-) -> complex:
-    """The share of stop j in ``_gain``."""
+) -> None:  # fmt: skip
+    """The share of constant force and excitations in ``mode_gains``."""
+    n, slot = work.place.shape[1], flow.slot[e]
+    for p in range(work.gain.shape[1]):
+        if columns.touches[p, 3] != 0:
+            for r in range(n):
+                left = flow.modes.left[slot, i, n + r]
+                work.gain[i, p] += left * columns.static[p, r] * work.still[i]
+        if columns.touches[p, 4] == 0:
+            continue
+        for x in range(machine.power.shape[0]):
+            w, total = machine.wave[x], 0j
+            for r in range(n):
+                one = columns.push[p, x, r]
+                push = one * work.ahead[i, w] + one.conjugate() * work.behind[i, w]
+                total += flow.modes.left[slot, i, n + r] * push
+            work.gain[i, p] += total * omega ** machine.power[x]
+
+
+@kernel(inline=True)
+def _add_stop_gains(
+    machine: MachineArrays, flow: Flow, e: int, i: int, columns: Columns, j: int, driven: float,
+    work: ColumnWork,
+) -> None:  # fmt: skip
+    """The share of stop j in ``mode_gains``."""
     regime, stops, n = flow.regimes[e, j], machine.stops, work.place.shape[1]
     f_k, f_c = stiffness_share(stops, j, regime), damping_share(stops, j, regime)
     if f_k == 0.0 and f_c == 0.0:
-        return 0j
+        return
     slot, still = flow.slot[e], driven * work.still[i]
-    depth = -signed_gap(stops, j, regime) * still
-    turned = -gap_slope(columns, j, regime, p) * still
-    rate, turned_rate = 0j, 0j
+    k, c = stops.stiffness[j], stops.damping[j]
+    depth, rate = -signed_gap(stops, j, regime) * still, 0j
     for s in range(n):
         depth += machine.direction[j, s] * work.place[i, s]
-        turned += columns.direction[p, j, s] * work.place[i, s]
         rate += machine.direction[j, s] * work.speed[i, s]
-        turned_rate += columns.direction[p, j, s] * work.speed[i, s]
-    k, c = stops.stiffness[j], stops.damping[j]
     force = f_k * k * depth + f_c * c * rate
-    slope = f_k * (columns.stop_stiffness[p, j] * depth + k * turned)
-    slope += f_c * (columns.stop_damping[p, j] * rate + c * turned_rate)
-    total = flow.modes.gap_pick[slot, i, j] * slope
-    for r in range(n):
-        total += flow.modes.left[slot, i, n + r] * columns.reach[p, j, r] * force
-    return total
+    for p in range(work.gain.shape[1]):
+        if columns.touches[p, 5] == 0:
+            continue
+        turned, turned_rate = -gap_slope(columns, j, regime, p) * still, 0j
+        for s in range(n):
+            turned += columns.direction[p, j, s] * work.place[i, s]
+            turned_rate += columns.direction[p, j, s] * work.speed[i, s]
+        slope = f_k * (columns.stop_stiffness[p, j] * depth + k * turned)
+        slope += f_c * (columns.stop_damping[p, j] * rate + c * turned_rate)
+        total = flow.modes.gap_pick[slot, i, j] * slope
+        for r in range(n):
+            total += flow.modes.left[slot, i, n + r] * columns.reach[p, j, r] * force
+        work.gain[i, p] -= total
 
 
 @kernel(inline=True)
@@ -374,13 +362,11 @@ def advance_columns(
     """
     slot, parameters = flow.slot[e], columns.static.shape[0]
     in_omega = U.shape[1] > parameters
-    _prepare(machine, flow, e, omega, elapsed, work)
+    divided_differences(machine, flow, e, omega, elapsed, work)
     if parameters > 0:
         spread_free(flow, slot, flow.q[e], work)
         _spread_steady(machine, flow, e, omega, elapsed, work)
-    for i in range(flow.modes.mode_count[slot]):
-        for p in range(parameters):
-            work.gain[i, p] = mode_gain(machine, flow, e, omega, columns, i, p, 1.0, work)
+        mode_gains(machine, flow, e, omega, columns, 1.0, work)
     if in_omega:
         add_driven_slope(machine, flow, slot, omega, flow.start[e], -1.0, U)
     carry_freely(U, work)

@@ -18,7 +18,7 @@ from flipflow.dynamics.parameter_tangent import (
     advance_columns,
     carry_freely,
     kick_columns,
-    mode_gain,
+    mode_gains,
     moved_against_gap,
     side_of_change,
     spread_free,
@@ -78,7 +78,7 @@ def _vary_map(
     slopes: Real,
     work: ColumnWork,
 ) -> None:
-    """Carry T and its derivatives over segment e, which ``_prepare`` has prepared.
+    """Carry T and its derivatives over segment e, whose ``divided_differences`` are known.
 
     ``longer`` and ``before`` tell how its end and its start move.
     """
@@ -115,6 +115,7 @@ def _vary_column(
         for k in range(size):
             work.amplitude[i] += modes.left[slot, i, k] * T[k, c]
     spread_free(flow, slot, work.amplitude, work)
+    mode_gains(machine, flow, e, omega, columns, 0.0, work)
     for k in range(size):
         work.slope[k, c] = 0.0
     for i in range(count):
@@ -123,7 +124,7 @@ def _vary_column(
         for k in range(size):
             work.slope[k, c] += (modes.right[slot, k, i] * after).real
         for p in range(columns.static.shape[0]):
-            gain = weight * mode_gain(machine, flow, e, omega, columns, i, p, 0.0, work)
+            gain = weight * work.gain[i, p]
             for k in range(size):
                 slopes[p, k, c] += (modes.right[slot, k, i] * gain).real
 
