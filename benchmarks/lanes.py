@@ -54,16 +54,20 @@ def rate(batch, machine, omega, threads):
     return touching / statistics.median(processors), touching / statistics.median(walls), failed
 
 
+def slopes_asked(omega):
+    """Derivatives of states, extremes, forces and contact, not of multipliers."""
+    none = np.zeros((1, omega.size, 0, len(FIELDS)), complex)
+    return SlopesAsked(
+        linear=np.zeros((1, 0, 3, 2, len(FIELDS))), along=none, across=none, means=False,
+        multipliers=False, even=True, corner=np.zeros(1, np.int64),
+    )  # fmt: skip
+
+
 def derivative_ratios(batch, machine, columns, omega):
     """Time of solutions with derivatives over that of solutions alone; then multipliers, too."""
     asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
     nearby = nearby_motions(machine.system(), machine.system(), omega)
-    none = np.zeros((1, omega.size, 0, len(FIELDS)), complex)
-    wanted = SlopesAsked(
-        linear=np.zeros((1, 0, 3, 2, len(FIELDS))), along=none, across=none, means=False,
-        multipliers=False, even=True, corner=np.zeros(1, np.int64),
-    )  # fmt: skip
-    spent = [[], [], []]
+    wanted, spent = slopes_asked(omega), [[], [], []]
     for _ in range(ROUNDS + 1):
         clock = time.process_time()
         found, _ = solve_lanes(batch, omega, asked, nearby)

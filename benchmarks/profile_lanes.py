@@ -14,8 +14,10 @@ import statistics
 import time
 
 import numpy as np
+from lanes import FIELDS, slopes_asked
 
 import flipflow as ff
+from flipflow.batch.lane_columns import lane_columns
 from flipflow.batch.lane_kernels import new_found, problem_of, run_lanes
 from flipflow.batch.lane_path import (
     is_even,
@@ -25,12 +27,17 @@ from flipflow.batch.lane_path import (
     predict,
 )
 from flipflow.batch.lane_readings import new_reading_work, new_readings, read_lane
+from flipflow.batch.lane_slopes import columns_of, read_slopes, state_slopes
+from flipflow.batch.multiplier_slopes import multiplier_slopes
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
+from flipflow.batch.slope_readings import new_slope_work, new_slopes
 from flipflow.batch.solutions import nearby_motions, nothing_asked
 from flipflow.batch.variants import batches
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.flow import run_flow
 from flipflow.dynamics.modes import prepare
+from flipflow.dynamics.parameter_tangent import carry_starts
 from flipflow.periodic.shooting import shoot
 from flipflow.periodic.solver import characteristic_length
 
@@ -41,6 +48,11 @@ STAGES = (
     "multipliers", "guess through the last motions", "readings",
 )  # fmt: skip
 MODES, FLOW, STEP, MULTIPLIERS, GUESS, READINGS = range(len(STAGES))
+OF_SLOPES = (
+    "flow alone", "derivatives over its segments", "derivatives of states: those, and the rest",
+    "of readings", "of multipliers",
+)  # fmt: skip
+FLOW_ALONE, SEGMENTS, STATES, OF_READINGS, OF_MULTIPLIERS = range(len(OF_SLOPES))
 
 
 @kernel(entry=True)
@@ -71,6 +83,52 @@ def repeated(stage, repeats, machine, length, omega, work, reading, asked, readi
                 newton_step(problem, work, omega)
 
 
+@kernel(entry=True)
+def repeated_slopes(
+    stage, repeats, machine, batch_columns, length, omega, z, mu, work, asked, wanted, slopes
+):
+    """One stage of the derivatives of a motion again and again."""
+    half, columns = is_even(machine), columns_of(batch_columns, 0)
+    problem, flow = problem_of(machine, half, length), work.lane.shooting.flow
+    turn = (1.0 if half else 2.0) * math.pi / omega
+    for _ in range(repeats):
+        if stage == FLOW_ALONE:
+            for k in range(z.shape[0]):
+                flow.z[k] = z[k]
+            run_flow(machine, flow, omega, 0.0, turn, work.lane.shooting.rate)
+        elif stage == SEGMENTS:
+            carry_starts(machine, flow, omega, columns, work.starts, work.tangents, work.columns)
+        elif stage == STATES:
+            state_slopes(problem, columns, omega, z, work, slopes.state[0, 0])
+        elif stage == OF_READINGS:
+            read_slopes(problem, columns, omega, asked, wanted, work, slopes, 0, 0)
+        else:
+            multiplier_slopes(
+                machine,
+                flow,
+                omega,
+                columns,
+                problem.sign,
+                work.shift,
+                work.tangents,
+                mu,
+                work.lane.schur,
+                work.multiplier,
+                work.columns,
+                slopes.multiplier[0, 0],
+            )
+
+
+def told(name, stage, repeats, one):
+    """Print the median time of a stage."""
+    spent = []
+    for _ in range(ROUNDS + 1):
+        clock = time.process_time()
+        one(stage, repeats)
+        spent.append(time.process_time() - clock)
+    print(f"{name:44s}{1e6 * statistics.median(spent[1:]) / repeats:8.2f}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--omega", type=float, default=120.0)
@@ -95,14 +153,40 @@ def main():
     assert (found.reason == FOUND).all()
     assert readings.share[0, -1, 0] > 0.0
     for stage, name in enumerate(STAGES):
-        spent = []
-        for _ in range(ROUNDS + 1):
-            clock = time.process_time()
-            repeated(
-                stage, given.repeats, machine, length, given.omega, work, reading, asked, readings
-            )
-            spent.append(time.process_time() - clock)
-        print(f"{name:40s}{1e6 * statistics.median(spent[1:]) / given.repeats:8.2f}")
+        told(
+            name,
+            stage,
+            given.repeats,
+            lambda stage, repeats: repeated(
+                stage, repeats, machine, length, given.omega, work, reading, asked, readings
+            ),
+        )
+    columns = {name: np.array([getattr(screen, name)]) for name in FIELDS}
+    (batch,), _ = batches(screen, columns)
+    changes = lane_columns(screen, columns, batch, FIELDS).solved
+    slope_work = new_slope_work(machine, asked, len(FIELDS), np.zeros(1, np.int64))
+    slopes = new_slopes(found, machine, asked, len(FIELDS))
+    wanted, z, mu = slopes_asked(omega), found.state[0, -1], found.multiplier[0, -1]
+    for stage in range(len(OF_SLOPES)):
+        told(
+            OF_SLOPES[stage],
+            stage,
+            given.repeats,
+            lambda stage, repeats: repeated_slopes(
+                stage,
+                repeats,
+                machine,
+                changes,
+                length,
+                given.omega,
+                z,
+                mu,
+                slope_work,
+                asked,
+                wanted,
+                slopes,
+            ),
+        )
 
 
 if __name__ == "__main__":
