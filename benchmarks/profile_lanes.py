@@ -28,7 +28,6 @@ from flipflow.batch.lane_path import (
 )
 from flipflow.batch.lane_readings import new_reading_work, new_readings, read_lane
 from flipflow.batch.lane_slopes import columns_of, read_slopes, state_slopes
-from flipflow.batch.multiplier_slopes import multiplier_slopes
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
 from flipflow.batch.slope_readings import new_slope_work, new_slopes
 from flipflow.batch.solutions import nearby_motions, nothing_asked
@@ -37,6 +36,7 @@ from flipflow.compiled.compile import kernel
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.flow import run_flow
 from flipflow.dynamics.modes import prepare
+from flipflow.dynamics.multiplier_slopes import multiplier_slopes
 from flipflow.dynamics.parameter_tangent import carry_starts
 from flipflow.periodic.shooting import shoot
 from flipflow.periodic.solver import characteristic_length
@@ -104,19 +104,9 @@ def repeated_slopes(
             read_slopes(problem, columns, omega, asked, wanted, work, slopes, 0, 0)
         else:
             multiplier_slopes(
-                machine,
-                flow,
-                omega,
-                columns,
-                problem.sign,
-                work.shift,
-                work.tangents,
-                mu,
-                work.lane.schur,
-                work.multiplier,
-                work.columns,
-                slopes.multiplier[0, 0],
-            )
+                machine, flow, omega, columns, problem.sign, half, work.shift, work.tangents, mu,
+                work.lane.schur, work.multiplier, work.columns, slopes.multiplier[0, 0],
+            )  # fmt: skip
 
 
 def told(name, stage, repeats, one):

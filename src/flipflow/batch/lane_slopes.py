@@ -13,7 +13,6 @@ from flipflow.batch.lane_kernels import Found, machine_of, problem_of
 from flipflow.batch.lane_path import forget, is_even
 from flipflow.batch.lane_readings import Asked
 from flipflow.batch.mean_slopes import mean_slopes
-from flipflow.batch.multiplier_slopes import multiplier_slopes
 from flipflow.batch.reasons import FOUND
 from flipflow.batch.slope_readings import (
     Slopes,
@@ -22,7 +21,6 @@ from flipflow.batch.slope_readings import (
     contact_slopes,
     coordinate_slopes,
     force_slopes,
-    set_end,
 )
 from flipflow.batch.vector_slopes import vector_slopes
 from flipflow.compiled import status
@@ -31,8 +29,9 @@ from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import run_flow
-from flipflow.dynamics.parameter_tangent import Columns, carry_starts
-from flipflow.dynamics.parameter_variation import set_shifts
+from flipflow.dynamics.multiplier_slopes import multiplier_slopes
+from flipflow.dynamics.parameter_tangent import Columns, add_begin, carry_starts
+from flipflow.dynamics.parameter_variation import set_limits
 from flipflow.periodic.near_grazing import GRAZES, near_grazing_of
 from flipflow.periodic.shooting import Shooting
 
@@ -67,9 +66,9 @@ def slope_lanes(
             torn = grazes(problem, work, omega[f], wanted, z, True)
             if wanted.multipliers and not grazes(problem, work, omega[f], wanted, z, False):
                 multiplier_slopes(
-                    machine, work.lane.shooting.flow, omega[f], columns, problem.sign, work.shift,
-                    work.tangents, found.multiplier[lane, f], work.lane.schur, work.multiplier,
-                    work.columns, out.multiplier[lane, f],
+                    machine, work.lane.shooting.flow, omega[f], columns, problem.sign, half,
+                    work.shift, work.tangents, found.multiplier[lane, f], work.lane.schur,
+                    work.multiplier, work.columns, out.multiplier[lane, f],
                 )  # fmt: skip
             if not torn:
                 read_slopes(problem, columns, omega[f], asked, wanted, work, out, lane, f)
@@ -105,9 +104,7 @@ def state_slopes(
     for k in range(size):
         for p in range(slopes.shape[1]):
             slopes[k, p] = work.state[k, p]
-    for e in range(segments):
-        set_end(machine, columns, e, omega, work)
-        set_shifts(machine, flow, e, omega, columns, work.ended, work.shift[e + 1], work.columns)
+    set_limits(machine, flow, omega, columns, work.starts, work.ended, work.shift, work.columns)
     return True
 
 
@@ -127,12 +124,7 @@ def solve_states(
         lu_solve(A, pivot, r)
         for k in range(size):
             state[k, p] = r[k]
-    for e in range(segments + 1):
-        for k in range(size):
-            for s in range(size):
-                entry = tangents[e, k, s]
-                for p in range(count):
-                    starts[e, k, p] += entry * state[s, p]
+    add_begin(segments, state, tangents, starts)
 
 
 @kernel

@@ -16,7 +16,6 @@ import numpy as np
 from flipflow.batch.lane_kernels import Found
 from flipflow.batch.lane_path import LaneWork, new_lane_work
 from flipflow.batch.lane_readings import Asked, ReadingWork, new_reading_work
-from flipflow.batch.multiplier_slopes import MultiplierWork, new_multiplier_work
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
@@ -28,14 +27,15 @@ from flipflow.dynamics.contact_search import (
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, end_segment, force_peak, segment_motion, segment_state
 from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
+from flipflow.dynamics.multiplier_slopes import MultiplierWork, new_multiplier_work
 from flipflow.dynamics.parameter_tangent import (
     Columns,
     ColumnWork,
     advance_columns,
     gap_slope,
-    kick_columns,
     new_column_work,
 )
+from flipflow.dynamics.parameter_variation import set_ended
 from flipflow.periodic.shooting import Shooting
 
 GAUSS_POINTS = 12  # in each part of a segment in which a mean is taken
@@ -408,8 +408,9 @@ def set_approach(
     machine: MachineArrays, columns: Columns, e: int, omega: float, work: SlopeWork
 ) -> None:
     """Derivatives of the speed at the end of segment e, where a contact begins, into work.row."""
-    j, n, end = work.lane.shooting.flow.spring[e], machine.direction.shape[1], work.columns
-    set_end(machine, columns, e, omega, work)
+    flow, n, end = work.lane.shooting.flow, machine.direction.shape[1], work.columns
+    j = flow.spring[e]
+    set_ended(machine, flow, e, omega, columns, work.starts, work.ended, end)
     sign = -1.0 if speed_at(machine, j, end.z) < 0.0 else 1.0
     for p in range(work.row.shape[0]):
         slope = 0.0
@@ -420,20 +421,3 @@ def set_approach(
             if columns.touches[p, 6] != 0:
                 slope += columns.direction[p, j, s] * end.z[n + s]
         work.row[p] = sign * slope
-
-
-@kernel
-def set_end(
-    machine: MachineArrays, columns: Columns, e: int, omega: float, work: SlopeWork
-) -> None:
-    """Derivatives at the end of segment e into work.ended, and the state there into the columns'.
-
-    They are those behind a change of contact, with its saltation undone.
-    """
-    flow, end = work.lane.shooting.flow, work.columns
-    for k in range(work.ended.shape[0]):
-        for p in range(work.ended.shape[1]):
-            work.ended[k, p] = work.starts[e + 1, k, p]
-    end_segment(machine, flow, e, omega, end.z, end.rate)
-    if flow.kick[e] != 0.0:
-        kick_columns(machine, flow, e, columns, -1.0, work.ended, end)

@@ -471,3 +471,15 @@ def carry_starts(
                 segment_state(machine, flow, e, omega, flow.length[e], work.z, work.rate)
             kick_columns(machine, flow, e, columns, 1.0, U, work)
             saltation(machine, flow.spring[e], flow.kick[e], T, size)
+
+
+@kernel
+def add_begin(segments: int, begin: Real, tangents: Real, starts: Real) -> None:
+    """Add to columns that began with 0 what ``begin`` (2 N, P + 1) brings to each segment."""
+    size, count = begin.shape
+    for e in range(segments + 1):
+        for k in range(size):
+            for s in range(size):
+                entry = tangents[e, k, s]
+                for p in range(count):
+                    starts[e, k, p] += entry * begin[s, p]

@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.eigen import new_schur
 from flipflow.dynamics.machine_columns import MachineColumns
 from flipflow.dynamics.motion import Motion, motion_of_flow
+from flipflow.dynamics.multiplier_slopes import multiplier_slopes, new_multiplier_work
 from flipflow.dynamics.parameter_tangent import new_column_work
-from flipflow.dynamics.parameter_variation import APART, carry_variation, columns_at
+from flipflow.dynamics.parameter_variation import columns_at, slopes_along
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.contact_law import shares, signed_gap
 from flipflow.periodic.exact_solver import ExactSolver
@@ -129,9 +131,7 @@ class MotionDerivatives:
     @cached_property
     def _along(self) -> tuple[Real, Real]:
         """Derivatives at the segments' starts and of the segments' limits, both at fixed time."""
-        state = self.state  # over half a turn it may fly that half
-        self._fly(self.solver.whole)
-        starts, shift, _, _ = self._vary(state, with_map=False)
+        starts, _, shift = self._carried(self.solver.whole)
         return starts, shift
 
     @cached_property
@@ -183,20 +183,16 @@ class MotionDerivatives:
     @cached_property
     def eigenvalues(self) -> tuple[Complex, Complex]:
         """Eigenvalues of the return map (2 N,) and their derivatives (2 N, P + 1)."""
-        M, slopes = self.map_slopes
-        value, right = np.linalg.eig(M)
-        slope = np.einsum("ik,pkl,li->ip", np.linalg.inv(right), slopes, right)
-        away = np.abs(value[:, None] - value) + np.diag(np.full(value.size, np.inf))
-        slope[away.min(axis=1) < APART * np.abs(value).max()] = np.nan
+        solver = self.solver
+        _, tangents, shift = self._carried(self.problem)
+        value = np.linalg.eigvals(self.problem.sign * tangents[-1]).astype(complex)
+        slope = np.full((value.size, self.parameters + 1), np.nan, complex)
+        multiplier_slopes(
+            solver.machine, solver.flow, self.omega, self.columns.solved, self.problem.sign, False,
+            shift, tangents, value, new_schur(value.size),
+            new_multiplier_work(value.size, self.parameters), self.work, slope,
+        )  # fmt: skip
         return value, slope
-
-    @cached_property
-    def map_slopes(self) -> tuple[Real, Real]:
-        """The monodromy matrix (with sign over half a turn) and its derivatives (P + 1, ...)."""
-        state = self.state
-        self._fly(self.problem)
-        _, _, T, slopes = self._vary(state, with_map=True)
-        return self.problem.sign * T, self.problem.sign * slopes
 
     def require_smooth(self, *, multipliers: bool = False) -> None:
         """Refuse a motion that grazes a stop where the derivative has two sides.
@@ -262,17 +258,19 @@ class MotionDerivatives:
         if self._flown != problem.fraction:
             self._slopes_of(problem)
 
-    def _vary(self, state: Real, *, with_map: bool) -> tuple[Real, Real, Real, Real]:
-        """Carry ``state`` and, if asked for, the map's derivatives over the recorded flow."""
+    def _carried(self, problem: Shooting) -> tuple[Real, Real, Real]:
+        """Columns and maps at the limits of the segments of a problem's flow, and their shifts."""
+        state = self.state  # over half a turn it may fly that half
+        self._fly(problem)
         flow, (size, columns) = self.solver.flow, state.shape
-        segments = int(flow.segments[0])
-        starts, shift = np.zeros((segments, size, columns)), np.zeros((segments + 1, columns))
-        T, slopes = np.eye(size), np.zeros((columns if with_map else 0, size, size))
-        carry_variation(
-            self.solver.machine, flow, self.omega, self.columns.solved, state.copy(), starts, shift,
-            T, slopes, self.work,
+        limits = int(flow.segments[0]) + 1
+        starts, shift = np.zeros((limits, size, columns)), np.zeros((limits, columns))
+        tangents = np.zeros((limits, size, size))
+        slopes_along(
+            self.solver.machine, flow, self.omega, self.columns.solved, state, starts, tangents,
+            np.zeros_like(state), shift, self.work,
         )  # fmt: skip
-        return starts, shift, T, slopes
+        return starts, tangents, shift
 
     def _shares(self, piece: Pieces) -> Iterator[tuple[Real, Real, Real]]:
         """f_k, f_c and the gap's position of each stop in given pieces, (K,) each."""

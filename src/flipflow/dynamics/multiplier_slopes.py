@@ -25,7 +25,8 @@ from flipflow.dynamics.parameter_tangent import (
     mode_gains,
     spread_free,
 )
-from flipflow.dynamics.parameter_variation import APART
+
+APART = 1e-7  # distance of two multipliers, as a share of the largest, below which they are one
 
 
 class MultiplierWork(NamedTuple):
@@ -51,17 +52,18 @@ def new_multiplier_work(size: int, parameters: int) -> MultiplierWork:
     )
 
 
-@kernel
+@kernel(entry=True)
 def multiplier_slopes(
-    machine: MachineArrays, flow: Flow, omega: float, columns: Columns, sign: float, shift: Real,
-    tangents: Real, known: Complex, schur: Schur, work: MultiplierWork, column: ColumnWork,
-    slopes: Complex,
+    machine: MachineArrays, flow: Flow, omega: float, columns: Columns, sign: float, squared: bool,
+    shift: Real, tangents: Real, known: Complex, schur: Schur, work: MultiplierWork,
+    column: ColumnWork, slopes: Complex,
 ) -> None:  # fmt: skip
-    """Derivatives of the multipliers ``known`` of a whole turn into ``slopes`` (R, P).
+    """Derivatives of multipliers ``known`` into ``slopes`` (R, P), or (R, P + 1) with omega.
 
     The recorded flow is the turn, or with ``sign`` -1 the half of it after which the motion is its
-    own mirror image. ``tangents`` (E + 1, R, R) are the maps up to the starts of its segments,
-    ``shift`` (E + 1, P + 1) tells how those move in time. Of a double multiplier there is none.
+    own mirror image; ``squared`` where the multipliers are those of the whole all the same.
+    ``tangents`` (E + 1, R, R) are the maps up to the starts of its segments, ``shift``
+    (E + 1, P + 1) tells how those move in time. Of a double multiplier there is none.
     """
     size, segments = work.pivot.shape[0], flow.segments[0]
     for i in range(size):
@@ -77,7 +79,7 @@ def multiplier_slopes(
         _over_segment(machine, flow, e, omega, columns, shift, tangents, schur, work, column)
     for k in range(size):
         if schur.value[k].imag >= 0.0 and _is_single(schur.value, k):
-            _write(schur.value[k], sign < 0.0, k, known, work, slopes)
+            _write(schur.value[k], squared, k, known, work, slopes)
 
 
 @kernel(inline=True)
