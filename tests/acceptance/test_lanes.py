@@ -246,3 +246,19 @@ def test_a_jump_on_the_way_leads_where_it_leads_however_far_the_speed_ahead():
         expected = ff.frequency_response(machine, (0.15, 1.4094)).orbit_from_below(1.4094)
         found = ff.study(machine, {"forcing": [1.0, 1.001]}, "amplitude[0]", speeds)
         close(f"at {phase}", found.values["amplitude[0]"][0, 0, 1], expected.amplitude(0), rel=1e-6)
+
+
+def test_a_machine_that_always_touches_comes_from_below_to_a_single_speed():
+    """From rest it settled into a motion of 0.0595 m beside that of 0.0234."""
+    stops = (
+        ff.ClearanceSpring([1.0, 0.0], 94.58, 8.193, -2.06, np.inf, law="undamped-rebound"),
+        ff.ClearanceSpring([-1.0, 1.0], 288.4, 9.396, -0.0377, np.inf, law="undamped-rebound"),
+        ff.ClearanceSpring([1.0, -1.0], 5.581, 0.8118, -0.0493, np.inf),
+    )
+    machine = ff.MechanicalSystem(
+        np.diag([1.4225, 0.4188]), [[0.9565, -0.6724], [-0.6724, 0.6724]],
+        [[3.739, -2.6285], [-2.6285, 2.6285]], stops, ff.HarmonicForce([-0.9924 - 0.1233j, 0.0]),
+    )  # fmt: skip
+    below = ff.frequency_response(machine, (0.23, 6.0)).orbit_from_below(5.48)
+    found = ff.study(machine, {"forcing": [1.0, 1.001]}, "amplitude[0]", [5.48])
+    close("at once", found.values["amplitude[0]"][0, 0, 0], below.amplitude(0), rel=1e-7)
