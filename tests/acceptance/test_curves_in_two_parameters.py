@@ -461,3 +461,39 @@ def test_no_turn_where_a_parameter_has_no_part() -> None:
     close("speed", np.ptp(curve.omega[~touched]), 0.0, abs=1e-12)
     turns = [one.values[0] for one in curve.points_of("turning point")]
     assert all(value < 1.0 + 1e-6 for value in turns), turns
+
+
+BESIDE = {
+    "an equal stop": ff.ClearanceSpring([1.0], 3.0, 0.2, 2.0),
+    "a stop on one side, far off": ff.ClearanceSpring([1.0], 5.0, 0.3, 50.0, np.inf),
+}
+
+
+@pytest.mark.parametrize("law", ["paper", "compression-only", "undamped-rebound", "elasto-gap"])
+@pytest.mark.parametrize("beside", BESIDE)
+def test_gaps_that_are_grazed_at_once(law, beside) -> None:
+    """The curve crept along the corner of the other gap, up to the limit of points."""
+    stops = ff.ClearanceSpring([1.0], 5.0, 0.3, 2.0, law=law), BESIDE[beside]
+    machine = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], stops, ff.HarmonicForce([0.5]))
+    point = ff.frequency_response(machine, (0.3, 1.6)).points_of("contact begin")[0]
+    curve = ff.continue_bifurcation(point, ("forcing", "omega"), ((0.8, 2.0), (0.3, 1.6)))
+    assert curve.complete
+    assert len(curve.orbits) < 500
+    forcing, omega = curve.values.T
+    size = 0.5 * forcing / np.abs(1.0 - omega**2 + 0.1j * omega)
+    close("amplitude along the curve", size, np.full_like(size, 2.0), rel=1e-10)
+
+
+def test_gaps_that_are_grazed_at_once_at_the_start_alone() -> None:
+    """With a smaller gap on the other side the motion touches there before."""
+    stop = ff.ClearanceSpring([1.0], 5.0, 0.3, 2.0)
+    machine = ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], (stop,), ff.HarmonicForce([0.5]))
+    point = ff.frequency_response(machine, (0.3, 1.6)).points_of("contact begin")[0]
+    names, bounds = ("springs[0].clearance_minus", "omega"), ((1.0, 3.0), (0.3, 1.6))
+    curve = ff.continue_bifurcation(point, names, bounds)
+    assert curve.complete
+    other, omega = curve.values.T
+    close("ends", sorted(other[[0, -1]]), [1.0, 3.0], rel=1e-9)
+    alone = omega[other >= 2.0]
+    close("untouched on the other side", alone, np.full_like(alone, point.omega), rel=1e-9)
+    assert omega[other < 1.9].min() > point.omega

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -311,14 +312,13 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
         raise InputError("parameters", plane.names, "the machine must stay its own mirror image")
     test, gap, start, notes = _sought(point)
     sought = Sought(test, gap) if over_omega else Sought(test, gap, plane.bounds[1], plane.own[1])
-    solver = FieldSolver(
-        plane.system_at, plane.bounds[0], plane.own[0], 0.0 if over_omega else orbit.omega,
-        half_turn=half_turn, turns=own.turns, sought=sought,
-    )  # fmt: skip
-    low, high = plane.bounds[1]
-    course = course_over(plane.bounds[0], SHARP)._replace(beside_lower=low, beside_upper=high)
     u = np.append(start.u, start.omega if over_omega else plane.own[1])
-    traced = follow_both_ways(solver, u, plane.own[0], course, say).traced
+    at_once = _grazed_at_once(start, gap) if test == GRAZING else ()
+    solver, traced = _traced(plane, orbit, u, replace(sought, at_once=at_once), half_turn, say)
+    if _touches(solver, traced, at_once):
+        # They are grazed at once for these parameters alone.
+        sought = replace(sought, at_once=(gap ^ 1,) if half_turn else ())
+        solver, traced = _traced(plane, orbit, u, sought, half_turn, say)
     say("special points", SPECIAL_SHARE)
     found, unsettled = curve_points(solver, traced) if traced.omega.size else ([], [])
     kept = _where_it_holds(solver, traced, plane)
@@ -345,6 +345,26 @@ def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
     )  # fmt: skip
 
 
+def _traced(
+    plane: Plane, orbit: Orbit, u: Real, sought: Sought, half_turn: bool, say: Monitor
+) -> tuple[FieldSolver, Traced]:
+    """The curve through the motion u, both ways."""
+    solver = FieldSolver(
+        plane.system_at, plane.bounds[0], plane.own[0], 0.0 if plane.over_omega else orbit.omega,
+        half_turn=half_turn, turns=orbit.point.formulation.turns, sought=sought,
+    )  # fmt: skip
+    low, high = plane.bounds[1]
+    course = course_over(plane.bounds[0], SHARP)._replace(beside_lower=low, beside_upper=high)
+    return solver, follow_both_ways(solver, u, plane.own[0], course, say).traced
+
+
+def _touches(solver: FieldSolver, traced: Traced, gaps: Sequence[int]) -> bool:
+    """Whether a motion of the curve goes beyond gaps that it should graze."""
+    motion = np.abs(traced.u[:, : solver.system.size]).max(initial=0.0)
+    depth = traced.depth.reshape(-1, 2 * len(solver.springs))[:, list(gaps)]
+    return bool((depth > GRAZED * motion).any())
+
+
 def _ended(
     solver: FieldSolver, traced: Traced, ends: Sequence[Orbit], plane: Plane
 ) -> BranchStatus:
@@ -367,6 +387,16 @@ def _grazes(orbit: Orbit, length: float) -> bool:
         return False
     nearest = min(near_grazing(solver.problem, solver.scratch, orbit.omega))
     return nearest < BEFORE_GRAZING * length
+
+
+def _grazed_at_once(point: Point, gap: int) -> tuple[int, ...]:
+    """Other gaps that a motion grazes with one."""
+    solver = point.formulation.solver()
+    least, most = solver.gap_extremes(point.u[None], np.array([point.omega]))
+    reach = np.stack([most[0], -least[0]], axis=1)
+    depth = (reach - [spring.gaps for spring in solver.springs]).ravel()
+    near = np.abs(depth - depth[gap]) < GRAZED * np.abs(point.u[: solver.system.size]).max()
+    return tuple(other for other in np.flatnonzero(near).tolist() if other != gap)
 
 
 def _values(point: Point) -> tuple[float, float]:

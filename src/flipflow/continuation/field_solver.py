@@ -34,12 +34,16 @@ class Sought:
         2 * spring + side of the gap that is grazed, side 0 plus, 1 minus.
     bounds, own
         Of a curve in two fields, (lower, upper) of the second, and its size.
+    at_once
+        Other gaps that are grazed with it all along, in the same count: those of a stop on both
+        sides by a motion that is its own mirror image, and of equal stops.
     """
 
     test: int = MOTION
     gap: int = 0
     bounds: tuple[float, float] = (0.0, 0.0)
     own: float = 0.0
+    at_once: tuple[int, ...] = ()
 
 
 MOTIONS = Sought()
@@ -109,7 +113,12 @@ class FieldSolver(ExactSolver):
         curve = sought.test != MOTION
         self.branches_off = not curve
         self.unknowns += int(curve)
-        self.problem = Varied(self.problem, series, omega, own, sought.own, sought.test, sought.gap)
+        opened = np.zeros((len(self.springs), 2), np.int64)
+        if sought.test == GRAZING:
+            opened.flat[[sought.gap, *sought.at_once]] = 1
+        self.problem = Varied(
+            self.problem, series, omega, own, sought.own, sought.test, sought.gap, opened
+        )
         self.scratch = new_varied_work(
             self.shooting_work, self.system.size, len(self.springs), pairs=sought.test == PAIR
         )
@@ -194,13 +203,12 @@ class FieldSolver(ExactSolver):
     def _before_contact(self, point: FieldPoint) -> Real:
         """The return map of a motion that grazes, of the side without the contact."""
         system = point.formulation.system.with_bonded()
-        spring, side = divmod(self.sought.gap, 2)
-        gaps = list(system.springs[spring].gaps)
-        sides = (0, 1) if self.half_turn else (side,)
-        for one in sides:
-            gaps[one] = np.inf
-        opened = replace(system.springs[spring], clearance=gaps[0], clearance_minus=gaps[1])
-        springs = (*system.springs[:spring], opened, *system.springs[spring + 1 :])
+        gaps = np.array([spring.gaps for spring in system.springs])
+        gaps[self.problem.opened != 0] = np.inf
+        springs = tuple(
+            replace(spring, clearance=plus, clearance_minus=minus)
+            for spring, (plus, minus) in zip(system.springs, gaps.tolist(), strict=True)
+        )
         solver = ExactSolver(
             replace(system, springs=springs), half_turn=self.half_turn, turns=self.turns
         )

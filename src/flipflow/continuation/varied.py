@@ -63,6 +63,7 @@ class Varied(NamedTuple):
     beside: float  # that of the field beside the state, where there is one
     test: int  # MOTION, or the test function whose zeros are followed
     gap: int  # 2 * spring + side of the gap that is grazed
+    opened: Int  # (m, 2) 1 for the gaps that are not met up to the grazing: those grazed at once
 
 
 class VariedWork(NamedTuple):
@@ -71,7 +72,7 @@ class VariedWork(NamedTuple):
     shooting: ShootingWork
     series: SeriesWork
     at: Real  # (3,) values of both parameters for which the machine stands; the last frequency
-    gap: Real  # (2,) gaps of the grazed spring, which the flow does not see
+    gap: Real  # (m, 2) gaps, of which the flow does not see those that are opened
     z: Real  # (2 N + 2,) unknowns moved for a difference
     move: Real  # (2 N + 2,) how far
     ahead: Real  # (2 N,)
@@ -90,7 +91,7 @@ def new_varied_work(shooting: ShootingWork, size: int, stops: int, *, pairs: boo
         shooting=shooting,
         series=new_series_work(size),
         at=np.full(3, np.nan),
-        gap=np.full(2, np.inf),
+        gap=np.full((stops, 2), np.inf),
         z=np.zeros(n + 2),
         move=np.zeros(n + 2),
         ahead=np.zeros(n),
@@ -121,10 +122,11 @@ def stand_at(problem: Varied, work: VariedWork, value: float, beside: float) -> 
     if not set_machine(series, work.series, value, beside, machine):
         return False
     if problem.test == GRAZING:
-        # Up to the grazing the gap is not met: without it the motion is smooth beyond as well.
-        for side in range(2):
-            work.gap[side] = machine.stops.gap[problem.gap // 2, side]
-        open_gap(problem)
+        # Up to the grazing the gaps are not met: without them the motion is smooth beyond as well.
+        for j in range(work.gap.shape[0]):
+            for side in range(2):
+                work.gap[j, side] = machine.stops.gap[j, side]
+        open_gaps(problem)
     work.at[0], work.at[1] = value, beside
     return True
 
@@ -137,20 +139,22 @@ def inside(value: float, low: float, high: float) -> bool:
 
 
 @kernel
-def open_gap(problem: Varied) -> None:
-    """Let the grazed gap be infinite, of a motion that is its own mirror image on both sides."""
-    gap, spring = problem.shooting.machine.stops.gap, problem.gap // 2
-    gap[spring, problem.gap % 2] = math.inf
-    if problem.shooting.sign < 0.0:
-        gap[spring, 1 - problem.gap % 2] = math.inf
+def open_gaps(problem: Varied) -> None:
+    """Let the grazed gaps be infinite."""
+    gap = problem.shooting.machine.stops.gap
+    for j in range(gap.shape[0]):
+        for side in range(2):
+            if problem.opened[j, side] != 0:
+                gap[j, side] = math.inf
 
 
 @kernel
-def show_gap(problem: Varied, work: VariedWork) -> None:
-    """Let the grazed gap be what it is, for what is read off a motion."""
+def show_gaps(problem: Varied, work: VariedWork) -> None:
+    """Let the grazed gaps be what they are, for what is read off a motion."""
     if problem.test == GRAZING:
-        for side in range(2):
-            problem.shooting.machine.stops.gap[problem.gap // 2, side] = work.gap[side]
+        for j in range(work.gap.shape[0]):
+            for side in range(2):
+                problem.shooting.machine.stops.gap[j, side] = work.gap[j, side]
 
 
 @kernel
@@ -343,10 +347,10 @@ def varied_crossings(problem: Varied, work: VariedWork) -> int:
 @kernel
 def varied_depths(problem: Varied, work: VariedWork, value: float, depth: Real) -> None:
     """The shooting's depths, (m, 2); the machine stands at the value already."""
-    show_gap(problem, work)
+    show_gaps(problem, work)
     flow_depths(problem.shooting, work.shooting, float(work.at[2]), depth)
     if problem.test == GRAZING:
-        open_gap(problem)
+        open_gaps(problem)
 
 
 @kernel
@@ -363,10 +367,10 @@ def varied_scale(problem: Varied, u: Real, value: float, scale: Real) -> None:
 @kernel
 def varied_better(problem: Varied, work: VariedWork, value: float) -> float:
     """The shooting's better section."""
-    show_gap(problem, work)
+    show_gaps(problem, work)
     phase = section.better_section(problem.shooting, work.shooting, float(work.at[2]))
     if problem.test == GRAZING:
-        open_gap(problem)
+        open_gaps(problem)
     return float(phase)
 
 
@@ -381,8 +385,9 @@ def varied_mirrored(problem: Varied) -> Varied:
     """The problem of motions that are their own mirror image."""
     half = mirrored_shooting(problem.shooting)
     return Varied(
-        half, problem.series, problem.omega, problem.own, problem.beside, problem.test, problem.gap
-    )
+        half, problem.series, problem.omega, problem.own, problem.beside, problem.test, problem.gap,
+        problem.opened,
+    )  # fmt: skip
 
 
 @kernel
