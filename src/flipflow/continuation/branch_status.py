@@ -32,8 +32,8 @@ class BranchStatus(Enum):
         "follow it."
     )
     STEP_TOO_SMALL = (
-        "The branch could not be followed: the step became too small. Try more points, or start "
-        "from another frequency."
+        "The branch or curve could not be followed on: the step became too small. Start from "
+        "another point of it; over frequency the method takes more points, too."
     )
     POINT_LIMIT = "The branch has more points than are kept; shorten the interval."
     TOO_MANY_CONTACTS = (
