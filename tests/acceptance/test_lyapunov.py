@@ -176,6 +176,34 @@ def test_a_quasi_periodic_motion():
     assert swept.words == ("quasi-periodic",)
 
 
+def test_a_motion_that_only_leaves_an_unstable_one_is_not_chaotic():
+    """Its damper drives it, and those of the stops hold it: a torus far from where it starts."""
+    omega = 0.9
+    stop = ff.ClearanceSpring([1.0], 1.0, 0.5, 1.0)
+    machine = ff.MechanicalSystem([[1.0]], [[-1e-3]], [[1.0]], [stop], ff.HarmonicForce([0.1]))
+    X = 0.1 / (1.0 - omega**2 - 1e-3j * omega)
+    near = np.array([X.real + 1e-6, -omega * X.imag])
+    leaving = ff.lyapunov_exponents(machine, omega, initial=near, periods=1024, skip=64)
+    close("driven", leaving.exponents[0], 5e-4, rel=0.05)
+    assert leaving.exponents[0] > 4.0 * leaving.standard_error[0]
+    assert leaving.word == "undecided"
+    assert ff.sweep(machine, [omega], initial=near, most_turns=300).words == ("undecided",)
+    away = ff.lyapunov_exponents(machine, omega, initial=leaving.state, periods=8192, skip=4096)
+    assert away.word == "quasi-periodic"
+    assert abs(away.state[0]) > 0.1
+
+
+def test_a_mode_that_grows_beyond_all_bounds_is_not_chaotic():
+    """One that a force shakes, and one that no force shakes, which grows out of rounding."""
+    stop = ff.ClearanceSpring([1.0, 0.0], 29.0, 0.1, 1.0, np.inf)
+    for force in (0.0, 0.3):
+        machine = ff.MechanicalSystem(
+            np.eye(2), np.diag([0.1, -1e-3]), np.diag([1.0, 2.0]), [stop],
+            ff.HarmonicForce([0.5, force]),
+        )  # fmt: skip
+        assert ff.sweep(machine, [0.9]).words == ("undecided",)
+
+
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, -0.3), (0.3, 1.0)])
 def test_two_trajectories_part_as_the_largest_exponent_says(start):
     """The impact oscillator at 0.905: two runs of DOP853 with events, pulled together each turn.

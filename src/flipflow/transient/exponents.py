@@ -9,6 +9,7 @@ the mean alone wanders off as a random walk does.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +40,7 @@ STRETCHES = 16  # of the growth, whose ranges tell whether it stays within bound
 WITHIN_BOUNDS = 2.0
 PERIODS = 2048  # forcing periods followed for a word, after
 ALIGNING = 256  # those in which the frame turns into the directions that grow most
+AWAY = 10.0  # times as much as the way from what is left may disturbances of it grow
 MOST_PARTS = 4096  # times a period that the frame may have to be made orthonormal
 
 
@@ -87,7 +89,7 @@ class Growth:
         largest, error = self.exponents[0], CERTAIN * self.standard_error[0]
         bounded = self._within_bounds()
         if largest > error and not bounded:
-            return CHAOTIC
+            return UNDECIDED if self._drives_away(settling) else CHAOTIC
         near = settling.approached(self.recent, self.omega)
         # Growth seems to stay within bounds, too, where a periodic motion is come to slowly.
         if bounded and near is None:
@@ -98,11 +100,24 @@ class Growth:
 
     def _comes_closer(self, settling: Settling, near: Point) -> bool:
         """Whether the way to a periodic motion has at least halved."""
-        first, last = (
-            min(settling.distance(z, phase, self.omega) for phase in settling.phases(near))
-            for z in (self.first, self.recent[-1])
-        )
+        first, last = (settling.distance_from(near, z) for z in (self.first, self.recent[-1]))
         return last < 0.5 * first
+
+    def _drives_away(self, settling: Settling) -> bool:
+        """Whether disturbances grow no more than the way from what is unstable does by itself.
+
+        That is a periodic motion which is only being left, or rest, from which a motion grows
+        beyond all bounds. What it comes to is not seen yet.
+        """
+        ends, omega = (self.first, self.recent[-1]), self.omega
+        ways = [[settling.size(z[None], omega) for z in ends]]
+        point = settling.near_ahead(self.first, omega)
+        if point is not None:
+            ways.append([settling.distance_from(point, z) for z in ends])
+        growth = float(self.growth[:, 0].sum())
+        return any(
+            0.0 < first < last and growth <= math.log(AWAY * last / first) for first, last in ways
+        )
 
     def _within_bounds(self) -> bool:
         """Whether the leading growth keeps within the bounds that a short stretch of it shows."""
