@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,3 +183,28 @@ def test_a_glide_that_ends_in_chaos_has_jumped():
     speed, size = glide.amplitude("relative")
     before, after = size[speed < jump.fold][-20:], size[speed > jump.omega + 5.0]
     assert np.median(after) < 0.8 * before.min()
+
+
+def test_an_amplitude_that_no_turn_tells_is_not_a_number(tmp_path):
+    """A mode that grows to infinity within a few turns."""
+    machine = ff.MechanicalSystem([[1.0]], [[-0.2]], [[1.0]], (), ff.HarmonicForce([1.0]))
+    found = ff.sweep(machine, [0.7])
+    assert found.words == ("undecided",)
+    for value in (found.amplitude(0), *found.extremes(0)):
+        assert np.isnan(value).all()
+    for ending in ("html", "svg"):
+        assert ff.figure(found).write(tmp_path / f"sweep.{ending}").stat().st_size > 1000
+
+
+def test_the_greatest_amplitude_is_one_that_is_known(command, tmp_path):
+    """A gap of 1 um and a hard stop: at 200 rpm a turn has more contacts than are recorded."""
+    text = (Path(ff.__file__).parent / "io/machines/ffs0827.toml").read_text(encoding="utf-8")
+    before, stops, after = re.split(r"(?s)(\[stops\].*?)(?=\n\[)", text, maxsplit=1)
+    for name, value in (("stiffness", "1e11 kN/m"), ("damping", "0.01 kN s/m"),
+                        ("clearance", "0.001 mm")):  # fmt: skip
+        stops = re.sub(rf"(?m)^{name} = .*", f'{name} = "{value}"', stops)
+    (tmp_path / "hard.toml").write_text(before + stops + after, encoding="utf-8")
+    speeds = "--speeds", "200 rpm", "850 rpm", "--steps", "2"
+    code, out, err = command("sweep", tmp_path / "hard.toml", *speeds, "--force")
+    assert code == 0, err
+    assert re.search(r"greatest relative amplitude 0\.001\d* mm at 850 rpm", out), out

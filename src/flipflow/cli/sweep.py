@@ -31,6 +31,7 @@ from flipflow.model.numerals import rpm
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from flipflow.compiled.arrays import Real
     from flipflow.io.command_results import Sweeps
     from flipflow.model.project import Project
     from flipflow.plotting.figure import Figure
@@ -214,16 +215,22 @@ def _show(title: str, found: Passed, steps: int, out: Console) -> None:
         say(out, f"Note: no glide: {found.no_glide}.", "yellow")
 
 
+def _greatest(swept: Sweep, amplitude: Real) -> str:
+    import numpy as np  # noqa: PLC0415  keeps --help quick
+
+    known = np.flatnonzero(np.isfinite(amplitude))
+    if not known.size:
+        return "no turn could be carried to its end"
+    top = known[amplitude[known].argmax()]
+    speed = rpm(swept.omega[top])
+    return f"greatest relative amplitude {amplitude[top]:.4g} mm at {speed} rpm"
+
+
 def _show_sweep(word: str, swept: Sweep, steps: int, out: Console) -> None:
     from flipflow.report.terminal import say  # noqa: PLC0415  keeps --help quick
 
     amplitude = swept.amplitude("relative") * 1e3
-    top = int(amplitude.argmax())
-    say(
-        out,
-        f"Speed {word}: greatest relative amplitude {amplitude[top]:.4g} mm at "
-        f"{rpm(swept.omega[top])} rpm",
-    )
+    say(out, f"Speed {word}: {_greatest(swept, amplitude)}")
     for jump in swept.jumps:
         before, after = amplitude[jump.index - 1], amplitude[jump.index]
         say(

@@ -52,10 +52,11 @@ def sweep_figure(
         traces += underlay(branch, chosen)
     for k, sweep in enumerate(sweeps):
         traces += _swept(sweep, chosen, k + 1)
-    top = max(float(trace.y.max()) for trace in traces)
+    drawn = np.concatenate([trace.y for trace in traces])
+    top = drawn.max(initial=0.0, where=np.isfinite(drawn)) or 1.0
     omega = np.concatenate([sweep.omega for sweep in sweeps])
     panel = Panel(
-        speed_axis(omega), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * top)),
+        speed_axis(omega), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * float(top))),
         traces=tuple(traces),
     )  # fmt: skip
     caption = (

@@ -138,13 +138,14 @@ class Sweep(Frozen, Result):
     def amplitude(self, which: Coordinate) -> Real:
         """Half peak-to-peak of a coordinate in m, as it moves at the end of each step.
 
-        Where the motion did not settle, over the last turns recorded (up to 64).
+        Where the motion did not settle, over the last turns recorded (up to 64); NaN where no turn
+        from there can be carried to its end.
         """
         low, high = self.extremes(which)
         return np.asarray((high - low) / 2.0)
 
     def extremes(self, which: Coordinate) -> tuple[Real, Real]:
-        """Least and greatest value of a coordinate in m at the end of each step."""
+        """Least and greatest value of a coordinate in m at the end of each step, or NaN."""
         key = tuple(self.system.coordinate(which))
         if key not in self._seen:
             turns = [row.recent.shape[0] for row in self.rows]
@@ -152,9 +153,10 @@ class Sweep(Frozen, Result):
             solver = self.formulation.solver()
             low, high, _ = solver.extremes(states, np.repeat(self.omega, turns), np.array([key]))
             starts = np.cumsum([0, *turns[:-1]])
-            self._seen[key] = (
-                np.minimum.reduceat(low[:, 0], starts), np.maximum.reduceat(high[:, 0], starts),
-            )  # fmt: skip
+            least = np.minimum.reduceat(low[:, 0], starts)
+            greatest = np.maximum.reduceat(high[:, 0], starts)
+            known = least <= greatest
+            self._seen[key] = np.where(known, least, np.nan), np.where(known, greatest, np.nan)
         low, high = self._seen[key]
         return low.copy(), high.copy()
 
