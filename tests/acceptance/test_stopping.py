@@ -65,6 +65,14 @@ def test_in_the_first_moment_it_is_a_sentence(number):
     assert run.stderr == "Stopped by the user; nothing is written.\n"
 
 
+@pytest.mark.parametrize("where", ["typer.main.get_command", "typer.core.TyperGroup.parse_args"])
+@pytest.mark.parametrize("number", BOTH)
+def test_while_the_command_line_is_read_it_is_a_sentence(command, monkeypatch, where, number):
+    monkeypatch.setattr(where, lambda *_, **__: os.kill(os.getpid(), number) or time.sleep(5.0))
+    stopped = (130, "", "Stopped by the user; nothing is written.\n")
+    assert command("check", "ffs0827") == stopped
+
+
 @pytest.mark.parametrize("number", BOTH)
 def test_a_stopped_simulation_says_that_nothing_is_written(tmp_path, number):
     run = started("simulate", "ffs0827", "--periods", "100000", "-o", "out", folder=tmp_path)

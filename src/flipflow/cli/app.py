@@ -99,11 +99,24 @@ def _options(
     """Dynamics, design and diagnosis of flip-flow vibrating screens."""
 
 
+def _commands() -> None:
+    """Read the command line and do what it says."""
+    try:
+        app()
+    except SystemExit as ended:
+        # So typer answers Ctrl-C while it reads the command line.
+        if ended.code != Cancelled.exit_code:
+            raise
+    except KeyboardInterrupt:
+        pass
+    raise Cancelled(f"{STOPPED}; {NOTHING}.")
+
+
 def run() -> None:
     """Run the command line; an error is one sentence on stderr and the exit code of its class."""
     try:
         try:
-            app()
+            _commands()
         finally:
             sys.stdout.flush()
     except FlipflowError as error:
@@ -117,8 +130,6 @@ def run() -> None:
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(StoreError.exit_code)
-    except KeyboardInterrupt:
-        sys.exit(130)
 
 
 def _say(sentence: str) -> None:
