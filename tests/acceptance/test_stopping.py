@@ -20,6 +20,7 @@ from flipflow.compiled.interruptible import interruptible
 from flipflow.errors import IncompleteError
 from flipflow.paper.page import write_figure
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.results.stage import Stage
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
 # Sends itself a signal while the command line loads what it is built with.
@@ -71,6 +72,27 @@ def test_while_the_command_line_is_read_it_is_a_sentence(command, monkeypatch, w
     monkeypatch.setattr(where, lambda *_, **__: os.kill(os.getpid(), number) or time.sleep(5.0))
     stopped = (130, "", "Stopped by the user; nothing is written.\n")
     assert command("check", "ffs0827") == stopped
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_a_signal_waits_while_files_take_their_places(command, monkeypatch, tmp_path, number):
+    """What stands there is told, never that nothing does."""
+    commit = Stage.commit
+
+    def interrupted(stage):
+        commit(stage)
+        os.kill(os.getpid(), number)
+        time.sleep(0.01)
+
+    monkeypatch.setattr(Stage, "commit", interrupted)
+    monkeypatch.chdir(tmp_path)
+    words = "simulate", "ffs0827", "--periods", "3", "-o", "out", "--json", "out.json"
+    code, _, error = command(*words)
+    assert (code, error) == (
+        130, "Stopped by the user; what was finished is in out and out.json.\n"
+    )  # fmt: skip
+    assert (tmp_path / "out.json").exists()
+    assert (tmp_path / "out" / "motion.html").exists()
 
 
 @pytest.mark.parametrize("number", BOTH)

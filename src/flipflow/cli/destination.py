@@ -13,6 +13,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
+from flipflow.cli.progress import held_back
 from flipflow.errors import Cancelled, FlipflowError, InputError, StoreError
 from flipflow.results.stage import Stage
 from flipflow.results.store import (
@@ -177,8 +178,9 @@ class Destination:
             When that cannot be; then every file is as it was.
         """
         if not self._kept:
-            self._stage.commit()
-            self._kept = True
+            with held_back():
+                self._stage.commit()
+                self._kept = True
             sys.stdout.write(self._answer)
 
     def wrote(self, *names: str) -> None:
