@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -152,3 +153,23 @@ def test_a_cluster_that_has_lost_all_workers_ends_the_study(tmp_path, monkeypatc
         assert list(run_chunks(client.get_executor(), slow, [(7, (str(tmp_path), 7))])) == [(7, 7)]
         with pytest.raises(ff.IncompleteError, match="lost all workers"):
             list(run_chunks(client.get_executor(), slow, tasks()))
+
+
+def test_ctrl_c_in_a_terminal_is_one_sentence(tmp_path):
+    """There it comes to the worker processes as well."""
+    (tmp_path / "wide.toml").write_text(
+        'machine = "ffs0827"\n[vary]\nclearance = "+-5 %"\n[study]\nsamples = 100000\n'
+        'quantities = ["relative_amplitude"]\n', encoding="utf-8",
+    )  # fmt: skip
+    run = subprocess.Popen(
+        [sys.executable, "-m", "flipflow", "study", "wide.toml", "--workers", "2"], cwd=tmp_path,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    end = time.monotonic() + 120.0
+    while not any(tmp_path.glob("wide.zarr/relative_amplitude/c.*")):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    os.killpg(run.pid, signal.SIGINT)
+    _, error = run.communicate(timeout=60.0)
+    assert run.returncode == 130
+    assert re.fullmatch(r"Stopped by the user; \d+ of \d+ chunks are in wide.zarr, and .*\n", error)

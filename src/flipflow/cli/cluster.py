@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -38,12 +39,29 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
         with _client(distributed, scheduler) as client:
             yield client.get_executor()
         return
-    cluster = distributed.LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0",
-        silence_logs=QUIET,
-    )  # fmt: skip
+    with _deaf_to_ctrl_c():
+        cluster = distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0",
+            silence_logs=QUIET,
+        )  # fmt: skip
     with cluster, distributed.Client(cluster) as client:
         yield client.get_executor()
+
+
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    """Have processes that are started in the block leave Ctrl-C to this one, which ends them.
+
+    A terminal sends it to all of them. Here it waits for the end of the block.
+    """
+    from multiprocessing import resource_tracker  # noqa: PLC0415  keeps --help quick
+
+    resource_tracker.ensure_running()  # which, started later, would let the signal through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _client(distributed: Any, scheduler: str) -> Any:
