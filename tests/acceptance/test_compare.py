@@ -135,6 +135,16 @@ def test_a_file_with_itself_differs_in_nothing(machine):
     assert set(same.names) == {"FFS0827 (A)", "FFS0827 (B)"}
 
 
+def test_inputs_in_other_units_do_not_differ(tmp_path):
+    """14.1666... Hz are 850 rpm but for the last digit."""
+    text = SMALL.read_text(encoding="utf-8")
+    for old, new in (("850 rpm", "14.166666666666666 Hz"), ("916 kg", "0.916 t")):
+        assert old in text
+        text = text.replace(f'"{old}"', f'"{new}"')
+    (tmp_path / "units.toml").write_text(text, encoding="utf-8")
+    assert ff.compare([SMALL, tmp_path / "units.toml"]).inputs == ()
+
+
 def test_machines_paths_and_projects_can_be_compared(machine, files):
     linear = machine.screen.replace(clearance=math.inf)
     found = ff.compare([machine.screen, linear, files / "six.toml"], omega=80.0)

@@ -33,6 +33,7 @@ READER = "flipflow.io.project"
 REMEDY = "give a list of at least two projects, screens or paths of machine files"
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 ROUNDING = 1e-9  # of a value: what the solution of one motion leaves open
+UNITS = 1e-14  # of a value: what writing it in another unit leaves open
 EMPTY = "empty machine"
 REGION = (
     ("omega_cs", "contact begins (w_cs)"),
@@ -273,8 +274,15 @@ def _differences(keys: Mapping[str, None], flat: Sequence[Flat]) -> Iterator[Inp
     for key in keys:
         unit, shown_unit, _ = next(inputs[key] for inputs in flat if key in inputs)
         values = tuple(inputs[key][2] if key in inputs else None for inputs in flat)
-        if any(value != values[0] for value in values):
+        if not all(_same(value, values[0]) for value in values):
             yield InputDifference(key, unit, shown_unit, values)
+
+
+def _same(one: Given, other: Given) -> bool:
+    """Whether two inputs are one; 6 mm and 0.6 cm are, whatever the units leave in rounding."""
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=UNITS)
+    return one == other
 
 
 def _inputs_of(project: Project) -> Flat:
