@@ -171,6 +171,19 @@ def test_m1_is_the_least_and_the_greatest_within_the_region(reproduction):
     close("loaded contact", found[start], 92.534, abs=5e-4)
 
 
+def test_m4_draws_both_lines_over_regions_of_one_kind(reproduction, stiffened):
+    found = numbers(reproduction, "M4")
+    for name, machine in (("with", stiffened.with_stop), ("without", stiffened.without_stop)):
+        for whose, region in (("unloaded", machine.region), ("loaded", machine.from_loaded)):
+            lines = {
+                "ends": region.line_through_ends,
+                "least squares": region.line_of_least_squares,
+            }
+            for how, line in lines.items():
+                what = f"region of the {whose} machine, {how}, intercept, {name} stop"
+                close(what, found[what], 1e3 * line.intercept, rel=1e-9)
+
+
 def test_what_is_found_beyond_the_paper_is_no_claim(reproduction):
     """Rows 25 and 34 of the trusted values; V1g was never the paper's."""
     assert "V1g" not in verdicts(reproduction)

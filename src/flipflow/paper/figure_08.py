@@ -218,17 +218,17 @@ def straight_lines(data: Loads) -> Evaluation:
     machine, bare = data.loading.with_stop, data.loading.without_stop
     if machine is None or machine.unloaded_marks.omega_cs is None:
         return undecided(NO_STOP)
-    ways = [("region of the unloaded machine", machine.region)]
-    if machine.from_loaded is not None:
-        ways.append(("region of the loaded machine", machine.from_loaded))
+    ways = [("region of the unloaded machine", machine.region, bare.region)]
+    if machine.from_loaded is not None and bare.from_loaded is not None:
+        ways.append(("region of the loaded machine", machine.from_loaded, bare.from_loaded))
     parts: list[Part] = []
     numbers: dict[Name, Number] = {}
-    for way, region in ways:
+    for way, *regions in ways:
         for how in ("ends", "least squares"):
             row = f"{way}, {how}"
             stopped, free = (
                 one.line_through_ends if how == "ends" else one.line_of_least_squares
-                for one in (region, bare.region)
+                for one in regions
             )
             for name, line in (("with stop", stopped), ("without stop", free)):
                 numbers[row, f"intercept, {name}"] = Number(MM * line.intercept, "mm")
