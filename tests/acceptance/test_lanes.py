@@ -262,3 +262,19 @@ def test_a_machine_that_always_touches_comes_from_below_to_a_single_speed():
     below = ff.frequency_response(machine, (0.23, 6.0)).orbit_from_below(5.48)
     found = ff.study(machine, {"forcing": [1.0, 1.001]}, "amplitude[0]", [5.48])
     close("at once", found.values["amplitude[0]"][0, 0, 0], below.amplitude(0), rel=1e-7)
+
+
+@pytest.mark.parametrize("law", ["compression-only", "elasto-gap"])
+def test_a_small_motion_far_from_zero_is_as_exact_as_one_about_it(law):
+    K = np.array([[2.0, -1.0], [-1.0, 1.5]])
+    static = np.array([1200.0, 0.0])
+    gap = float(np.linalg.solve(K, static)[0])
+    stop = ff.ClearanceSpring([1.0, 0.0], 100.0, 5.0, gap, np.inf, law=law)
+    machine = ff.MechanicalSystem(
+        np.diag([1.0, 0.7]), 0.05 * K, K, [stop], ff.HarmonicForce([0.0, 1e-3]), static_force=static
+    )
+    omega = np.array([0.5, 0.9, 2.2])
+    found = ff.study(machine, {"forcing": np.array([0.9, 1.0])}, "amplitude[0]", omega)
+    branch = ff.frequency_response(machine, (0.2, 3.0))
+    own = [branch.orbit_from_below(at).amplitude(0) for at in omega]
+    assert found.values["amplitude[0]"][1, 0] == pytest.approx(own, rel=1e-6)

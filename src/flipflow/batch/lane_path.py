@@ -38,6 +38,7 @@ from flipflow.periodic.turn_by_turn import next_turn
 
 NEWTON_MOST = 8
 CONVERGED = 1e-9  # last Newton step, as a share of the motion; the error left is about its square
+HELD = 1e-13  # the same where a constant force holds the machine far from where it moves about
 DIVERGED = 1e3  # Newton step, as a share of the motion, from which none follows
 FAR = 0.1  # first Newton step along a path, as a share of the motion: farther lies another motion
 FAR_FROM_GUESS = 0.3  # the same from the motion of another machine
@@ -123,9 +124,8 @@ def is_even(machine: MachineArrays) -> bool:
     for j in range(machine.stops.gap.shape[0]):
         if machine.stops.gap[j, 0] != machine.stops.gap[j, 1]:
             return False
-    for k in range(machine.static.shape[0]):
-        if machine.static[k] != 0.0:
-            return False
+    if is_held(machine):
+        return False
     for w in range(machine.order.shape[0]):
         even = machine.order[w] % 2 == 0
         if even:
@@ -134,14 +134,26 @@ def is_even(machine: MachineArrays) -> bool:
 
 
 @kernel
+def is_held(machine: MachineArrays) -> bool:
+    """Whether a constant force acts on the machine."""
+    held = False
+    for k in range(machine.static.shape[0]):
+        held = held or machine.static[k] != 0.0
+    return held
+
+
+@kernel
 def newton(problem: Shooting, work: LaneWork, omega: float, far: float) -> int:
     """The motion at omega from work.guess: work.z, its flow recorded, J, slope, Newton steps.
 
-    None is looked for where the first step, as a share of the motion, is ``far`` or more.
+    None is looked for where the first step, as a share of the motion, is ``far`` or more. Of a
+    machine under a constant force the motion may be a small part of the state: one step more is
+    taken there where the last one was not as small as rounding.
     """
     size = work.z.shape[0]
     for k in range(size):
         work.z[k] = work.guess[k]
+    again = is_held(problem.machine)
     for iteration in range(NEWTON_MOST):
         code = newton_step(problem, work, omega)
         if code != status.OK:
@@ -150,7 +162,10 @@ def newton(problem: Shooting, work: LaneWork, omega: float, far: float) -> int:
             return status.NO_CONVERGENCE
         # A guess that is taken as it is has to be right beside a small motion, too.
         right = iteration > 0 or work.step[1] < CONVERGED * work.step[2]
-        if right and work.step[0] < CONVERGED:
+        converged = right and work.step[0] < CONVERGED
+        if converged and again and work.step[0] > HELD and iteration + 1 < NEWTON_MOST:
+            again, converged = False, False
+        if converged:
             for k in range(size):
                 work.slope[k] = -work.J[k, size]
             lu_solve(work.A, work.pivot, work.slope)
