@@ -278,3 +278,18 @@ def test_a_small_motion_far_from_zero_is_as_exact_as_one_about_it(law):
     branch = ff.frequency_response(machine, (0.2, 3.0))
     own = [branch.orbit_from_below(at).amplitude(0) for at in omega]
     assert found.values["amplitude[0]"][1, 0] == pytest.approx(own, rel=1e-6)
+
+
+def test_a_machine_that_rests_on_a_stop_is_brought_up_from_below():
+    stops = [
+        ff.ClearanceSpring([1.0], 1.0, 0.02, 0.5, np.inf, law="elasto-gap"),
+        ff.ClearanceSpring([1.0], 10.0, 0.0, 1.35, 1.0),
+    ]
+    machine = ff.MechanicalSystem(
+        [[1.0]], [[0.04]], [[1.0]], stops, ff.HarmonicForce([0.03]), static_force=[2.0]
+    )
+    branch = ff.frequency_response(machine, (0.3, 4.0))
+    for omega in np.linspace(1.53, 1.79, 9):  # between the folds, each speed by itself
+        found = ff.study(machine, {"forcing": np.array([0.99, 1.0])}, "amplitude[0]", omega)
+        own = branch.orbit_from_below(omega).amplitude(0)
+        assert found.values["amplitude[0]"][1, 0, 0] == pytest.approx(own, rel=1e-6)

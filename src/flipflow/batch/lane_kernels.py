@@ -36,6 +36,7 @@ from flipflow.periodic.shooting import Shooting
 
 BEHIND = 1e-3  # share of a frequency at which a motion ends, behind which the next one is sought
 LEAPS = 8  # from motion to motion on the way to one frequency
+OCTAVES_BELOW = 4  # below a frequency at which a machine that rests on a stop is let settle first
 OCTAVES = 3  # away from a frequency at which a machine is let settle where it does not there
 
 
@@ -120,6 +121,8 @@ def run_lane(
                 half = even
                 problem = problem_of(machine, half, length)
                 begun = start_without_contact(problem, work, omega[f], rising)
+            if not begun and rising and f == 0:
+                begun, half = start_far_below(machine, work, omega[f], length, even)
         reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
         if begun and not lost and not reached:
             jumps += 1
@@ -160,6 +163,22 @@ def start_without_contact(problem: Shooting, work: LaneWork, omega: float, risin
     if not at > 0.0 or not contact_free_state(machine, work, at):
         return False
     return begun(problem, work, at, FAR)
+
+
+@kernel
+def start_far_below(
+    machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool
+) -> tuple[bool, bool]:
+    """Begin the path far below omega with what a machine settles into that rests on a stop.
+
+    From rest at omega it may settle into a motion that it is not brought to from below.
+    """
+    for k in range(OCTAVES_BELOW, 0, -1):
+        reached, half = settled(machine, work, omega * 2.0 ** (-k), length, even)
+        if reached:
+            return True, half
+        forget_path(work, 0)
+    return False, even
 
 
 @kernel
