@@ -230,7 +230,10 @@ def test_what_is_no_store(tmp_path):
         ({"sampling": ff.Sample(n=256, seed=1)}, "sample.seed is 0 there and 1 here"),
         ({"sampling": ff.Sample(n=512)}, "sample.n is 256 there and 512 here"),
         ({"branch": "upper"}, "branch is from-below there and upper here"),
-        ({"load_cases": [ff.Load(name="full", floating_mass=10.0)]}, "load_cases"),
+        ({"load_cases": [ff.Load(name="full", floating_mass=10.0)]},
+         "load_cases[0].floating_mass is 0.0 there and 10.0 here"),
+        ({"load_cases": [ff.Load(), ff.Load(name="full", floating_mass=10.0)]},
+         "length of load_cases is 1 there and 2 here"),
     ],
 )  # fmt: skip
 def test_other_inputs_are_refused_with_the_difference(copy, whole, changes, words):
@@ -238,6 +241,19 @@ def test_other_inputs_are_refused_with_the_difference(copy, whole, changes, word
         study(copy, **changes)
     assert words in str(refused.value)
     assert files(copy) == files(whole)
+
+
+def test_the_load_or_the_speed_that_differs_is_named_in_a_long_list(tmp_path):
+    speeds = np.linspace(60.0, 89.0, 30)
+    loads = [ff.Load(name="full", floating_mass=10.0), ff.Load(name="wet", floating_mass=20.0)]
+    words = {"sampling": ff.Sample(n=2), "load_cases": loads}
+    screen, folder = ff.load("ffs0827-linear"), tmp_path / "s"
+    ff.study(screen, VARY, "stroke", speeds, store=folder, **words)
+    with pytest.raises(StoreError, match=r"omega\[29\] is 89.0 there and 90.0 here; name"):
+        ff.study(screen, VARY, "stroke", [*speeds[:-1], 90.0], store=folder, **words)
+    words["load_cases"] = [loads[0], ff.Load(name="wet", floating_mass=30.0)]
+    with pytest.raises(StoreError, match=r"load_cases\[1\].floating_mass is 20.0 there and 30.0"):
+        ff.study(screen, VARY, "stroke", speeds, store=folder, **words)
 
 
 def test_another_version_is_refused(copy, monkeypatch):

@@ -323,6 +323,11 @@ def _differences(kept: object, now: object, path: str) -> Iterator[str]:
         for name in dict.fromkeys((*kept, *now)):
             within = f"{path}.{name}" if path else str(name)
             yield from _differences(kept.get(name, "none"), now.get(name, "none"), within)
+    elif isinstance(kept, list) and isinstance(now, list):
+        if len(kept) != len(now):
+            yield f"length of {path} is {len(kept)} there and {len(now)} here"
+        for k, (one, other) in enumerate(zip(kept, now, strict=False)):
+            yield from _differences(one, other, f"{path}[{k}]")
     elif kept != now:
         yield f"{path} is {_brief(kept)} there and {_brief(now)} here"
 
