@@ -256,6 +256,18 @@ def test_the_load_or_the_speed_that_differs_is_named_in_a_long_list(tmp_path):
         ff.study(screen, VARY, "stroke", speeds, store=folder, **words)
 
 
+def test_the_value_of_a_list_that_differs_is_named(tmp_path):
+    screen, folder = ff.load("ffs0827-linear"), tmp_path / "s"
+    vary = {"main_mass": np.array([900.0, 910.0]), "floating_mass": np.array([300.0, 301.0])}
+    words = {"sampling": "list", "store": folder}
+    ff.study(screen, vary, "stroke", 60.0, **words)
+    other = vary | {"main_mass": np.array([900.0, 911.0])}
+    with pytest.raises(StoreError, match=r"values.main_mass\[1\] is 910.0 there and 911.0 here; n"):
+        ff.study(screen, other, "stroke", 60.0, **words)
+    with pytest.raises(StoreError, match=r"fields\[0\] is main_mass there and floating_mass here"):
+        ff.study(screen, dict(reversed(vary.items())), "stroke", 60.0, **words)
+
+
 def test_another_version_is_refused(copy, monkeypatch):
     monkeypatch.setattr("flipflow.studies.study_plan.__version__", "9.0.0")
     with pytest.raises(StoreError, match=r"flipflow is 0\.1\.0 there and 9\.0\.0 here"):

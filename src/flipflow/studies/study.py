@@ -48,6 +48,7 @@ from flipflow.studies.study_plan import (
     plan_from,
     plan_of,
     refuse_other,
+    refuse_other_study,
 )
 
 Words = NDArray[np.str_]
@@ -250,7 +251,7 @@ def study(
         folder = checked_path("store", store)
         if folder.exists():
             kept = ChunkStore(folder)
-            refuse_other(kept.manifest, plan.manifest, folder)
+            refuse_other_study(kept, plan)
         else:
             create_store(folder, plan.layout(_references(plan, pool, tell)))
             kept = ChunkStore(folder)

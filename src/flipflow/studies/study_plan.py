@@ -318,6 +318,26 @@ def refuse_other(
         )
 
 
+def refuse_other_study(store: ChunkStore, plan: Plan) -> None:
+    """See that a store is one of a plan.
+
+    Raises
+    ------
+    StoreError
+        As :func:`refuse_other`; of a list the values that differ are named, not their digest.
+    """
+    kept, now = dict(store.manifest), dict(plan.manifest)
+    if kept.get("sampling") == now["sampling"] == "list":
+        there = {name: store.read(name) for name in kept["vary"]}
+        refuse_other(kept | _machines(there), now | _machines(plan.design.columns), store.folder)
+    refuse_other(kept, now, store.folder)
+
+
+def _machines(columns: Columns) -> dict[str, Any]:
+    """The machines of a list as a document tells them."""
+    return {"fields": list(columns), "values": {k: v.tolist() for k, v in columns.items()}}
+
+
 def _differences(kept: object, now: object, path: str) -> Iterator[str]:
     if isinstance(kept, Mapping) and isinstance(now, Mapping):
         for name in dict.fromkeys((*kept, *now)):
