@@ -497,3 +497,23 @@ def test_gaps_that_are_grazed_at_once_at_the_start_alone() -> None:
     alone = omega[other >= 2.0]
     close("untouched on the other side", alone, np.full_like(alone, point.omega), rel=1e-9)
     assert omega[other < 1.9].min() > point.omega
+
+
+@pytest.mark.parametrize(
+    ("name", "bounds"), [("springs[0].stiffness", (15.0, 60.0)), ("forcing", (0.8, 1.2))]
+)
+def test_a_doubling_at_which_multipliers_jump_is_a_grazing(name, bounds) -> None:
+    """A law that kicks on entry: no motion has the multiplier -1 where the stop begins to act."""
+    stop = ff.ClearanceSpring([1.0], 30.0, 2.0, 1.0, np.inf, law="compression-only")
+    machine = ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], [stop], ff.HarmonicForce([5.76]))
+    branch = ff.frequency_response(machine, (2.2, 4.0))
+    point = branch.points_of("period doubling")[-1]
+    assert np.abs(point.orbit.multipliers + 1.0).min() > 0.1
+    curve = ff.continue_bifurcation(point, (name, "omega"), (bounds, (2.0, 5.0)))
+    assert curve.status is ff.BranchStatus.FOLLOWED
+    assert curve.special_points == ()
+    assert "the curve is that of the grazing" in curve.notes[0]
+    # Without contact the amplitude is the gap: F = ((1 - w^2)^2 + (c w)^2)^(1/2).
+    force = 5.76 * (curve.along(name) if name == "forcing" else 1.0)
+    free = np.hypot(1.0 - curve.omega**2, 0.06 * curve.omega)
+    np.testing.assert_allclose(free, force, rtol=1e-9)

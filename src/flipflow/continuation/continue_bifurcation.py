@@ -50,9 +50,12 @@ TESTS = {
     FOLD: SADDLE_NODE, SYMMETRY: FLIP, DOUBLING: FLIP, NEIMARK_SACKER: PAIR,
     CONTACT_BEGIN: GRAZING, CONTACT_END: GRAZING,
 }  # fmt: skip
-CRITICAL = 1e-3  # distance of a multiplier from 1 beyond which a fold is none of the map
+CRITICAL = (
+    1e-3  # distance of multipliers from critical ones beyond which a point is none of the map
+)
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
 FINE = 20.0  # steps in each of these intervals
+NEAR = 1e-6  # share of the bounds within which a motion with that multiplier is looked for
 GRAZED = 1e-6  # depth beyond a gap that a motion grazes, as a share of the motion
 BEFORE_GRAZING = 1e-4  # the same, from which a curve that stalls is held to end at it
 AT_CORNER = (
@@ -64,6 +67,11 @@ AT_LOWER_CORNER = (
     "The fold lies where the branch has a corner, because a stop that is touched already in the "
     "turn begins to be touched once more: it is no fold of the return map, and its curve cannot be "
     "followed."
+)
+
+AT_JUMP = (
+    "The multipliers jump past their critical value where a contact begins: the curve is that of "
+    "the grazing, and a {kind} as long as they jump past it there."
 )
 
 
@@ -119,11 +127,12 @@ def continue_bifurcation(
     say = checked_monitor(monitor)
     names = _checked_names(parameters)
     plane = _plane(point.orbit, names, bounds)
-    followed = _followed(point, plane, say)
+    jumps = _jumps(point, plane)
+    followed = _followed(point, plane, say, grazing=jumps)
     if followed.status is BranchStatus.NO_START and not plane.over_omega:
         # Where the first parameter stands still at the start, only the other one can be held there.
         plane = plane.turned
-        followed = _followed(point, plane, say)
+        followed = _followed(point, plane, say, grazing=jumps)
     turned = names != plane.names
     kind = GRAZES if point.kind in (CONTACT_BEGIN, CONTACT_END) else point.kind
     return BifurcationCurve(
@@ -303,14 +312,34 @@ def _plane(orbit: Orbit, names: tuple[str, str], bounds: object) -> Plane:
     return Plane(orbit.machine, (first, second), (own, at), (within, beside))
 
 
-def _followed(point: SpecialPoint, plane: Plane, say: Monitor) -> Followed:
-    """The curve through a special point, and the special points on it."""
+def _jumps(point: SpecialPoint, plane: Plane) -> bool:
+    """Whether multipliers jump past their critical value at a grazing: no motion has it itself."""
+    test = TESTS[point.kind]
+    if test not in (FLIP, PAIR) or _is_critical(point.orbit.point, test):
+        return False
+    if _grazed(*_exact_start(point)) is None:
+        return False
+    # Before a hard stop a motion that has it may lie hardly beyond grazing.
+    close = [
+        (max(low, own - NEAR * (high - low)), min(high, own + NEAR * (high - low)))
+        for own, (low, high) in zip(plane.own, plane.bounds, strict=True)
+    ]
+    found = _followed(
+        point, replace(plane, bounds=(close[0], close[1])), lambda _words, _share: None
+    )
+    return not any(_is_critical(one.point, test) for one in found.orbits)
+
+
+def _followed(
+    point: SpecialPoint, plane: Plane, say: Monitor, *, grazing: bool = False
+) -> Followed:
+    """The curve through a special point, or of its grazing, and the special points on it."""
     orbit, over_omega = point.orbit, plane.over_omega
     own = orbit.point.formulation
     half_turn = own.half_turn and plane.stays_symmetric
     if point.kind == SYMMETRY and not half_turn:
         raise InputError("parameters", plane.names, "the machine must stay its own mirror image")
-    test, gap, start, notes = _sought(point)
+    test, gap, start, notes = _grazing(point) if grazing else _sought(point)
     sought = Sought(test, gap) if over_omega else Sought(test, gap, plane.bounds[1], plane.own[1])
     u = np.append(start.u, start.omega if over_omega else plane.own[1])
     at_once = _grazed_at_once(start, gap) if test == GRAZING else ()
@@ -419,10 +448,8 @@ def _where_it_holds(solver: FieldSolver, traced: Traced, plane: Plane) -> slice:
 def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
     """Test and gap of a special point, the motion to start from, and what must be said."""
     orbit, test = point.orbit, TESTS[point.kind]
-    # An exact motion, whatever the method that found the point.
     own = orbit.point.formulation
-    exact = ExactSolver(own.system, half_turn=own.half_turn, turns=own.turns)
-    start = Point(exact.formulation, orbit.state, orbit.omega)
+    start, exact = _exact_start(point)
     if test == GRAZING:
         return test, 2 * point.spring + (0 if point.side > 0 else 1), start, []
     if test != SADDLE_NODE or _is_critical(orbit.point):
@@ -435,8 +462,29 @@ def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
     return (GRAZING, gap, start, [AT_CORNER]) if beside is None else (test, 0, beside, [])
 
 
-def _is_critical(point: Point) -> bool:
-    return bool(np.abs(point.eigenvalues - 1.0).min() < CRITICAL)
+def _exact_start(point: SpecialPoint) -> tuple[Point, ExactSolver]:
+    """An exact motion, whatever the method that found the point."""
+    orbit = point.orbit
+    own = orbit.point.formulation
+    exact = ExactSolver(own.system, half_turn=own.half_turn, turns=own.turns)
+    return Point(exact.formulation, orbit.state, orbit.omega), exact
+
+
+def _grazing(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
+    """As :func:`_sought`, of the grazing at which multipliers jump."""
+    start, exact = _exact_start(point)
+    return GRAZING, _grazed(start, exact) or 0, start, [AT_JUMP.format(kind=point.kind)]
+
+
+def _is_critical(point: Point, test: int = SADDLE_NODE) -> bool:
+    """Whether eigenvalues of the map are those that a test looks for."""
+    mu = point.eigenvalues
+    if test == PAIR:
+        i, j = np.triu_indices(mu.size, 1)
+        off = mu[i] * mu[j] - 1.0
+    else:
+        off = mu - 1.0 if test == SADDLE_NODE else mu + 1.0
+    return bool(np.abs(off).min() < CRITICAL)
 
 
 def _fold_beside(point: Point, solver: ExactSolver) -> Point | None:
