@@ -137,6 +137,7 @@ def test_a_fold_that_moves_through_the_speed_is_a_share_that_jumps(screen):
     first, second = (row for row in rows if row[0] == "relative amplitude")
     assert (first[1], second[1]) == ("empty", "empty, jumped")
     assert (int(first[-1]), int(second[-1])) == ((~beyond).sum(), beyond.sum())
+    assert first[2] != "-" == second[2]  # the nominal machine has not jumped
     assert {row[1] for row in rows if row[0] == "upper jump speed"} == {"empty"}
     assert "counted, the rest have none" not in spread_table(found).caption
     values = dict(found.values)

@@ -213,12 +213,20 @@ def spread_table(found: Study) -> Table:
         one = quantity_named(name, found.machine)
         for c, case in enumerate(found.cases):
             for words, values in _groups(found, one, c):
-                nominal = np.atleast_1d(found.nominal[name][c])[0]
-                numbers = [nominal, *_quantiles(values)]
+                numbers = [_nominal(found, one, c, jumped=bool(words)), *_quantiles(values)]
                 texts = [_value(one, float(x)) for x in numbers]
                 rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
     title = f"What the machines do{speed_in_words(found.omega[0])}"
     return Table(title, columns, tuple(rows), " ".join(_spread_words(found)))
+
+
+def _nominal(found: Study, one: Quantity, case: int, *, jumped: bool) -> float:
+    """The value of the machine itself; NaN where it lies on the other side of the jump."""
+    own = float(np.atleast_1d(found.nominal[one.name][case])[0])
+    if one.of == "response" or not all(name in found.values for name in FOLDS):
+        return own
+    end = found.nominal[FOLDS[0] if found.branch == "lower" else FOLDS[1]][case]
+    return own if jumped == bool(found.omega[0] > end) else np.nan
 
 
 def _spread_words(found: Study) -> Iterator[str]:
