@@ -120,3 +120,15 @@ def test_a_fold_at_a_corner_stands_where_the_motion_without_contact_grazes():
     branch = ff.frequency_response(machine, (0.7, 0.9))
     (end,), fold = branch.points_of("contact end"), branch.folds[-1]
     assert [end.omega, fold.omega] == pytest.approx([grazing, grazing], abs=1e-10)
+
+
+@pytest.mark.parametrize("force", [0.6, 0.9])
+def test_where_a_contact_that_hardly_lasts_ends(force) -> None:
+    """Samples within it are as high as its summit; without contact the amplitude is the gap."""
+    stop = ff.ClearanceSpring([1.0], 80.0, 8.0, 1.0, law="compression-only")
+    machine = ff.MechanicalSystem([[1.0]], [[0.2]], [[1.0]], [stop], ff.HarmonicForce([force]))
+    (point,) = ff.frequency_response(machine, (0.2, 4.0)).points_of("contact end")
+    # force^2 = (1 - w^2)^2 + (0.2 w)^2
+    w = point.omega
+    slope = 2.0 * force**2 / (-4.0 * w * (1.0 - w**2) + 0.08 * w)
+    assert point.sensitivity(["forcing"]) == pytest.approx([slope], rel=1e-7)

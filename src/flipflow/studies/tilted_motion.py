@@ -475,7 +475,9 @@ class TiltedMotion:
 
         a, b = sorted((float(t[k]), float(t[other])))
         if values[k, -1].imag * values[other, -1].imag > 0.0:
-            return np.asarray(values[k])
+            # Within a contact that hardly lasts, samples are as high and no summits yet.
+            level = abs(values[other, 0].real - values[k, 0].real) <= TIED * abs(values[k, 0].real)
+            return self._climbed(formula, values, other) if level else np.asarray(values[k])
         at = float(brentq(rate, a, b, xtol=1e-15 * self.period, rtol=1e-14))
         return np.asarray(formula(self._path(np.array([at]), piece[k : k + 1]))[0])
 
