@@ -128,10 +128,9 @@ def run_lane(
             jumps += 1
             reached, half = leapt(machine, work, omega[f], length, even, half)
         if not reached:
-            if f == 0:
-                reached, half = first(machine, work, omega[f], length, even, rising, begun)
-            else:
-                reached, half = settled(machine, work, omega[f], length, even)
+            reached, half = settled(machine, work, omega[f], length, even)
+            if f == 0 and not reached:
+                reached, half = led(machine, work, omega[f], length, even, rising)
             lost = not reached
         found.jumps[lane, f] = jumps
         if reached:
@@ -228,30 +227,13 @@ def leapt(
 
 
 @kernel
-def first(
-    machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool, rising: bool,
-    begun: bool,
-) -> tuple[bool, bool]:  # fmt: skip
-    """A motion at the first frequency that no path led to, as ``settled``.
-
-    Where none had begun, as of a machine that always touches, it is led to from farther off: from
-    rest at omega the machine may settle into another motion than one brought there slowly.
-    """
-    reached, half = False, even
-    if not begun:
-        reached, half = led(machine, work, omega, length, even, rising)
-    if not reached:
-        reached, half = settled(machine, work, omega, length, even)
-    if begun and not reached:
-        reached, half = led(machine, work, omega, length, even, rising)
-    return reached, half
-
-
-@kernel
 def led(
     machine: MachineArrays, work: LaneWork, omega: float, length: float, even: bool, rising: bool
 ) -> tuple[bool, bool]:
-    """Begin with what the machine settles into farther off, followed to omega, as ``settled``."""
+    """Begin with what the machine settles into farther off, followed to omega, as ``settled``.
+
+    From rest at omega it may settle into a motion of several turns beside one of a single turn.
+    """
     for k in range(1, OCTAVES + 1):
         reached, half = settled(machine, work, omega * 2.0 ** (-k if rising else k), length, even)
         if reached and follow(problem_of(machine, half, length), work, omega):
