@@ -193,6 +193,17 @@ def test_a_motion_that_only_leaves_an_unstable_one_is_not_chaotic():
     assert abs(away.state[0]) > 0.1
 
 
+def test_what_passes_by_a_fold_is_not_chaotic(screen):
+    """FFS0827 takes thousands of turns where its large motion has just ceased to exist."""
+    branch = ff.frequency_response(screen, (150.0, 250.0))
+    fold = max(point.omega for point in branch.folds)
+    upper = max(branch.orbits_at(fold - 1e-3), key=lambda orbit: orbit.amplitude("relative"))
+    speeds = fold + np.array([-1e-5, -1e-7, 1e-7, 1e-5])
+    passing = ff.sweep(screen, speeds, initial=upper)
+    assert not passing.settled.any()
+    assert passing.words[-1] == "undecided"
+
+
 def test_a_mode_that_grows_beyond_all_bounds_is_not_chaotic():
     """One that a force shakes, and one that no force shakes, which grows out of rounding."""
     stop = ff.ClearanceSpring([1.0, 0.0], 29.0, 0.1, 1.0, np.inf)

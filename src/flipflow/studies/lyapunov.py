@@ -101,8 +101,8 @@ def lyapunov_exponents(
     - "quasi-periodic" where the growth of the leading tangent keeps within bounds: over the whole
       run it ranges no more than twice as far as over a sixteenth of it;
     - "chaotic" where the largest exponent lies more than four standard errors above 0, and
-      disturbances have grown more than ten times as much as the motion itself, and as its way from
-      an unstable periodic motion that it leaves;
+      disturbances have grown more than ten times as much as the motion's own steps over some
+      turns: one that only leaves an unstable periodic motion grows as its steps do;
     - "undecided" otherwise: ask for more periods.
 
     A chaotic motion that ends only after more periods than were asked for is called chaotic.

@@ -40,7 +40,8 @@ STRETCHES = 16  # of the growth, whose ranges tell whether it stays within bound
 WITHIN_BOUNDS = 2.0
 PERIODS = 2048  # forcing periods followed for a word, after
 ALIGNING = 256  # those in which the frame turns into the directions that grow most
-AWAY = 10.0  # times as much as the way from what is left may disturbances of it grow
+DRIFT = 10.0  # times as much as the motion's own steps may disturbances of a drift grow
+MOST_GROWTH = 500.0  # logarithm of a growth that no drift shows
 MOST_PARTS = 4096  # times a period that the frame may have to be made orthonormal
 
 
@@ -89,7 +90,7 @@ class Growth:
         largest, error = self.exponents[0], CERTAIN * self.standard_error[0]
         bounded = self._within_bounds()
         if largest > error and not bounded:
-            return UNDECIDED if self._drives_away(settling) else CHAOTIC
+            return UNDECIDED if self._drifts(settling) else CHAOTIC
         near = settling.approached(self.recent, self.omega)
         # Growth seems to stay within bounds, too, where a periodic motion is come to slowly.
         if bounded and near is None:
@@ -103,21 +104,17 @@ class Growth:
         first, last = (settling.distance_from(near, z) for z in (self.first, self.recent[-1]))
         return last < 0.5 * first
 
-    def _drives_away(self, settling: Settling) -> bool:
-        """Whether disturbances grow no more than the way from what is unstable does by itself.
+    def _drifts(self, settling: Settling) -> bool:
+        """Whether disturbances grow no more than the motion's own steps over some turns do.
 
-        That is a periodic motion which is only being left, or rest, from which a motion grows
-        beyond all bounds. What it comes to is not seen yet.
+        They do as these where an unstable periodic motion is left, where one has just ceased to
+        exist at a fold, and where a motion grows beyond all bounds. What comes of it is not seen.
         """
-        ends, omega = (self.first, self.recent[-1]), self.omega
-        ways = [[settling.size(z[None], omega) for z in ends]]
-        point = settling.near_ahead(self.first, omega)
-        if point is not None:
-            ways.append([settling.distance_from(point, z) for z in ends])
-        growth = float(self.growth[:, 0].sum())
-        return any(
-            0.0 < first < last and growth <= math.log(AWAY * last / first) for first, last in ways
-        )
+        first, last = (settling.steps_from(z, self.omega) for z in (self.first, self.recent[-1]))
+        if not first.size == last.size > 0:
+            return False
+        growth = min(float(self.growth[:, 0].sum()), MOST_GROWTH)
+        return bool((last >= first * (math.exp(growth) / DRIFT)).any())
 
     def _within_bounds(self) -> bool:
         """Whether the leading growth keeps within the bounds that a short stretch of it shows."""

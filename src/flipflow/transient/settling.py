@@ -149,11 +149,6 @@ class Settling:
 
     def approached(self, recent: Real, omega: float) -> Point | None:
         """The stable periodic motion near the last of the recent states (K, 2 N)."""
-        point = self.near(recent, omega)
-        return point if point is not None and is_stable(point) else None
-
-    def near(self, recent: Real, omega: float) -> Point | None:
-        """The periodic motion near the last of the recent states (K, 2 N), stable or not."""
         last = recent[-1]
         size = self.size(recent, omega)
         steps = [
@@ -168,7 +163,8 @@ class Settling:
         if point is None or self.distance(last, point.u, omega) > NEAR * size:
             return None
         # A spiral may come closer to itself after some turns than after one.
-        return self.shortest(point)
+        point = self.shortest(point)
+        return point if is_stable(point) else None
 
     def phases(self, point: Point) -> Real:
         """States of a motion after 1, 2, ... all of its forcing periods, the last its own."""
@@ -197,10 +193,10 @@ class Settling:
         point = self.ended_on(np.concatenate([z[None], ahead]), omega)
         return None if point is None else self.distance_from(point, z)
 
-    def near_ahead(self, z: Real, omega: float) -> Point | None:
-        """The periodic motion that the machine is near to soon after z, stable or not."""
-        ahead = self._run(z, omega, 2 * self.max_periods)
-        return None if ahead is None else self.near(np.concatenate([z[None], ahead]), omega)
+    def steps_from(self, z: Real, omega: float) -> Real:
+        """Distances in m between the state z and those 1, 2, ... max_periods turns later."""
+        ahead = self._run(z, omega, self.max_periods)
+        return np.array([self.distance(one, z, omega) for one in ([] if ahead is None else ahead)])
 
     def distance_from(self, point: Point, z: Real) -> float:
         """Distance in m of the state z from a periodic motion."""
