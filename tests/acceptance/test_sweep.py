@@ -11,6 +11,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.errors import Cancelled
+from flipflow.plotting.sweep import sweep_figure
 from judge import close
 
 pytestmark = pytest.mark.numerical
@@ -208,3 +209,14 @@ def test_the_greatest_amplitude_is_one_that_is_known(command, tmp_path):
     code, out, err = command("sweep", tmp_path / "hard.toml", *speeds, "--force")
     assert code == 0, err
     assert re.search(r"greatest relative amplitude 0\.001\d* mm at 850 rpm", out), out
+
+
+def test_a_sweep_is_drawn_where_no_branch_was_found(screen):
+    """The command ended with the branch's failure, and the sweep that had ended was lost."""
+    hard = screen.replace(
+        stop_stiffness=1e14, stop_damping=1e4, clearance=1e-6, stop_law="elasto-gap"
+    )
+    branch = ff.frequency_response(hard, (20.9, 89.0))
+    assert branch.omega.size == 0
+    figure = sweep_figure((ff.sweep(hard, np.array([20.9, 30.0])),), branch)
+    assert branch.status.value in figure.caption

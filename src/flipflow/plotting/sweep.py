@@ -48,7 +48,7 @@ def sweep_figure(
         raise InputError("sweeps", "none", "give at least one")
     chosen = coordinates(sweeps[0].system, which)[-1]
     traces: list[Trace] = []
-    if branch is not None:
+    if branch is not None and branch.omega.size > 0:
         traces += underlay(branch, chosen)
     for k, sweep in enumerate(sweeps):
         traces += _swept(sweep, chosen, k + 1)
@@ -59,10 +59,13 @@ def sweep_figure(
         speed_axis(omega), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * float(top))),
         traces=tuple(traces),
     )  # fmt: skip
-    caption = (
-        "Symbols: what the machine settles to, each speed reached from the one before. Solid: "
-        "motions that return after a small disturbance; dashed: motions that do not."
-    )
+    caption = "Symbols: what the machine settles to, each speed reached from the one before."
+    if branch is not None and branch.omega.size == 0:
+        caption += f" No branch of periodic motions lies beneath. {branch.status.value}"
+    elif branch is not None:
+        caption += (
+            " Solid: motions that return after a small disturbance; dashed: those that do not."
+        )
     return Figure("Settled motion over speed", caption, (panel,), height=380)
 
 
