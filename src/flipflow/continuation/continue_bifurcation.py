@@ -50,9 +50,7 @@ TESTS = {
     FOLD: SADDLE_NODE, SYMMETRY: FLIP, DOUBLING: FLIP, NEIMARK_SACKER: PAIR,
     CONTACT_BEGIN: GRAZING, CONTACT_END: GRAZING,
 }  # fmt: skip
-CRITICAL = (
-    1e-3  # distance of multipliers from critical ones beyond which a point is none of the map
-)
+CRITICAL = 1e-3  # distance of multipliers from critical ones beyond which a map has none
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
 FINE = 20.0  # steps in each of these intervals
 NEAR = 1e-6  # share of the bounds within which a motion with that multiplier is looked for
@@ -463,7 +461,7 @@ def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
 
 
 def _exact_start(point: SpecialPoint) -> tuple[Point, ExactSolver]:
-    """An exact motion, whatever the method that found the point."""
+    """The exact motion of a point, whatever the method that found it, and its solver."""
     orbit = point.orbit
     own = orbit.point.formulation
     exact = ExactSolver(own.system, half_turn=own.half_turn, turns=own.turns)
