@@ -205,14 +205,15 @@ def test_what_passes_by_a_fold_is_not_chaotic(screen):
 
 
 def test_a_mode_that_grows_beyond_all_bounds_is_not_chaotic():
-    """One that a force shakes, and one that no force shakes, which grows out of rounding."""
+    """One that a force shakes, and one that no force shakes, which begins with a push."""
     stop = ff.ClearanceSpring([1.0, 0.0], 29.0, 0.1, 1.0, np.inf)
-    for force in (0.0, 0.3):
+    for force, push in ((0.0, 1e-3), (0.3, 0.0)):
         machine = ff.MechanicalSystem(
             np.eye(2), np.diag([0.1, -1e-3]), np.diag([1.0, 2.0]), [stop],
             ff.HarmonicForce([0.5, force]),
         )  # fmt: skip
-        assert ff.sweep(machine, [0.9]).words == ("undecided",)
+        initial = np.array([0.0, push, 0.0, 0.0])
+        assert ff.sweep(machine, [0.9], initial=initial).words == ("undecided",)
 
 
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.5, -0.3), (0.3, 1.0)])
