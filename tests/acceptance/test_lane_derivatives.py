@@ -135,6 +135,15 @@ def drawn_system(rng, omega):
     return ff.MechanicalSystem(M, C, K, tuple(springs), tuple(excitation), static_force=still)
 
 
+def parameters_of(machine):
+    """The force and numbers of all stops, gaps where there are any."""
+    names = ["forcing"]
+    for j, spring in enumerate(machine.springs):
+        names += [f"springs[{j}].stiffness", f"springs[{j}].damping"]
+        names += [f"springs[{j}].clearance"] if spring.clearance > 0.0 else []
+    return names
+
+
 @pytest.fixture(scope="module")
 def compared():
     """Of each seed how many derivatives were compared, and whether a stop was touched."""
@@ -146,10 +155,7 @@ def test_machines_that_nobody_chose(seed, compared):
     rng = np.random.default_rng(seed)
     omega = float(rng.uniform(0.3, 3.0))
     machine = drawn_system(rng, omega)
-    names = ["forcing"]
-    for j, spring in enumerate(machine.springs):
-        names += [f"springs[{j}].stiffness", f"springs[{j}].damping"]
-        names += [f"springs[{j}].clearance"] if spring.clearance > 0.0 else []
+    names = parameters_of(machine)
     asked = [one for one in quantities_for(machine).values() if on_lanes(machine, one)]
     found, why = lane_values(
         machine, {"forcing": np.array([1.0, 1.1])}, asked, np.array([omega]), (0.1, 4.0),
@@ -177,10 +183,7 @@ def multipliers_compared(seed):
     rng = np.random.default_rng([seed, 1])
     omega = float(rng.uniform(0.3, 3.0))
     machine = drawn_system(rng, omega)
-    names = ["forcing"]
-    for j, spring in enumerate(machine.springs):
-        names += [f"springs[{j}].stiffness", f"springs[{j}].damping"]
-        names += [f"springs[{j}].clearance"] if spring.clearance > 0.0 else []
+    names = parameters_of(machine)
     columns = with_own(machine, {"forcing": np.ones(1)}, names)
     found, slopes = solved(machine, columns, np.array([omega]), names)
     if found.reason[0, 0] != FOUND:

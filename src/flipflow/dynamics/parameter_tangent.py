@@ -69,7 +69,6 @@ class ColumnWork(NamedTuple):
     gain: Complex  # (R, P) what the modes gain over a segment
     free: Real  # (2 N, 2 N) exp(A t)
     moved: Real  # (2 N, 2 N + P + 1) columns on their way
-    slope: Real  # (2 N, 2 N) rate of the tangent map
     z: Real  # (2 N,)
     rate: Real  # (2 N,)
 
@@ -93,7 +92,6 @@ def new_column_work(machine: MachineArrays, parameters: int) -> ColumnWork:
         gain=np.zeros((R, parameters), np.complex128),
         free=np.zeros((R, R)),
         moved=np.zeros((R, R + parameters + 1)),
-        slope=np.zeros((R, R)),
         z=np.zeros(R),
         rate=np.zeros(R),
     )
