@@ -35,6 +35,41 @@ from flipflow.cli.main import main
 main()
 """
 
+# Sends itself Ctrl-C right after it has locked something: the first time, the second, and so on.
+LOCKED = """
+import signal, threading
+class Interrupting(threading.Condition):
+    wanted = seen = 0
+    def __init__(self, lock=None):
+        super().__init__(lock)
+        self.acquire = self.__enter__
+    def __enter__(self, *words, **more):
+        locked = self._lock.acquire(*words, **more)
+        if threading.get_ident() == threading.main_thread().ident:
+            Interrupting.seen += 1
+            if Interrupting.seen == Interrupting.wanted:
+                signal.raise_signal(signal.SIGINT)
+        return locked
+threading.Condition = Interrupting
+from flipflow.batch.side_by_side import side_by_side
+from flipflow.compiled.interruptible import interruptible
+stopped = 0
+def work(part, stop):
+    pass
+def run():
+    side_by_side(work, 4, 1, 2)
+    interruptible(dict)
+while Interrupting.seen >= Interrupting.wanted:
+    Interrupting.wanted, Interrupting.seen = Interrupting.wanted + 1, 0
+    try:
+        run()
+    except KeyboardInterrupt:
+        stopped += 1
+Interrupting.wanted = 0
+run()
+print(stopped)
+"""
+
 
 def started(*words, folder):
     environment = os.environ | {"COLUMNS": "80"}
@@ -45,8 +80,9 @@ def started(*words, folder):
 
 
 def processor_seconds(pid):
+    """Of a process and of those that it has started and that have ended, as compilers have."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def until(holds, seconds=120.0):
@@ -292,6 +328,14 @@ def test_a_failure_beside_the_main_thread_is_raised_in_it():
     with pytest.raises(IncompleteError, match="a sentence"):
         interruptible(fails)
     assert interruptible(lambda: 3.0) == 3.0
+
+
+def test_an_interrupt_leaves_no_lock_that_nobody_opens():
+    run = subprocess.run(
+        [sys.executable, "-c", LOCKED], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    assert int(run.stdout) > 10
 
 
 def test_slow_turns_are_refused_where_they_take_hours(screen):

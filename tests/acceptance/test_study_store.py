@@ -17,6 +17,7 @@ import pytest
 import flipflow as ff
 from flipflow.batch import chunk_store
 from flipflow.errors import StoreError
+from flipflow.signals import SIGNALS
 
 zarr = pytest.importorskip("zarr")
 VARY = {"shear_stiffness": (2.5e6, 2.9e6), "main_mass": ff.Normal(916.0, 20.0)}
@@ -96,10 +97,7 @@ def test_an_interrupt_waits_for_the_chunk_that_is_written(tmp_path, monkeypatch)
 
 def test_an_answer_that_raises_leaves_the_others_in_place(tmp_path, monkeypatch):
     """SIGTERM of a host program that ends it by an exception of its own."""
-    written, answers = (
-        chunk_store.write_file,
-        [signal.getsignal(one) for one in chunk_store.SIGNALS],
-    )
+    written, answers = chunk_store.write_file, [signal.getsignal(one) for one in SIGNALS]
 
     def terminated(path, *words):
         if path.parent.name == "relative_amplitude":

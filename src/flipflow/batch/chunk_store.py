@@ -14,11 +14,9 @@ import hashlib
 import json
 import os
 import shutil
-import signal
-import threading
 import uuid
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +28,7 @@ from numpy.typing import NDArray
 from flipflow.errors import InputError, MissingExtra, StoreError
 from flipflow.results.stage import held, sweep
 from flipflow.results.store import because, refused, sync_folder, write_file
+from flipflow.signals import undisturbed
 
 Array = NDArray[Any]
 META = "zarr.json"
@@ -41,31 +40,6 @@ PART = ".part"
 # What zarr raises where a store does not hold what it should.
 DAMAGE = (ValueError, LookupError, TypeError, OSError, AttributeError)
 FINISHED, MISSING, DAMAGED = "finished", "missing", "damaged"
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Answer signals after the block: one within zarr leaves coroutines that nobody awaits."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-
-    def answer_late() -> None:
-        for number in dict.fromkeys(came):
-            signal.raise_signal(number)
-
-    # Whatever an answer raises, all of them return; that to SIGTERM may be that to SIGINT, which is
-    # therefore the last.
-    with ExitStack() as after:
-        after.callback(answer_late)
-        for one in SIGNALS:
-            answer = signal.getsignal(one)
-            if answer is not None:  # what no Python code has set cannot be set again
-                after.callback(signal.signal, one, answer)
-                signal.signal(one, lambda number, _frame: came.append(number))
-        yield
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +104,7 @@ class ChunkState:
         return f"chunk {self.index} ({'; '.join(self.files)})"
 
 
-@_undisturbed()
+@undisturbed()
 def create_store(folder: Path, layout: Layout) -> None:
     """Make a store without chunks; it is there whole or not at all.
 
@@ -265,7 +239,7 @@ class ChunkStore:
         for index in range(self.chunks):
             yield self.state(index)
 
-    @_undisturbed()
+    @undisturbed()
     def state(self, index: int) -> ChunkState:
         """The state of a chunk."""
         row = self._file(CHECKSUM, index)
@@ -282,7 +256,7 @@ class ChunkStore:
         ]
         return ChunkState(index, DAMAGED if faults else FINISHED, tuple(faults))
 
-    @_undisturbed()
+    @undisturbed()
     def write(self, index: int, values: Mapping[str, Array]) -> None:
         """Write a chunk: all its arrays, then their checksums.
 
@@ -301,7 +275,7 @@ class ChunkStore:
             digests[0, k] = np.frombuffer(content, np.uint8)
         self._put(CHECKSUM, slice(index, index + 1), digests)
 
-    @_undisturbed()
+    @undisturbed()
     def read(self, name: str, index: int | None = None) -> Array:
         """The values of an array, or those of one chunk of a growing one.
 

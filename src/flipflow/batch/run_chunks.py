@@ -8,19 +8,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from itertools import islice
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from flipflow.errors import IncompleteError, InputError
+from flipflow.signals import undisturbed
 
 WINDOW = 256  # chunks handed out at once: enough for a cluster, few to hold
 MOST_LOST = 10  # times that the worker of one chunk may be lost
@@ -42,7 +37,9 @@ def executor_or_threads(executor: object, threads: int) -> Iterator[Executor]:
         try:
             yield own
         finally:
-            own.shutdown(cancel_futures=True)
+            with undisturbed():
+                own.shutdown(wait=False, cancel_futures=True)
+            own.shutdown()
         return
     yield checked_executor(executor)
 
@@ -68,6 +65,7 @@ def run_chunks(
 ) -> Iterator[tuple[int, Any]]:
     """Yield (index, ``work(*arguments)``) of each task, in the order in which they end.
 
+    Tasks are drawn as there is room for them, while those before are worked on.
     A chunk whose worker is lost is handed out again. When the caller stops, what has not begun is
     not begun.
 
@@ -78,24 +76,33 @@ def run_chunks(
         cluster has lost all its workers for some time.
     """
     waiting: dict[Future[Any], tuple[int, tuple[Any, ...]]] = {}
+    # In place of concurrent.futures.wait, within which an interrupt leaves futures locked.
+    done: SimpleQueue[Future[Any]] = SimpleQueue()
     lost: dict[int, int] = {}
     todo, cluster = iter(tasks), _Cluster(executor)
+
+    def hand_out(task: tuple[int, tuple[Any, ...]]) -> None:
+        with undisturbed():
+            future = _submitted(executor, work, task, lost.get(task[0], 0))
+            waiting[future] = task
+            future.add_done_callback(done.put)
+
     try:
         while True:
-            for task in _some(todo, WINDOW - len(waiting)):
-                waiting[_submitted(executor, work, task, 0)] = task
+            for task in islice(todo, WINDOW - len(waiting)):
+                hand_out(task)
             if not waiting:
                 return
-            for future in cluster.ended(waiting):
-                index, arguments = waiting.pop(future)
-                if _is_lost(future, index, lost):
-                    again = index, arguments
-                    waiting[_submitted(executor, work, again, lost[index])] = again
-                else:
-                    yield index, future.result()
+            future = cluster.next_of(done)
+            index, arguments = waiting.pop(future)
+            if _is_lost(future, index, lost):
+                hand_out((index, arguments))
+            else:
+                yield index, future.result()
     finally:
-        for future in waiting:
-            future.cancel()
+        with undisturbed():
+            for future in waiting:
+                future.cancel()
 
 
 class _Cluster:
@@ -106,8 +113,8 @@ class _Cluster:
         self._client = executor._client if of_dask else None  # type: ignore[attr-defined]  # noqa: SLF001  it has no other way to its client
         self._seen, self._looks = False, 0
 
-    def ended(self, waiting: Mapping[Future[Any], Any]) -> set[Future[Any]]:
-        """The chunks that have ended, at least one.
+    def next_of(self, done: SimpleQueue[Future[Any]]) -> Future[Any]:
+        """The next chunk that has ended.
 
         Raises
         ------
@@ -115,12 +122,13 @@ class _Cluster:
             When the workers that were there have been gone for a while.
         """
         while True:
-            done, _ = wait(waiting, timeout=LOOK, return_when=FIRST_COMPLETED)
-            there = bool(done) or self._client is None or self._has_workers(self._client)
+            with suppress(Empty):
+                future = done.get(timeout=LOOK)
+                self._seen, self._looks = True, 0
+                return future
+            there = self._client is None or self._has_workers(self._client)
             self._seen = self._seen or there
             self._looks = 0 if there else self._looks + 1
-            if done:
-                return done
             if self._seen and self._looks >= MOST_LOOKS:
                 told = f"The cluster has lost all workers, {LOOK * MOST_LOOKS:.0f} s ago"
                 raise IncompleteError(f"{told}; start one, and go on.")
@@ -131,14 +139,6 @@ class _Cluster:
             return bool(client.nthreads())
         except (OSError, ValueError):  # the scheduler is gone, and its futures are about to tell
             return True
-
-
-def _some(todo: Iterator[tuple[int, tuple[Any, ...]]], count: int) -> Iterator[Any]:
-    for _ in range(count):
-        task = next(todo, None)
-        if task is None:
-            return
-        yield task
 
 
 def _submitted(

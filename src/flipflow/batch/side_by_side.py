@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
 
+from flipflow.batch.run_chunks import executor_or_threads, run_chunks
 from flipflow.compiled.arrays import Int
 
 Work = Callable[[slice, Int], None]
@@ -29,21 +29,16 @@ def side_by_side(
         Called with the share of rows done; what it raises ends the work.
     """
     stop = np.zeros(1, np.int64)
-    pool = ThreadPoolExecutor(threads)
+    parts = [slice(k, min(k + size, count)) for k in range(0, count, size)]
     done = 0
-    try:
-        waiting = {
-            pool.submit(work, part, stop): part.stop - part.start
-            for part in (slice(k, min(k + size, count)) for k in range(0, count, size))
-        }
-        for future in as_completed(waiting):
-            future.result()
-            done += waiting[future]
-            if tell is not None:
-                tell(done / count)
-    finally:
-        stop[0] = 1
-        pool.shutdown(cancel_futures=True)
+    with executor_or_threads(None, threads) as pool:
+        try:
+            for k, _ in run_chunks(pool, work, ((k, (part, stop)) for k, part in enumerate(parts))):
+                done += parts[k].stop - parts[k].start
+                if tell is not None:
+                    tell(done / count)
+        finally:
+            stop[0] = 1
 
 
 def processors() -> int:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 SCHEDULER, WORKERS = "--scheduler", "--workers"
 PATIENCE = 20.0  # s to wait for a scheduler
-QUIET = 50  # level of logging at which dask tells of failures alone
+QUIET = 51  # above all levels of logging: what fails in dask is raised
 
 
 @contextmanager

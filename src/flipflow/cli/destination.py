@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
-from flipflow.cli.progress import held_back
 from flipflow.errors import Cancelled, FlipflowError, InputError, StoreError
 from flipflow.results.stage import Stage
 from flipflow.results.store import (
@@ -23,6 +22,7 @@ from flipflow.results.store import (
     refuse_input,
     write_file,
 )
+from flipflow.signals import undisturbed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -178,7 +178,7 @@ class Destination:
             When that cannot be; then every file is as it was.
         """
         if not self._kept:
-            with held_back():
+            with undisturbed():
                 self._stage.commit()
                 self._kept = True
             sys.stdout.write(self._answer)

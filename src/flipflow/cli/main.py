@@ -16,9 +16,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
+from flipflow.signals import SIGNALS
+
 STOPPED_CODE = 130
 OBJECTS = 50_000  # made since garbage was last looked for
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
 ESCAPED = "flipflow-escaped"  # how letters are shown that an encoding has not
 AGAIN = 0.02  # seconds until a dropped interrupt is raised again
 

@@ -1,9 +1,8 @@
-"""Progress of long work on stderr, and Ctrl-C that keeps what is finished or waits."""
+"""Progress of long work on stderr, and Ctrl-C that keeps what is finished."""
 
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -77,21 +76,3 @@ def stoppable(tell: Monitor, stage: str) -> Iterator[Monitor]:
         yield told
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def held_back() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait for the end of the block, which is short."""
-    waiting: list[int] = []
-    before = {}
-    if threading.current_thread() is threading.main_thread():
-        for one in (signal.SIGINT, signal.SIGTERM):
-            if callable(signal.getsignal(one)):
-                before[one] = signal.signal(one, lambda number, _frame: waiting.append(number))
-    try:
-        yield
-    finally:
-        for one, answer in before.items():
-            signal.signal(one, answer)
-        if waiting:
-            signal.raise_signal(waiting[0])

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 from flipflow.compiled.arrays import Int
+from flipflow.signals import undisturbed
 
 R = TypeVar("R")
 BRIEF = 4096  # turns or points times N^2 up to which a kernel is called as it is
@@ -32,27 +35,29 @@ def interruptible(run: Callable[[], R], *stops: Int, work: int = BRIEF + 1) -> R
     if work <= BRIEF or threading.current_thread() is not threading.main_thread():
         return run()
     outcome: list[R] = []
-    failure: list[BaseException] = []
-    done = threading.Event()
+    # In place of an event, within which an interrupt leaves a lock that nobody opens.
+    ended: SimpleQueue[BaseException | None] = SimpleQueue()
 
     def beside() -> None:
         try:
             outcome.append(run())
         except BaseException as error:  # noqa: BLE001  it is raised where it is waited for
-            failure.append(error)
-        finally:
-            done.set()
+            ended.put(error)
+        else:
+            ended.put(None)
 
-    threading.Thread(target=beside, name="flipflow kernel", daemon=True).start()
     try:
-        done.wait()
+        with undisturbed():
+            threading.Thread(target=beside, name="flipflow kernel", daemon=True).start()
+        failure = ended.get()
     except BaseException:
         for stop in stops:
             stop[0] = 1
-        if done.wait(PATIENCE):
+        with suppress(Empty):
+            ended.get(timeout=PATIENCE)
             for stop in stops:
                 stop[0] = 0
         raise
-    if failure:
-        raise failure[0]
+    if failure is not None:
+        raise failure
     return outcome[0]

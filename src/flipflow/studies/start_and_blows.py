@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from flipflow.batch.run_chunks import executor_or_threads, run_chunks
 from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.model.drive import Drive
 from flipflow.model.limits import Passage
@@ -197,7 +197,7 @@ def _side_by_side(
 ) -> tuple[list[_Runs] | InputError, list[JumpRisk | str]]:
     """The runs of each screen on two threads, and its blows beside them.
 
-    Where a run fails or Ctrl-C ends the wait, all end.
+    Where Ctrl-C ends the wait, all end.
     """
     ended = threading.Event()
 
@@ -205,18 +205,26 @@ def _side_by_side(
         if ended.is_set():
             raise Cancelled("nobody waits for this run")
 
-    # Kernels leave the interpreter free.
-    pool = ThreadPoolExecutor(2)
-    try:
-        waiting = [pool.submit(_runs, one, drive, omega, heard) for one in screens]
-        jumps = [_jump(screen, omega) for screen in screens]
+    jumps: list[JumpRisk | str] = []
+
+    def runs(screen: FlipFlowScreen) -> _Runs | InputError:
         try:
-            return [one.result() for one in waiting], jumps
+            return _runs(screen, drive, omega, heard)
         except InputError as error:
-            return error, jumps
-    finally:
-        ended.set()
-        pool.shutdown(cancel_futures=True)
+            return error
+
+    def tasks() -> Iterator[tuple[int, tuple[FlipFlowScreen]]]:
+        yield from enumerate((screen,) for screen in screens)
+        # While those run: kernels leave the interpreter free.
+        jumps.extend(_jump(screen, omega) for screen in screens)
+
+    with executor_or_threads(None, 2) as pool:
+        try:
+            found = dict(run_chunks(pool, runs, tasks()))
+        finally:
+            ended.set()
+    refused = [one for one in found.values() if isinstance(one, InputError)]
+    return refused[0] if refused else [found[k] for k in range(len(screens))], jumps
 
 
 def _runs(screen: FlipFlowScreen, drive: Drive | None, omega: float, monitor: Monitor) -> _Runs:
