@@ -369,25 +369,51 @@ def tops(y: np.ndarray) -> np.ndarray:
     return y[1:-1][(y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:])]
 
 
-def test_a_curve_that_meets_a_valley_within_a_contact_ends_there() -> None:
-    """Three masses: within the outer one's contact a valley comes back to the gap."""
+def test_a_curve_that_meets_a_valley_within_a_contact_goes_on() -> None:
+    """Three masses: within the outer one's contact a valley comes back to the gap; single branches.
+
+    The difference quotients have to stay on one side of it.
+    """
     K = np.array([[3.6, -1.37, 0.0], [-1.37, 3.6, -2.23], [0.0, -2.23, 2.23]])
     stops = (
         ff.ClearanceSpring([0.0, 1.0, 0.0], 9.55, 4.72, 0.719, math.inf),
         ff.ClearanceSpring([1.0, 0.0, 0.0], 180.9, 0.0, 0.224, math.inf),
         ff.ClearanceSpring([0.0, 0.0, 1.0], 27.16, 0.164, 0.969),
     )
-    machine = ff.MechanicalSystem(
-        np.diag([3.2, 3.26, 0.304]), 0.362 * K, K, stops,
-        ff.HarmonicForce([-0.642 + 0.767j, 0.0, 0.0]),
-    )  # fmt: skip
-    folds = ff.frequency_response(machine, (0.55, 0.65)).folds
-    fold = min(folds, key=lambda one: abs(one.omega - 0.5957))
+
+    def folds(forcing: float) -> tuple[ff.SpecialPoint, ...]:
+        force = ff.HarmonicForce(forcing * np.array([-0.642 + 0.767j, 0.0, 0.0]))
+        machine = ff.MechanicalSystem(np.diag([3.2, 3.26, 0.304]), 0.362 * K, K, stops, force)
+        return ff.frequency_response(machine, (0.5, 0.7)).folds
+
+    fold = min(folds(1.0), key=lambda one: abs(one.omega - 0.5957))
     curve = ff.continue_fold(fold, "forcing", (0.7, 1.3))
+    assert curve.status is ff.BranchStatus.FOLLOWED
+    assert [point.kind for point in curve.special_points] == ["cusp"]
+    close("ends", np.sort(curve.values[[0, -1]]), [0.7, 1.3], rel=1e-12)
+    for i in np.linspace(0, len(curve.orbits) - 1, 5).astype(int):
+        alone = nearest(folds(float(curve.values[i])), float(curve.omega[i]))
+        close("fold", curve.omega[i], alone, rel=1e-9)
+
+
+@pytest.mark.parametrize(("field", "bounds"), [("forcing", (0.5, 2.0)),
+                                               ("springs[0].stiffness", (19.0, 75.0))])  # fmt: skip
+def test_a_curve_that_meets_a_moment_without_contact_ends_there(field, bounds) -> None:
+    """Two masses: the stop opens for a moment, or the way out of it just comes back to the gap."""
+    K = np.array([[3.166, -1.5255], [-1.5255, 1.5255]])
+    stop = ff.ClearanceSpring([1.0, 0.0], 37.63, 3.383, 2.2187, math.inf, law="compression-only")
+    machine = ff.MechanicalSystem(
+        np.diag([2.288, 2.823]), 0.043485 * K, K, (stop,), ff.HarmonicForce([-0.473 + 0.881j, 0.0])
+    )
+    folds = ff.frequency_response(machine, (0.3, 0.6)).folds
+    curve = ff.continue_fold(max(folds, key=lambda one: one.omega), field, bounds)
     assert curve.status is ff.BranchStatus.MEETS_GRAZING
-    orbit = curve.orbits[0]
-    valleys = tops(orbit.displacement(2, np.linspace(0.0, orbit.period, 20_001))) + 0.969
-    assert np.abs(valleys).min() < 1e-5
+    for value, orbit in zip(
+        curve.values[[0, -1]], (curve.orbits[0], curve.orbits[-1]), strict=True
+    ):
+        if value not in bounds:
+            y = orbit.displacement(0, np.linspace(0.0, orbit.period, 200_001)) - 2.2187
+            assert np.abs([*tops(y), *tops(-y)]).min() < 1e-7
 
 
 @pytest.mark.parametrize("names", [("eccentric_moment", "stop_stiffness"),

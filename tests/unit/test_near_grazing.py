@@ -17,7 +17,7 @@ SAMPLES = 20_000
 
 
 @pytest.mark.parametrize("law", get_args(ContactLaw))
-def test_the_shallowest_contact_and_the_highest_summit_outside(law):
+def test_the_shallowest_contact_or_opening(law):
     """Under a law whose damper lets go where the way turns back, its summit ends a segment."""
     stop = ff.ClearanceSpring([0.0, 1.0], 66.8, 1.53, 0.1, 0.28, law=law)
     K = np.array([[3.61, -2.18], [-2.18, 2.18]])
@@ -34,9 +34,15 @@ def test_the_shallowest_contact_and_the_highest_summit_outside(law):
         assert solver.residual(orbit.state, orbit.omega) is not None
         _, depth = near_grazing(solver.problem, solver.scratch, orbit.omega)
         y = orbit.displacement(1, orbit.period * np.arange(SAMPLES) / SAMPLES)
-        summits = np.array([])
+        turns = np.array([])
         for side, gap in zip((1.0, -1.0), stop.gaps, strict=True):
             deep = side * y - gap
-            tops = deep[(deep >= np.roll(deep, 1)) & (deep > np.roll(deep, -1))]
-            summits = np.append(summits, tops[tops > 0.0])
-        assert depth == pytest.approx(summits.min(), rel=1e-4, abs=1e-6)
+            turns = np.append(turns, deep[_tops(deep) & (deep > 0.0)])
+            # An opening is a valley outside both gaps.
+            opened = (deep < 0.0) & (-side * y < (stop.gaps[1] if side > 0.0 else stop.gaps[0]))
+            turns = np.append(turns, -deep[_tops(-deep) & opened])
+        assert depth == pytest.approx(turns.min(), rel=1e-4, abs=1e-6)
+
+
+def _tops(y):
+    return (y >= np.roll(y, 1)) & (y > np.roll(y, -1))

@@ -37,8 +37,9 @@ ROUNDING = 1e-15  # of h, as a share of the terms of its sum, with the gap
 def near_grazing(problem: Shooting, work: ShootingWork, omega: float) -> tuple[float, float]:
     """Room and depth in m of the recorded flow.
 
-    The room is what the motion that is nearest to one more contact has left before it, the depth
-    that of the shallowest contact; infinite where there is none.
+    The room is what the motion that is nearest to one more contact, or to one more opening, has
+    left before it, the depth that of the shallowest contact or opening; infinite where there is
+    none.
     """
     room, depth = math.inf, math.inf
     for j in range(problem.machine.direction.shape[0]):
@@ -95,9 +96,9 @@ def _of_spring(
         for at in range(2):
             sign, gap = 1.0 - 2.0 * at, stops.gap[j, at]
             if gap < math.inf:
-                # A summit turns the room gap - sign y round at its least.
-                least, _ = _stands_still(motion, count, j, sign * gap, -sign, 0.0, duration)
-                room = min(room, least)
+                # A summit turns the room gap - sign y round at its least, a valley at its most.
+                least, most = _stands_still(motion, count, j, sign * gap, -sign, 0.0, duration)
+                room, depth = min(room, least), min(depth, most)
         return room, depth
     side, gap = (1.0 if regime > OPEN else -1.0), signed_gap(stops, j, regime)
     room, depth = _stands_still(motion, count, j, gap, side, 0.0, duration)
@@ -120,8 +121,8 @@ def _stands_still(
 ) -> tuple[float, float]:
     """Least minimum and least maximum, none below 0, of h = alpha (y_j - gap) + beta y_j'.
 
-    They are sought within [0, duration] where the rate of h changes its sign between two samples;
-    infinite where there is none.
+    They are sought within [0, duration] where the rate of h changes its sign between two samples,
+    or comes near zero and leaves it again; infinite where there is none.
     """
     fastest = 0.0
     for i in range(count):
@@ -135,20 +136,62 @@ def _stands_still(
     for i in range(count):
         size = ROUNDING * modulus(motion.amplitude[j, i])
         zero -= size * (abs(alpha) + abs(beta) * modulus(motion.rate[i]))
-    least, shallowest, before = math.inf, math.inf, 0.0
+    least, shallowest, before, bent = math.inf, math.inf, 0.0, 0.0
     for k in range(samples + 1):
-        slope = alpha * motion.drift[j]
+        slope, bend = alpha * motion.drift[j], 0.0
         for i in range(count):
-            slope += motion.turn[i].real
-            motion.turn[i] *= motion.ratio[i]
+            term = motion.turn[i]
+            slope += term.real
+            bend += term.real * motion.rate[i].real - term.imag * motion.rate[i].imag
+            motion.turn[i] = term * motion.ratio[i]
+        begin, part = (k - 1) * step, 0.0  # and the time to where the slope has the other sign
         if k > 0 and slope * before < 0.0:
-            h = _still_value(motion, count, j, gap, alpha, beta, (k - 1) * step, step, before)
-            if h > zero and before < 0.0:
-                least = min(least, max(h, 0.0))
-            elif h > zero:
-                shallowest = min(shallowest, max(h, 0.0))
-        before = slope
+            part = step
+        elif k > 0 and bent * before < 0.0 and bend * slope > 0.0:
+            part = _to_other_sign(motion, count, j, alpha, beta, begin, step, before)
+        if part > 0.0:
+            h = _still_value(motion, count, j, gap, alpha, beta, begin, part, before)
+            least, shallowest = _counted(least, shallowest, h, zero, before)
+        if 0.0 < part < step:
+            h = _still_value(motion, count, j, gap, alpha, beta, begin + part, step - part, -before)
+            least, shallowest = _counted(least, shallowest, h, zero, -before)
+        before, bent = slope, bend
     return least, shallowest
+
+
+@kernel
+def _counted(
+    least: float, shallowest: float, h: float, zero: float, before: float
+) -> tuple[float, float]:
+    """Least minimum and maximum, with h, to which it falls or rises with the slope ``before``."""
+    if h <= zero:
+        return least, shallowest
+    if before < 0.0:
+        return min(least, max(h, 0.0)), shallowest
+    return least, min(shallowest, max(h, 0.0))
+
+
+@kernel
+def _to_other_sign(
+    motion: GapMotion, count: int, j: int, alpha: float, beta: float, begin: float, step: float,
+    before: float,
+) -> float:  # fmt: skip
+    """Time within a step to where the rate of h, which turns round there, has the other sign.
+
+    0 where it never has.
+    """
+    low, high = 0.0, step
+    for _ in range(MOST_NEWTON):
+        part = 0.5 * (low + high)
+        exponentials(motion, count, begin + part)
+        _, slope, bend, _, _ = switching_state(motion, count, j, 0.0, alpha, beta)
+        if slope * before < 0.0:
+            return part
+        if bend * before < 0.0:
+            low = part
+        else:
+            high = part
+    return 0.0
 
 
 @kernel
