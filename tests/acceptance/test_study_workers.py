@@ -16,6 +16,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.batch.run_chunks import MOST_LOST, run_chunks
+from flipflow.cli.cluster import executor_of
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -173,3 +174,18 @@ def test_ctrl_c_in_a_terminal_is_one_sentence(tmp_path):
     _, error = run.communicate(timeout=60.0)
     assert run.returncode == 130
     assert re.fullmatch(r"Stopped by the user; \d+ of \d+ chunks are in wide.zarr, and .*\n", error)
+
+
+def test_a_signal_while_workers_are_closed_leaves_none(monkeypatch):
+    """Interrupted in its midst, dask waits for what does not come."""
+    closed, close = [], distributed.Client.close
+
+    def interrupted(client, *given, **more):
+        signal.raise_signal(signal.SIGINT)
+        close(client, *given, **more)
+        closed.append(client.status)
+
+    monkeypatch.setattr(distributed.Client, "close", interrupted)
+    with pytest.raises(KeyboardInterrupt), executor_of(1, None):
+        pass
+    assert closed[:1] == ["closed"]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from flipflow.errors import InputError, required
+from flipflow.signals import undisturbed
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -39,13 +40,21 @@ def executor_of(workers: int | None, scheduler: str | None) -> Iterator[Executor
         with _client(distributed, scheduler) as client:
             yield client.get_executor()
         return
-    with _deaf_to_ctrl_c():
-        cluster = distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0",
-            silence_logs=QUIET,
-        )  # fmt: skip
-    with cluster, distributed.Client(cluster) as client:
+    # What dask is interrupted in while it starts or closes, it waits for in vain.
+    own = ExitStack()
+    try:
+        with undisturbed():
+            with _deaf_to_ctrl_c():
+                cluster = distributed.LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True,
+                    dashboard_address=":0", silence_logs=QUIET,
+                )  # fmt: skip
+            own.enter_context(cluster)
+            client = own.enter_context(distributed.Client(cluster))
         yield client.get_executor()
+    finally:
+        with undisturbed():
+            own.close()
 
 
 @contextmanager
