@@ -18,6 +18,7 @@ from pathlib import Path
 from flipflow.compiled.compile import OWN_CACHE, compiled_by
 from flipflow.compiled.digest import module_digest
 from flipflow.compiled.folders import FOLDERS
+from flipflow.signals import undisturbed
 
 logger = logging.getLogger("flipflow")
 POLL_SECONDS = 0.2  # between two looks at whether the workers have ended
@@ -56,8 +57,6 @@ def compile_parts(module: str, parts: Iterable[str], tell: Callable[[float], Non
 
 def work(parts: Mapping[str, Iterable[Callable[[], None]]]) -> None:
     """Be a worker: compile the part that the command line names."""
-    # Ctrl-C is the parent's to answer, which ends its workers.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     part, lent = sys.argv[1:]
     FOLDERS.borrow_temporary(Path(lent) if lent else None)
     for compile_part in parts[part]:
@@ -74,24 +73,36 @@ def _can_start_workers() -> bool:
     return bool(sys.executable) and not getattr(sys, "frozen", False)
 
 
-def _run(module: str, parts: list[str], lent: Path | None, tell: Callable[[float], None]) -> bool:
-    """Run a worker for each part to its end; whether all were done."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    workers = [
-        subprocess.Popen(  # noqa: S603  a module of our own
+def _worker(
+    module: str, part: str, lent: Path | None, environment: Mapping[str, str]
+) -> subprocess.Popen[bytes]:
+    """Start a worker, which never sees Ctrl-C: its parent answers that, and ends its workers."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return subprocess.Popen(  # noqa: S603  a module of our own
             [sys.executable, "-P", "-m", module, part, str(lent or "")],
             stdout=subprocess.DEVNULL,
             env=environment,
         )
-        for part in parts
-    ]
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _run(module: str, parts: list[str], lent: Path | None, tell: Callable[[float], None]) -> bool:
+    """Run a worker for each part to its end; whether all were done."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    workers: list[subprocess.Popen[bytes]] = []
     begin = time.monotonic()
     try:
+        for part in parts:
+            with undisturbed():
+                workers.append(_worker(module, part, lent, environment))
         while any(worker.poll() is None for worker in workers):
             tell(time.monotonic() - begin)
             time.sleep(POLL_SECONDS)
     finally:
-        for worker in workers:
-            worker.kill()
-            worker.wait()
+        with undisturbed():
+            for worker in workers:
+                worker.kill()
+                worker.wait()
     return all(worker.returncode == 0 for worker in workers)
