@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ from flipflow.paper.reproduce import Reproduction
 from flipflow.report.blocks import FigureBlock, Heading
 from flipflow.report.html import KIND, footer_of, page, title_of
 from flipflow.report.registry import blocks_of
+from flipflow.signals import SIGNALS
 from flipflow.studies.assessment import Assessment, assess
 from kernels_ahead import compile_ahead
 
@@ -126,6 +128,23 @@ def exact(response: Callable[..., Branch]) -> Branch:
     return response()
 
 
+@contextmanager
+def signals_as_they_were() -> Iterator[None]:
+    """A command that has ended leaves Ctrl-C and SIGTERM without an answer, as its process ends."""
+    before = {one: signal.getsignal(one) for one in SIGNALS}
+    try:
+        yield
+    finally:
+        for one, answer in before.items():
+            signal.signal(one, answer)
+
+
+@pytest.fixture(autouse=True)
+def _signals() -> Iterator[None]:
+    with signals_as_they_were():
+        yield
+
+
 @pytest.fixture
 def command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -135,11 +154,12 @@ def command(
     def call(*words: object) -> tuple[int, str, str]:
         monkeypatch.setenv("COLUMNS", "80")
         monkeypatch.setattr(sys, "argv", ["flipflow", *map(str, words)])
-        try:
-            main()
-            code = 0
-        except SystemExit as ended:
-            code = ended.code or 0
+        with signals_as_they_were():
+            try:
+                main()
+                code = 0
+            except SystemExit as ended:
+                code = ended.code or 0
         told = capsys.readouterr()
         assert "Traceback" not in told.err
         return code, told.out, told.err

@@ -336,6 +336,37 @@ def same(one: ff.Proposal, other: ff.Proposal) -> None:
         np.testing.assert_array_equal(values, other.objectives[name])
 
 
+def test_stopped_when_it_is_done_it_is_whole():
+    """At the last word there is nothing left to end."""
+
+    def stop(sentence: str, share: float) -> None:  # noqa: ARG001
+        if sentence == "design, done":
+            raise ff.Cancelled("stopped by the user")
+
+    found = ff.design(duty(), generations=3, monitor=stop)
+    assert not found.cancelled
+    same(found, after_three())
+
+
+def test_a_search_that_is_kept_is_said_when_it_is_stopped(command, monkeypatch, tmp_path):
+    """Here while its report is written, of which nothing stays."""
+    monkeypatch.chdir(tmp_path)
+    assert command("new", "duty.toml", "--duty")[0] == 0
+
+    def pressed(_found):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("flipflow.report.html.proposal_html", pressed)
+    words = ("design", "duty.toml", "--generations", "1", "-o", "out")
+    for more, said in (
+        ((), "nothing is written"),
+        (("--store", "search"), "the search is in search, and the same command goes on"),
+    ):
+        code, _, err = command(*words, *more)
+        assert (code, err) == (130, f"Stopped by the user; {said}.\n")
+        assert not (tmp_path / "out").exists()
+
+
 def test_a_search_that_was_stopped_goes_on_and_ends_as_one_that_was_not(tmp_path):
     """Damaged in between, a generation is looked at again; another duty is refused."""
     store, told = tmp_path / "search.zarr", []

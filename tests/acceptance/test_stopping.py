@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import pkgutil
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.compiled import workers
 from flipflow.compiled.interruptible import interruptible
 from flipflow.errors import IncompleteError
 from flipflow.paper.page import write_figure
@@ -23,6 +26,7 @@ from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.results.stage import Stage
 
 BOTH = [signal.SIGINT, signal.SIGTERM]
+SMALL = str(Path(__file__).parents[1] / "machines" / "small.toml")
 # Sends itself a signal while the command line loads what it is built with.
 EARLY = """
 import os, sys
@@ -336,6 +340,208 @@ def test_an_interrupt_leaves_no_lock_that_nobody_opens():
     )
     assert (run.returncode, run.stderr) == (0, "")
     assert int(run.stdout) > 10
+
+
+# Sends itself a signal when all is done, while Python ends.
+LATE = """
+import atexit, signal, sys
+from flipflow.cli.main import main
+number = int(sys.argv.pop())
+atexit.register(lambda: signal.raise_signal(number))
+main()
+"""
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_a_signal_changes_nothing_once_all_is_said(tmp_path, number):
+    for file, code, said in (("ffs0827", 0, ""), ("none.toml", 2, "Error: ")):
+        words = (sys.executable, "-c", LATE, "check", file, str(int(number)))
+        run = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert run.returncode == code
+        assert run.stderr.startswith(said)
+        assert run.stderr.count("\n") == bool(said)
+
+
+def pressed_after(monkeypatch, place, number=signal.SIGINT):
+    """Have a function of the program send a signal when it has done what it does."""
+    holder, name = pkgutil.resolve_name(place.rpartition(".")[0]), place.rpartition(".")[2]
+    run = getattr(holder, name)
+
+    def sending(*given, **more):
+        found = run(*given, **more)
+        monkeypatch.setattr(holder, name, run)
+        signal.raise_signal(number)
+        return found
+
+    monkeypatch.setattr(holder, name, sending)
+
+
+SAID_ONCE = ["flipflow.cli.app._say", "flipflow.cli.app.said"]
+
+
+@pytest.mark.parametrize("number", BOTH)
+@pytest.mark.parametrize("place", SAID_ONCE)
+def test_a_sentence_is_said_once(command, monkeypatch, tmp_path, place, number):
+    monkeypatch.chdir(tmp_path)
+    pressed_after(monkeypatch, place, number)
+    code, _, error = command("check", "none.toml")
+    assert code == 2
+    assert error.startswith("Error: ")
+    assert error.count("\n") == 1
+
+
+WRITING = {
+    "simulate": ("simulate", SMALL, "--periods", "3", "-o", "out", "--json", "s.json"),
+    "reproduce": ("reproduce", "2c", "-o", "out"),
+    "several": ("analyze", SMALL, SMALL, "-o", "out"),
+    "new": ("new", "fresh.toml"),
+}
+WRITTEN = {
+    "simulate": "out and s.json", "reproduce": "out", "new": "fresh.toml",
+    "several": "out/small-flipflow and out/small-2-flipflow and out",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRITING)
+def test_what_is_written_is_said_whenever_the_signal_comes(command, monkeypatch, tmp_path, name):
+    """Here when the command has come to its end, and is about to give its exit code."""
+    monkeypatch.chdir(tmp_path)
+    pressed_after(monkeypatch, "typer.core.TyperCommand.invoke")
+    code, _, error = command(*WRITING[name])
+    assert code == 130
+    assert error == f"Stopped by the user; what was finished is in {WRITTEN[name]}.\n"
+    for place in WRITTEN[name].split(" and "):
+        assert (tmp_path / place).exists()
+
+
+def test_what_is_written_is_said_while_it_is_shown(command, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    pressed_after(monkeypatch, "flipflow.cli.reproduce._show")
+    code, _, error = command("reproduce", "2c", "-o", "out")
+    assert (code, error) == (130, "Stopped by the user; what was finished is in out.\n")
+    assert (tmp_path / "out" / "reproduction.html").exists()
+
+
+MAKES = ["tempfile.TemporaryFile", "pathlib.Path.mkdir", "flipflow.results.stage.held"]
+
+
+@pytest.mark.parametrize("place", [*MAKES, "flipflow.results.stage.write_beside"])
+def test_a_signal_leaves_nothing_that_was_begun(command, monkeypatch, tmp_path, place):
+    monkeypatch.chdir(tmp_path)
+    pressed_after(monkeypatch, place)
+    code, _, error = command(*WRITING["simulate"])
+    assert (code, error) == (130, "Stopped by the user; nothing is written.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("place", ["pathlib.Path.touch", "flipflow.results.store.write_beside"])
+def test_a_new_file_is_there_whole(command, monkeypatch, tmp_path, place):
+    monkeypatch.chdir(tmp_path)
+    pressed_after(monkeypatch, place)
+    code, _, error = command("new", "fresh.toml")
+    assert (code, error) == (130, "Stopped by the user; what was finished is in fresh.toml.\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["fresh.toml"]
+    monkeypatch.undo()
+    assert command("check", tmp_path / "fresh.toml")[0] == 0
+
+
+def test_a_second_signal_leaves_nothing_either(command, monkeypatch, tmp_path):
+    """It comes while the first has what is begun removed."""
+    monkeypatch.chdir(tmp_path)
+    pressed_after(monkeypatch, "flipflow.plotting.figure.Figure.write")
+    remove = shutil.rmtree
+
+    def interrupted(*given, **more):
+        signal.raise_signal(signal.SIGINT)
+        remove(*given, **more)
+
+    monkeypatch.setattr(shutil, "rmtree", interrupted)
+    code, _, error = command(*WRITING["simulate"])
+    assert (code, error) == (130, "Stopped by the user; nothing is written.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_is_answered_while_a_pipe_is_not_read(command, monkeypatch, tmp_path):
+    """Nobody may ever read it."""
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    came = []
+
+    def waiting(_path, _content):
+        signal.raise_signal(signal.SIGINT)
+        came.append("answered too late")
+
+    monkeypatch.setattr(Path, "write_bytes", waiting)
+    code, _, error = command("orbits", SMALL, "--json", "pipe")
+    assert (code, error) == (130, "Stopped by the user; nothing is written.\n")
+    assert came == []
+
+
+# Of each what computes, and how often it is called.
+LAST = {
+    "basins": ("flipflow.studies.basins.basins", 1, ("--cells", "2")),
+    "sweep": (
+        "flipflow.transient.sweep.sweep", 2,
+        ("--speeds", "800 rpm", "850 rpm", "--steps", "2", "--rate", "300"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LAST)
+def test_a_signal_at_the_end_of_what_is_kept_is_not_lost(command, monkeypatch, tmp_path, name):
+    """All is finished before the monitor is called again."""
+    place, calls, words = LAST[name]
+    monkeypatch.chdir(tmp_path)
+    run, ended = pkgutil.resolve_name(place), []
+
+    def interrupted(*given, **more):
+        found = run(*given, **more)
+        ended.append(found)
+        if len(ended) == calls:
+            signal.raise_signal(signal.SIGINT)
+        return found
+
+    monkeypatch.setattr(place, interrupted)
+    code, out, error = command(name, SMALL, *words, "-o", "out", "--json", "s.json")
+    assert (code, error) == (
+        130, "Stopped by the user; what was finished is in out and s.json.\n"
+    )  # fmt: skip
+    assert (tmp_path / "out" / f"{name}.html").exists()
+    assert "Speed rising by" not in out
+
+
+# A worker that Ctrl-C reaches before it has loaded anything, as it does in a terminal.
+EARLY_WORKER = """
+import signal
+signal.raise_signal(signal.SIGINT)
+"""
+
+
+def test_a_worker_that_compiles_is_deaf_to_ctrl_c_from_its_first_moment(tmp_path, monkeypatch):
+    (tmp_path / "early_worker.py").write_text(EARLY_WORKER, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert workers._run("early_worker", ["part"], None, lambda _: None)
+
+
+def test_a_signal_between_two_workers_ends_both(monkeypatch):
+    made = []
+
+    class Worker:
+        def __init__(self, *_given, **_more):
+            made.append(self)
+            self.killed = False
+            signal.raise_signal(signal.SIGINT)
+
+        def kill(self):
+            self.killed = True
+
+        def wait(self):
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Worker)
+    with pytest.raises(KeyboardInterrupt):
+        workers._run("module", ["one", "two"], None, lambda _: None)
+    assert [one.killed for one in made] == [True]
 
 
 def test_slow_turns_are_refused_where_they_take_hours(screen):

@@ -285,6 +285,22 @@ def test_stopped_it_keeps_what_is_finished_and_goes_on(command, here, number):
         go_on(here / "long.zarr", monitor=tell)
 
 
+def test_stopped_while_the_report_is_written_the_store_is_said(command, here, monkeypatch):
+    def pressed(*_words):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("flipflow.report.study.study_blocks", pressed)
+        code, _, err = command("study", "map.toml")
+    goes_on = "flipflow study map.toml --resume map.zarr"
+    assert code == 130
+    assert (
+        err == f"Stopped by the user; the finished chunks are in map.zarr, and {goes_on} goes on.\n"
+    )
+    assert not (here / "map-flipflow").exists()
+    assert command(*goes_on.split()[1:])[0] == 0
+
+
 def test_a_terminal_sees_the_time_left(here):
     reads, writes = pty.openpty()
     run = started("study", "long.toml", folder=here, stderr=writes)

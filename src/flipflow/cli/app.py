@@ -7,8 +7,6 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable
-from functools import wraps
 from typing import Annotated
 
 import typer
@@ -19,9 +17,9 @@ from flipflow.cli.basins import basins
 from flipflow.cli.check import check
 from flipflow.cli.compare import compare
 from flipflow.cli.design import design
-from flipflow.cli.destination import NOTHING, STOPPED
 from flipflow.cli.new import new
 from flipflow.cli.orbits import orbits
+from flipflow.cli.outcome import OUTCOME
 from flipflow.cli.reproduce import reproduce
 from flipflow.cli.schema import schema
 from flipflow.cli.sensitivity import sensitivity
@@ -59,27 +57,14 @@ COMMANDS = (
 )
 
 
-def _stoppable(command: Callable[..., None]) -> Callable[..., None]:
-    """A command that Ctrl-C ends with a sentence, wherever it is."""
-
-    @wraps(command)
-    def run(*given: object, **options: object) -> None:
-        try:
-            command(*given, **options)
-        except KeyboardInterrupt:
-            raise Cancelled(f"{STOPPED}; {NOTHING}.") from None
-
-    return run
-
-
 for one in COMMANDS:
-    app.command()(_stoppable(one))
+    app.command()(one)
 
 
 stores = typer.Typer(
     help="Stores of studies.", no_args_is_help=True, add_completion=False, rich_markup_mode=None
 )
-stores.command()(_stoppable(info))
+stores.command()(info)
 app.add_typer(stores, name="store")
 
 
@@ -99,37 +84,48 @@ def _options(
     """Dynamics, design and diagnosis of flip-flow vibrating screens."""
 
 
-def _commands() -> None:
-    """Read the command line and do what it says."""
+def run() -> None:
+    """Read the command line and do what it says.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When it is stopped.
+    OSError
+        When what was found cannot be shown.
+    """
     try:
         app()
     except SystemExit as ended:
-        # So typer answers Ctrl-C while it reads the command line.
-        if ended.code != Cancelled.exit_code:
-            raise
-    except KeyboardInterrupt:
-        pass
-    raise Cancelled(f"{STOPPED}; {NOTHING}.")
+        # So typer answers Ctrl-C.
+        if ended.code == Cancelled.exit_code:
+            raise KeyboardInterrupt from None
+        sys.stdout.flush()
+        raise
+    except FlipflowError:
+        sys.stdout.flush()
+        raise
 
 
-def run() -> None:
-    """Run the command line; an error is one sentence on stderr and the exit code of its class."""
-    try:
-        try:
-            _commands()
-        finally:
-            sys.stdout.flush()
-    except FlipflowError as error:
-        head = "" if isinstance(error, Cancelled) else "Error: "
-        _say(_for_terminal(f"{head}{_sentence(str(error))}"))
-        sys.exit(error.exit_code)
-    except OSError as error:
+def said(error: KeyboardInterrupt | FlipflowError | OSError) -> int:
+    """Say what has ended a command in one sentence on stderr; the exit code of its class."""
+    if isinstance(error, OSError):
         # What is written to files has its own sentence; this is the terminal, or a pipe from it.
         _say(f"Error: what was found cannot be shown ({error.strerror}).")
-        # What is still held back would be tried again, and fail again, at the interpreter's end.
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(StoreError.exit_code)
+        _drop_what_is_not_shown()
+        return StoreError.exit_code
+    if isinstance(error, KeyboardInterrupt):
+        _drop_what_is_not_shown()
+        error = OUTCOME.error()
+    head = "" if isinstance(error, Cancelled) else "Error: "
+    _say(_for_terminal(f"{head}{_sentence(str(error))}"))
+    return error.exit_code
+
+
+def _drop_what_is_not_shown() -> None:
+    """Have the interpreter's end not try, and fail or wait again, to show what is held back."""
+    with contextlib.suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say(sentence: str) -> None:

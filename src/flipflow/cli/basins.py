@@ -50,7 +50,7 @@ def basins(
     project = in_case(load_project(file, force=force), case, speed)
     omega = speed_of(project, speed)
     with Destination(output or Path(f"{project.name}-flipflow"), json, [file]) as target:
-        found, risk, reason = _computed(project.screen, omega, cells)
+        found, risk, reason, stopped = _computed(project.screen, omega, cells)
 
         from flipflow.plotting.dispatch import figure  # noqa: PLC0415  keeps --help quick
 
@@ -60,14 +60,17 @@ def basins(
         target.data("basins.json", document)
         target.document(document)
         target.finish(lambda out: _show(title, found, risk, reason, out))
-        if not found.complete:
-            raise target.stopped(kept=True)
+        if stopped:
+            raise target.stopped()
 
 
 def _computed(
     screen: FlipFlowScreen, omega: float, cells: int
-) -> tuple[Basins, JumpRisk | None, str]:
-    """Basins, then the jump risk, or why there is none: basins that are found are not lost."""
+) -> tuple[Basins, JumpRisk | None, str, bool]:
+    """Basins, then the jump risk, or why there is none: basins that are found are not lost.
+
+    The last is whether Ctrl-C has ended it.
+    """
     from flipflow.studies.basins import basins as basins_of  # noqa: PLC0415  keeps --help quick
     from flipflow.studies.jump_risk import jump_risk  # noqa: PLC0415
 
@@ -76,12 +79,12 @@ def _computed(
         x, v = _window(screen, omega, cells)
         with stoppable(monitor, "cells") as told:
             found = basins_of(screen, omega, {"relative": x}, {"relative": v}, monitor=told)
-        if not found.complete:
-            return found, None, ""
+        if told.asked:
+            return found, None, "", True
         try:
-            return found, jump_risk(screen, omega, monitor=monitor), ""
+            return found, jump_risk(screen, omega, monitor=monitor), "", False
         except IncompleteError as error:
-            return found, None, str(error)
+            return found, None, str(error), False
 
 
 def _window(screen: FlipFlowScreen, omega: float, cells: int) -> tuple[Any, Any]:

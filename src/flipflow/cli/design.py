@@ -10,6 +10,7 @@ import typer
 
 from flipflow.cli.destination import Destination
 from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers, whole
+from flipflow.cli.outcome import NOTHING, OUTCOME
 from flipflow.cli.output import IMPOSSIBLE
 from flipflow.cli.progress import compile_first, progress, stoppable
 
@@ -67,19 +68,26 @@ def design(
     old = replaced_files(folder, PROPOSAL, duty_key(duty), overwrite=overwrite)
     with Destination(folder, json, [file]) as target:
         target.replaces(old)
-        found = _searched(duty, generations, store, workers, scheduler)
+        if store is not None:
+            OUTCOME.words = lambda: _kept(store)
+        found, stopped = _searched(duty, generations, store, workers, scheduler)
         _write(found, target, pdf=pdf)
-        if found.cancelled:
-            raise target.stopped(kept=True)
+        if stopped:
+            raise target.stopped()
     if not found.possible:
         raise typer.Exit(IMPOSSIBLE)
+
+
+def _kept(store: Path) -> str:
+    """What is kept when the command is stopped before there is a machine."""
+    return f"the search is in {store}, and the same command goes on" if store.exists() else NOTHING
 
 
 def _searched(
     duty: Duty, generations: int | None, store: Path | None, workers: int | None,
     scheduler: str | None,
-) -> Proposal:  # fmt: skip
-    """The machine for a duty, with a bar; Ctrl-C keeps the best so far."""
+) -> tuple[Proposal, bool]:  # fmt: skip
+    """The machine for a duty, with a bar, and whether Ctrl-C has ended it with the best so far."""
     from flipflow.cli.cluster import executor_of  # noqa: PLC0415  keeps --help quick
     from flipflow.studies.design import design as analysis  # noqa: PLC0415
 
@@ -89,7 +97,10 @@ def _searched(
         stoppable(tell, STAGE) as told,
     ):
         compile_first(tell)
-        return analysis(duty, generations=generations, store=store, executor=executor, monitor=told)
+        found = analysis(
+            duty, generations=generations, store=store, executor=executor, monitor=told
+        )
+        return found, told.asked
 
 
 def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from flipflow.cli.outcome import OUTCOME, STOPPED
 from flipflow.cli.output import COLUMNS, JSON, OUTPUT, TERMINAL, console
-from flipflow.errors import Cancelled, FlipflowError, InputError, StoreError
+from flipflow.errors import Cancelled, InputError, StoreError
 from flipflow.results.stage import Stage
 from flipflow.results.store import (
     checked_place,
@@ -33,15 +34,14 @@ if TYPE_CHECKING:
 
 # Endings of figures and tables.
 OF_FOLDER = {".csv", ".html", ".nc", ".pdf", ".svg", ".toml", ".xlsx"}
-STOPPED, NOTHING = "Stopped by the user", "nothing is written"
 
 
 class Destination:
     """A folder for figures and data, and a file or the terminal for a JSON document.
 
-    Made before anything is computed, it refuses what cannot be written. All that a command writes
-    takes its place together, when :meth:`keep` is called. In a ``with`` block Ctrl-C ends the
-    command by a sentence that says what is written.
+    In a ``with`` block, entered before anything is computed, which refuses what cannot be written.
+    All that a command writes takes its place together, when :meth:`keep` is called; from then on
+    Ctrl-C says what is written.
 
     Parameters
     ----------
@@ -62,17 +62,6 @@ class Destination:
         self.folder, self.json, self._reads = folder, json, tuple(reads)
         self._quiet = quiet
         self._made: list[Path] = []
-        if folder is not None:
-            self._made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
-            prepare_folder(folder, OUTPUT)
-        if json not in (None, TERMINAL):
-            try:
-                refuse_input(json, self._reads, JSON)
-                checked_place(json, JSON)
-                self._refuse_figure(json)
-            except FlipflowError:
-                self._remove_made()
-                raise
         self._stage = Stage(folder, OUTPUT)
         self._names: list[str] = []
         self._places: list[str] = []
@@ -80,22 +69,37 @@ class Destination:
         self._kept = False
 
     def __enter__(self) -> Self:
-        """Begin the work that ends in this destination."""
+        """See that all can be written, before the work that ends in this destination."""
+        try:
+            with undisturbed():
+                self._prepare()
+        except BaseException:
+            self._remove_made()
+            raise
         return self
+
+    def _prepare(self) -> None:
+        if self.folder is not None:
+            above = (self.folder, *self.folder.parents)
+            self._made = [one for one in above if not os.path.lexists(one)]
+            prepare_folder(self.folder, OUTPUT)
+        if self.json not in (None, TERMINAL):
+            refuse_input(self.json, self._reads, JSON)
+            checked_place(self.json, JSON)
+            self._refuse_figure(self.json)
 
     def __exit__(
         self,
-        kind: type[BaseException] | None,
+        _kind: type[BaseException] | None,
         error: BaseException | None,
         _trace: TracebackType | None,
     ) -> None:
-        """Turn Ctrl-C into the sentence that ends a stopped command; drop what is not kept."""
-        told = self._stage.told(str(error))
-        self._stage.discard()
-        if not self._kept:
-            self._remove_made()
-        if kind is not None and issubclass(kind, KeyboardInterrupt):
-            raise self.stopped() from None
+        """Drop what is not kept."""
+        with undisturbed():
+            told = self._stage.told(str(error))
+            self._stage.discard()
+            if not self._kept:
+                self._remove_made()
         if isinstance(error, StoreError) and told != str(error):
             raise StoreError(told) from None
 
@@ -178,9 +182,11 @@ class Destination:
             When that cannot be; then every file is as it was.
         """
         if not self._kept:
+            self._stage.prepare()
             with undisturbed():
                 self._stage.commit()
                 self._kept = True
+                OUTCOME.wrote(*self._where())
             sys.stdout.write(self._answer)
 
     def wrote(self, *names: str) -> None:
@@ -201,12 +207,15 @@ class Destination:
             show(console())
         self.tell()
 
-    def stopped(self, *, kept: bool = False) -> Cancelled:
-        """The error that ends a command after Ctrl-C; ``kept``: what was finished is shown."""
-        places = [str(self.folder)] * bool(self._names) + self._places
-        if self._kept and places:
-            return Cancelled(f"{STOPPED}; what was finished is in {' and '.join(places)}.")
-        return Cancelled(f"{STOPPED}; {'what was finished is shown' if kept else NOTHING}.")
+    def stopped(self) -> Cancelled:
+        """The error that ends a command after Ctrl-C that has shown what was finished."""
+        if self._where():
+            return OUTCOME.error()
+        return Cancelled(f"{STOPPED}; what was finished is shown.")
+
+    def _where(self) -> list[str]:
+        """Places that are written, or will be."""
+        return [str(self.folder)] * bool(self._names) + self._places
 
     def _lines(self) -> Iterable[str]:
         if self._names:

@@ -16,16 +16,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from flipflow.signals import SIGNALS
+from flipflow.cli.outcome import NOTHING, OUTCOME, STOPPED
+from flipflow.errors import Cancelled, FlipflowError
 
-STOPPED_CODE = 130
 OBJECTS = 50_000  # made since garbage was last looked for
 ESCAPED = "flipflow-escaped"  # how letters are shown that an encoding has not
 AGAIN = 0.02  # seconds until a dropped interrupt is raised again
 
 
 def main() -> None:
-    """Run the command line; an error is one sentence on stderr and the exit code of its class."""
+    """Run the command line; an error is one sentence on stderr and the exit code of its class.
+
+    Once that is said, Ctrl-C and SIGTERM change nothing: the process is about to end.
+    """
     sys.stdout = sys.stdout or Closed()
     sys.stderr = sys.stderr or Closed()
     _show_what_it_can(sys.stdout)
@@ -33,11 +36,73 @@ def main() -> None:
     gc.set_threshold(OBJECTS, 50, 50)
     # Nor is there any at the end, where Python takes a tenth of an analysis to look once more.
     atexit.register(gc.freeze)
-    with _stopped_at_once():
+    OUTCOME.clear()
+    answers = _Answers()
+    with answers.in_force():
         # Loading the commands takes a moment, in which libraries would answer Ctrl-C themselves.
-        from flipflow.cli.app import run  # noqa: PLC0415
-    with _terminated_as_interrupted(), _never_lost():
-        run()
+        from flipflow.cli.app import run, said  # noqa: PLC0415
+
+        try:
+            try:
+                answers.loaded = True
+                with _never_lost():
+                    run()
+            finally:
+                answers.ended = True
+        except (KeyboardInterrupt, FlipflowError, OSError) as error:
+            code = said(error)
+        else:
+            return
+        sys.exit(code)
+
+
+class _Answers:
+    """What Ctrl-C and SIGTERM do: end the process, interrupt a command, or nothing.
+
+    The handlers stay the same, and plain flags say which: between two handlers a signal would find
+    that of Python.
+    """
+
+    def __init__(self) -> None:
+        self.loaded = self.ended = False
+
+    @contextmanager
+    def in_force(self) -> Iterator[None]:
+        """Answer signals in the block, and none after it.
+
+        What is ignored, as in a shell's background, stays so.
+        """
+        answers = {signal.SIGINT: self._interrupted, signal.SIGTERM: self._terminated}
+        if threading.current_thread() is not threading.main_thread():
+            answers = {}
+        for one, answer in answers.items():
+            if signal.getsignal(one) is not signal.SIG_IGN:
+                signal.signal(one, answer)
+        try:
+            yield
+        finally:
+            self.ended = True
+            for one in answers:
+                signal.signal(one, signal.SIG_IGN)
+            # An interrupt that passed through code made from text, as dataclasses are, has
+            # "python -m" end itself by SIGINT in place of the exit code; running such code forgets
+            # it.
+            exec("")  # noqa: S102
+
+    def _interrupted(self, _number: int, _frame: FrameType | None) -> None:
+        if self.ended:
+            return
+        if self.loaded:
+            raise KeyboardInterrupt
+        self.ended = True
+        with suppress(OSError):
+            os.write(sys.stderr.fileno(), f"{STOPPED}; {NOTHING}.\n".encode())
+        os._exit(Cancelled.exit_code)
+
+    def _terminated(self, number: int, frame: FrameType | None) -> None:
+        """Do what Ctrl-C does at that moment."""
+        answer = signal.getsignal(signal.SIGINT)
+        (answer if callable(answer) else self._interrupted)(number, frame)
 
 
 class Closed(io.TextIOBase):
@@ -67,37 +132,6 @@ def _escaped(error: UnicodeError) -> tuple[str, int]:
         raise error
     digits = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass").hex()
     return "".join(f"\\u{digits[k : k + 4]}" for k in range(0, len(digits), 4)), error.end
-
-
-def _say_stopped(outcome: str) -> None:
-    with suppress(OSError):
-        os.write(sys.stderr.fileno(), f"Stopped by the user; {outcome}.\n".encode())
-
-
-@contextmanager
-def _stopped_at_once() -> Iterator[None]:
-    """End the process at Ctrl-C or SIGTERM as long as nothing has begun."""
-
-    def end(_number: int, _frame: FrameType | None) -> None:
-        _say_stopped("nothing is written")
-        os._exit(STOPPED_CODE)
-
-    with _answered(dict.fromkeys(SIGNALS, end)):
-        yield
-
-
-@contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """Let SIGTERM do what Ctrl-C does at that moment."""
-
-    def interrupted(number: int, frame: FrameType | None) -> None:
-        answer = signal.getsignal(signal.SIGINT)
-        if not callable(answer):
-            raise KeyboardInterrupt
-        answer(number, frame)
-
-    with _answered({signal.SIGTERM: interrupted}):
-        yield
 
 
 @contextmanager
@@ -135,30 +169,9 @@ def _never_lost() -> Iterator[None]:
                 later.join()
             # An error has its own code, and keeps it.
             if dropped.is_set() and not code:
-                raise KeyboardInterrupt
-    except KeyboardInterrupt:
-        _say_stopped("it had come to its end")
-        sys.exit(STOPPED_CODE)
+                raise Cancelled(f"{STOPPED}; it had come to its end.")
     finally:
         sys.unraisablehook = before
-        # An interrupt that passed through code made from text, as dataclasses are, has "python -m"
-        # end itself by SIGINT in place of the exit code; running such code forgets it.
-        exec("")  # noqa: S102
-
-
-@contextmanager
-def _answered(answers: dict[signal.Signals, object]) -> Iterator[None]:
-    """Answer signals in the block; what is ignored, as in a shell's background, stays so."""
-    before = {}
-    if threading.current_thread() is threading.main_thread():
-        for one, answer in answers.items():
-            if signal.getsignal(one) is not signal.SIG_IGN:
-                before[one] = signal.signal(one, answer)  # type: ignore[arg-type]
-    try:
-        yield
-    finally:
-        for one, answer in before.items():
-            signal.signal(one, answer)
 
 
 if __name__ == "__main__":

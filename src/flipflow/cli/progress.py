@@ -51,27 +51,44 @@ def compile_first(tell: Monitor) -> None:
     compile_ahead(lambda seconds: tell(f"compiling, once per version: {seconds:.0f} s", 0.0))
 
 
-@contextmanager
-def stoppable(tell: Monitor, stage: str) -> Iterator[Monitor]:
+class Stoppable:
     """A monitor that raises Cancelled after Ctrl-C in a stage that keeps what is finished.
 
-    The stage is known by the first words of what it tells. In other stages, and at the second
-    time, Ctrl-C ends the program at once.
+    Parameters
+    ----------
+    tell
+        Is told what this is told.
+    stage
+        First words of what is told in that stage.
     """
-    at = {"stage": "", "stop": ""}
 
-    def told(sentence: str, share: float) -> None:
-        at["stage"] = sentence
-        if at["stop"]:
+    def __init__(self, tell: Monitor, stage: str) -> None:
+        self._tell, self._stage = tell, stage
+        self._last, self.asked = "", False
+
+    def __call__(self, sentence: str, share: float) -> None:
+        """Pass it on, unless the user has asked for the end."""
+        self._last = sentence
+        if self.asked:
             raise Cancelled("stopped by the user")
-        tell(sentence, share)
+        self._tell(sentence, share)
 
-    def interrupted(_number: int, _frame: FrameType | None) -> None:
-        if not at["stage"].startswith(stage) or at["stop"]:
+    def answer(self, _number: int, _frame: FrameType | None) -> None:
+        """Answer Ctrl-C."""
+        if not self._last.startswith(self._stage) or self.asked:
             raise KeyboardInterrupt
-        at["stop"] = "asked"
+        self.asked = True
 
-    before = signal.signal(signal.SIGINT, interrupted)
+
+@contextmanager
+def stoppable(tell: Monitor, stage: str) -> Iterator[Stoppable]:
+    """A monitor for a stage that Ctrl-C ends so that what is finished is kept.
+
+    ``asked`` says so afterwards, also where all was finished before the monitor was called again.
+    In other stages, and at the second time, Ctrl-C ends the program at once.
+    """
+    told = Stoppable(tell, stage)
+    before = signal.signal(signal.SIGINT, told.answer)
     try:
         yield told
     finally:

@@ -9,7 +9,6 @@ import typer
 
 from flipflow.cli.destination import Destination
 from flipflow.cli.options import Json, Output
-from flipflow.cli.output import console
 from flipflow.cli.progress import with_progress
 
 if TYPE_CHECKING:
@@ -60,15 +59,12 @@ def reproduce(
             # A figure that this machine does not have would be left over from another one.
             target.replaces([name for name in files if not (folder / name).exists()])
         target.result(found)
-        target.keep()
-        if target.spoken:
-            _show(found, console())
         count = sum(one.figure is not None for one in found.figures)
         pictures = "1 figure" if count == 1 else f"{count} figures"
         target.wrote(PAGE, f"and {pictures} as HTML, SVG and PDF")
-        target.tell()
+        target.finish(lambda out: _show(found, out))
         if len(found.figures) < len(wanted):
-            raise target.stopped(kept=True)
+            raise target.stopped()
 
 
 def _finished(

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flipflow.cli.destination import NOTHING, STOPPED, Destination
+from flipflow.cli.destination import Destination
 from flipflow.cli.options import Folder, Force, Json, Scheduler, Workers
+from flipflow.cli.outcome import NOTHING, OUTCOME, STOPPED
 from flipflow.cli.output import printable
 from flipflow.cli.progress import compile_first, progress
 from flipflow.errors import Cancelled, InputError
@@ -62,11 +63,12 @@ def study(
     with Destination(
         output or Path(f"{asked.name}-flipflow"), json, [file] if file else []
     ) as target:
+        OUTCOME.words = lambda: _kept(file, asked.store)
         try:
             with progress("starting") as tell, executor_of(workers, scheduler) as executor:
                 found = asked.run(executor, tell)
         except KeyboardInterrupt:
-            raise _stopped(file, asked.store) from None
+            raise Cancelled(f"{STOPPED}; {_kept(file, asked.store, counted=True)}.") from None
         judged = asked.judged(found)
         _write(found, judged, asked, target)
 
@@ -146,24 +148,25 @@ def _asked(file: str | None, store: Path | None, resume: Path | None, *, force: 
     return _Asked(one, place)
 
 
-def _stopped(file: str | None, store: Path) -> Exception:
-    """The error that ends a command after Ctrl-C, with what is kept.
+def _kept(file: str | None, store: Path, *, counted: bool = False) -> str:
+    """What is kept when the command is stopped, and how it goes on.
 
-    The file is named, for limits and title are in it, and not in the store.
+    The file is named, for limits and title are in it, and not in the store. To count chunks takes
+    a moment, for each is read.
     """
     import shlex  # noqa: PLC0415  keeps --help quick
 
     from flipflow.batch.chunk_store import FINISHED, ChunkStore  # noqa: PLC0415  quick --help
 
     if not store.exists():
-        return Cancelled(f"{STOPPED}; {NOTHING}.")
-    kept = ChunkStore(store)
-    finished = sum(state.word == FINISHED for state in kept.states())
+        return NOTHING
+    kept = "the finished chunks"
+    if counted:
+        states = ChunkStore(store).states()
+        finished = [state.word == FINISHED for state in states]
+        kept = f"{sum(finished)} of {len(finished)} chunks"
     words = ["flipflow", "study", *([file] if file else []), RESUME, str(store)]
-    return Cancelled(
-        f"{STOPPED}; {finished} of {kept.chunks} chunks are in {store}, and "
-        f"{shlex.join(words)} goes on."
-    )
+    return f"{kept} are in {store}, and {shlex.join(words)} goes on"
 
 
 def _write(found: Study, judged: Tolerance | None, asked: _Asked, target: Destination) -> None:

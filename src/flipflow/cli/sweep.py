@@ -103,7 +103,7 @@ def sweep(
             target.picture("sweep.html", figure, marked(project, case))
         target.finish(lambda out: _show(title, found, steps, out))
         if not found.complete:
-            raise target.stopped(kept=True)
+            raise target.stopped()
 
 
 def _rate(written: str, ends: tuple[float, float]) -> float:
@@ -121,8 +121,8 @@ def _rate(written: str, ends: tuple[float, float]) -> float:
 
 def _passed(project: Project, ends: tuple[float, float], steps: int, rate: float | None) -> Passed:
     """Sweep up and down, then glide; Ctrl-C ends it and keeps what is finished."""
-    up, down = _swept(project, ends, steps)
-    if down is None or not down.complete:
+    up, down, stopped = _swept(project, ends, steps)
+    if stopped:
         return Passed(up, down)
     try:
         glides = () if rate is None else _glides(project, ends, rate)
@@ -133,7 +133,10 @@ def _passed(project: Project, ends: tuple[float, float], steps: int, rate: float
     return Passed(up, down, glides, complete=True)
 
 
-def _swept(project: Project, ends: tuple[float, float], steps: int) -> tuple[Sweep, Sweep | None]:
+def _swept(
+    project: Project, ends: tuple[float, float], steps: int
+) -> tuple[Sweep, Sweep | None, bool]:
+    """Speeds rising, then falling, and whether Ctrl-C has ended them."""
     import numpy as np  # noqa: PLC0415  keeps --help quick
 
     from flipflow.transient.sweep import sweep as settle  # noqa: PLC0415
@@ -145,11 +148,12 @@ def _swept(project: Project, ends: tuple[float, float], steps: int) -> tuple[Swe
     ):
         up = settle(project.screen, omega, monitor=lambda s, share: told(s, 0.5 * share))
         if not up.complete:
-            return up, None
-        return up, settle(
+            return up, None, True
+        down = settle(
             project.screen, omega[::-1], initial=up.rows[-1].state,
             monitor=lambda s, share: told(s, 0.5 + 0.5 * share),
         )  # fmt: skip
+        return up, down, told.asked
 
 
 def _glides(project: Project, ends: tuple[float, float], rate: float) -> tuple[Ramp, Ramp]:

@@ -28,6 +28,7 @@ from flipflow.results.store import (
     write_beside,
     write_file,
 )
+from flipflow.signals import undisturbed
 
 MOST_KEPT = 1000  # other files of a folder that are carried along
 ABANDONED = 10.0  # s after which files aside that nobody holds are those of a killed command
@@ -51,13 +52,15 @@ class Stage:
         self._aside: Path | None = None
         self._lock = -1
         self._elsewhere: list[tuple[str, str, str]] = []
+        self._parts: list[tuple[Path, Path]] = []
         self._dropped: frozenset[str] = frozenset()
 
     @property
     def aside(self) -> Path:
         """The folder that the files are written into."""
         if self._aside is None:
-            self._aside = self._made()
+            with undisturbed():
+                self._aside = self._made()
         return self._aside
 
     def hold(self, target: str, content: str, field: str) -> None:
@@ -72,6 +75,21 @@ class Stage:
         """A sentence on a file aside, made one on the file that the user knows."""
         return sentence.replace(str(self._aside), str(self._named)) if self._aside else sentence
 
+    def prepare(self) -> None:
+        """Write the files that are to stand elsewhere beside their places.
+
+        A device or a pipe gets its file now, and may let it wait: Ctrl-C ends that.
+
+        Raises
+        ------
+        StoreError
+            When one cannot be written.
+        """
+        for target, content, field in self._elsewhere:
+            if not self._is_aside(target):
+                self._beside(target, content, field)
+        self._elsewhere = []
+
     def commit(self) -> None:
         """Let all files take their places.
 
@@ -80,12 +98,9 @@ class Stage:
         StoreError
             When one cannot; then all are as they were.
         """
-        parts: list[tuple[Path, Path]] = []
+        self.prepare()
+        parts, self._parts = self._parts, []
         try:
-            for target, content, field in self._elsewhere:
-                if self._is_aside(target):
-                    continue
-                parts += self._beside(target, content, field)
             exchanged = self._aside is not None and self._exchanged()
             if self._aside is not None and not exchanged:
                 parts += self._single()
@@ -98,11 +113,12 @@ class Stage:
         finally:
             for part, _ in parts:
                 part.unlink(missing_ok=True)
-            self._elsewhere = []
             self.discard()
 
     def discard(self) -> None:
         """Remove what is aside."""
+        while self._parts:
+            self._parts.pop()[0].unlink(missing_ok=True)
         if self._aside is not None:
             shutil.rmtree(self._aside, ignore_errors=True)
             self._aside = None
@@ -125,14 +141,15 @@ class Stage:
                 return place
         raise refused(self._field, self._named or "", "nothing can be written there, name another")
 
-    def _beside(self, target: str, content: str, field: str) -> Iterator[tuple[Path, Path]]:
+    def _beside(self, target: str, content: str, field: str) -> None:
         """A file elsewhere, written beside its place; a device or a pipe gets it as it is."""
         place = checked_place(target, field)
         if place.exists() and not place.is_file():
             write_file(place, content, field)
             return
         try:
-            yield write_beside(place, content), place
+            with undisturbed():
+                self._parts.append((write_beside(place, content), place))
         except OSError as error:
             raise refused(field, target, because(error)) from None
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from flipflow.errors import InputError, StoreError
+from flipflow.signals import undisturbed
 
 AS_WRITTEN: Any = {"ensure_ascii": False, "allow_nan": False}
 MOST_SHOWN = 300  # characters of a path that a sentence shows
@@ -48,12 +49,11 @@ def write_file(
     content = as_bytes(content)
     place = checked_place(target, field)
     try:
-        if fresh:
-            _put_new(place, content)
-        elif place.exists() and not place.is_file():
+        if not fresh and place.exists() and not place.is_file():
             place.write_bytes(content)
         else:
-            _put(place, content)
+            with undisturbed():
+                (_put_new if fresh else _put)(place, content)
     except FileExistsError:
         remedy = "it exists and is not overwritten, choose another name"
         raise InputError(field, str(target), remedy) from None

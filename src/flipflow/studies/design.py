@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -291,7 +292,8 @@ def design(
     found = outcome.found
     built = _yield(space, outcome)
     if monitor is not None and not outcome.cancelled:
-        monitor("design, done", 1.0)
+        with suppress(Cancelled):  # nothing is left to end
+            monitor("design, done", 1.0)
     return Proposal(
         duty=duty,
         fields={name: np.asarray(one) for name, one in space.columns(front.u).items()},
