@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.cli.destination import Destination
 from flipflow.compiled import workers
 from flipflow.compiled.interruptible import interruptible
 from flipflow.errors import IncompleteError
@@ -456,6 +457,24 @@ def test_a_second_signal_leaves_nothing_either(command, monkeypatch, tmp_path):
         remove(*given, **more)
 
     monkeypatch.setattr(shutil, "rmtree", interrupted)
+    code, _, error = command(*WRITING["simulate"])
+    assert (code, error) == (130, "Stopped by the user; nothing is written.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", BOTH)
+def test_two_signals_at_once_are_one(command, monkeypatch, tmp_path, number):
+    """The second comes before what is begun is removed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("flipflow.cli.main.MOMENT", 1000.0)
+    pressed_after(monkeypatch, "flipflow.plotting.figure.Figure.write")
+    end = Destination.__exit__
+
+    def interrupted(*given):
+        signal.raise_signal(number)
+        end(*given)
+
+    monkeypatch.setattr(Destination, "__exit__", interrupted)
     code, _, error = command(*WRITING["simulate"])
     assert (code, error) == (130, "Stopped by the user; nothing is written.\n")
     assert list(tmp_path.iterdir()) == []

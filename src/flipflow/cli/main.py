@@ -8,10 +8,12 @@ import codecs
 import errno
 import gc
 import io
+import math
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -22,6 +24,7 @@ from flipflow.errors import Cancelled, FlipflowError
 OBJECTS = 50_000  # made since garbage was last looked for
 ESCAPED = "flipflow-escaped"  # how letters are shown that an encoding has not
 AGAIN = 0.02  # seconds until a dropped interrupt is raised again
+MOMENT = 0.5  # seconds after an interrupt in which another signal is the same wish
 
 
 def main() -> None:
@@ -45,7 +48,7 @@ def main() -> None:
         try:
             try:
                 answers.loaded = True
-                with _never_lost():
+                with _never_lost(answers):
                     run()
             finally:
                 answers.ended = True
@@ -65,6 +68,7 @@ class _Answers:
 
     def __init__(self) -> None:
         self.loaded = self.ended = False
+        self.raised = -math.inf
 
     @contextmanager
     def in_force(self) -> Iterator[None]:
@@ -93,6 +97,11 @@ class _Answers:
         if self.ended:
             return
         if self.loaded:
+            # Whoever sends two at once would else interrupt what the first has cleared away.
+            now = time.monotonic()
+            if now - self.raised < MOMENT:
+                return
+            self.raised = now
             raise KeyboardInterrupt
         self.ended = True
         with suppress(OSError):
@@ -135,12 +144,13 @@ def _escaped(error: UnicodeError) -> tuple[str, int]:
 
 
 @contextmanager
-def _never_lost() -> Iterator[None]:
+def _never_lost(answers: _Answers) -> Iterator[None]:
     """Raise an interrupt again that Python drops: it does so within a finalizer or a callback."""
     before, waiting, dropped = sys.unraisablehook, list[threading.Timer](), threading.Event()
 
     def interrupt() -> None:
         dropped.clear()
+        answers.raised = -math.inf
         _thread.interrupt_main()
 
     def again(one: sys.UnraisableHookArgs) -> None:
