@@ -12,22 +12,27 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import typer.main
 
 import flipflow as ff
 from flipflow.cli.main import main
 from flipflow.continuation.branch import Branch
+from flipflow.dynamics.machine_columns import Named
 from flipflow.io.project import Project
 from flipflow.model.monitor import Monitor
 from flipflow.paper.reproduce import Reproduction
+from flipflow.periodic.derivatives import MotionDerivatives
+from flipflow.periodic.orbit import Orbit
 from flipflow.report.blocks import FigureBlock, Heading
 from flipflow.report.html import KIND, footer_of, page, title_of
 from flipflow.report.registry import blocks_of
 from flipflow.signals import SIGNALS
+from flipflow.studies import derivatives
 from flipflow.studies.assessment import Assessment, assess
 from kernels_ahead import compile_ahead
 
@@ -145,6 +150,14 @@ def _signals() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _command_line_built_once() -> Iterator[None]:
+    """What reads a command line is made anew for each, which takes longer than most answers."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(typer.main, "get_command", functools.cache(typer.main.get_command))
+        yield
+
+
 @pytest.fixture
 def command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -237,6 +250,20 @@ def _print(report: Path) -> Path:
         capture_output=True, timeout=900, check=True,
     )  # fmt: skip
     return sheet
+
+
+@pytest.fixture
+def slopes_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The derivatives of a motion are made once for all that is read off it."""
+    made, known = derivatives._slopes, {}
+
+    def slopes(orbit: Orbit, parameters: Sequence[Named]) -> MotionDerivatives:
+        key = id(orbit), tuple(one.name for one in parameters)
+        if key not in known:
+            known[key] = orbit, made(orbit, parameters)  # an orbit that is kept keeps its number
+        return known[key][1]
+
+    monkeypatch.setattr(derivatives, "_slopes", slopes)
 
 
 @pytest.fixture(scope="module")

@@ -23,10 +23,9 @@ from flipflow.model.parameters import parameter_names, value_of, with_values
 from flipflow.model.quantities import quantities_for
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.periodic.orbit import Orbit
-from flipflow.studies import derivatives
 from flipflow.studies.quantity_values import Working
 
-pytestmark = pytest.mark.numerical
+pytestmark = [pytest.mark.numerical, pytest.mark.usefixtures("slopes_once")]
 LAWS = get_args(ContactLaw)
 STEP = 2e-5  # of a difference, as a share of the parameter
 WIDE_STEP = 2e-4  # where rounding of what is read exceeds what lies beyond fourth order
@@ -44,20 +43,6 @@ OF_QUANTITIES = [
     "bearing_life_exponent",
 ]  # fmt: skip
 READINGS = ("amplitude", "mean", "phase", "mean_square_velocity")
-
-
-@pytest.fixture(autouse=True)
-def _slopes_once(monkeypatch) -> None:
-    """The derivatives of a motion are made once for all that is read off it."""
-    made, known = derivatives._slopes, {}
-
-    def slopes(orbit, parameters):
-        key = id(orbit), tuple(one.name for one in parameters)
-        if key not in known:
-            known[key] = orbit, made(orbit, parameters)  # an orbit that is kept keeps its number
-        return known[key][1]
-
-    monkeypatch.setattr(derivatives, "_slopes", slopes)
 
 
 @pytest.fixture(scope="module")

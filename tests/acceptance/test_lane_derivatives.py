@@ -16,7 +16,7 @@ from flipflow.model.quantities import quantities_for, quantity_named
 from flipflow.studies.lane_values import lane_values, on_lanes, slope_key, with_own
 from flipflow.studies.quantity_values import MOTION_VALUES
 
-pytestmark = pytest.mark.numerical
+pytestmark = [pytest.mark.numerical, pytest.mark.usefixtures("slopes_once")]
 FIELDS = (
     "main_mass", "floating_mass", "shear_stiffness", "shear_damping", "stop_stiffness",
     "stop_damping", "clearance", "eccentric_moment", "isolation_stiffness", "isolation_damping",
