@@ -17,7 +17,7 @@ from flipflow.dynamics.contact_free import complex_amplitudes
 from judge import close
 
 pytestmark = pytest.mark.numerical
-SEED, MACHINES = 20261129, 120
+SEED, MACHINES = 20261129, 64
 SHIFTS = (math.pi / 6.0, math.pi / 3.0, 2.0, 4.0)
 
 
