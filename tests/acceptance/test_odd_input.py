@@ -58,9 +58,9 @@ def test_a_closed_terminal_is_said_where_it_can_be(tmp_path):
     assert (tmp_path / "x.json").read_text().startswith('{\n"schema"')
 
 
-@pytest.mark.parametrize("code", ["ascii", "latin-1", "utf-16"])
-def test_a_terminal_that_is_not_utf8_shows_what_it_can(code):
-    told = run("check", "ffs0827", capture_output=True, env=os.environ | {"PYTHONIOENCODING": code})
+def test_a_terminal_of_wide_letters_shows_what_it_can():
+    env = os.environ | {"PYTHONIOENCODING": "utf-16"}
+    told = run("check", "ffs0827", capture_output=True, env=env)
     assert told.returncode == 0, told.stderr
 
 

@@ -18,7 +18,7 @@ import flipflow as ff
 
 GRAVITY = 9.80665
 CREEP = 0.1  # rad/s, below which the constant friction fades
-STEP, ROWS = 5e-4, 4  # s, longest step; rows of each, so that no peak falls between two
+STEP, ROWS = 1e-3, 8  # s, longest step; rows of each, so that no peak falls between two
 Real = NDArray[np.float64]
 
 
