@@ -32,7 +32,7 @@ from flipflow.report.blocks import FigureBlock, Heading
 from flipflow.report.html import KIND, footer_of, page, title_of
 from flipflow.report.registry import blocks_of
 from flipflow.signals import SIGNALS
-from flipflow.studies import derivatives
+from flipflow.studies import derivatives, start_and_blows
 from flipflow.studies.assessment import Assessment, assess
 from kernels_ahead import compile_ahead
 
@@ -155,6 +155,17 @@ def _command_line_built_once() -> Iterator[None]:
     """What reads a command line is made anew for each, which takes longer than most answers."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(typer.main, "get_command", functools.cache(typer.main.get_command))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _blows_once() -> Iterator[None]:
+    """What throws a motion is half of an analysis, and the same for machines that differ in words.
+
+    ``ff.jump_risk`` itself finds it anew each time.
+    """
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(start_and_blows, "jump_risk", functools.cache(start_and_blows.jump_risk))
         yield
 
 
