@@ -117,7 +117,7 @@ def test_machines_that_nobody_chose():
         }
         omega = np.array([0.6, 1.0, 1.4, 1.9])
         found = ff.worst_case(machine, vary, "stop_force", omega, branch="upper")
-        grid = [np.linspace(*ends, 15) for ends in vary.values()]
+        grid = [np.linspace(*ends, 21) for ends in vary.values()]
         a, b = (one.ravel() for one in np.meshgrid(*grid))
         question = question_of(machine, "stop_force", omega, "upper")
         values = motion_values(question, {"gap": a, "stop": b}, 1, lambda _: None)
