@@ -191,6 +191,8 @@ def _to_other_sign(
             low = part
         else:
             high = part
+        if abs(slope) > abs(bend) * (high - low):
+            break  # too far from zero for what is left of the way
     return 0.0
 
 
