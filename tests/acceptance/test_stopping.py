@@ -335,6 +335,16 @@ def test_a_failure_beside_the_main_thread_is_raised_in_it():
     assert interruptible(lambda: 3.0) == 3.0
 
 
+def test_an_interrupt_before_a_kernel_has_begun_stops_none(monkeypatch):
+    """Its flag would stop the next one."""
+
+    monkeypatch.setattr("flipflow.compiled.interruptible.undisturbed", lambda: 1 / 0)
+    stop = np.zeros(1, np.int64)
+    with pytest.raises(ZeroDivisionError):
+        interruptible(dict, stop)
+    assert stop[0] == 0
+
+
 def test_an_interrupt_leaves_no_lock_that_nobody_opens():
     run = subprocess.run(
         [sys.executable, "-c", LOCKED], capture_output=True, text=True, timeout=60, check=False

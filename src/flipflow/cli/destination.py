@@ -39,9 +39,9 @@ OF_FOLDER = {".csv", ".html", ".nc", ".pdf", ".svg", ".toml", ".xlsx"}
 class Destination:
     """A folder for figures and data, and a file or the terminal for a JSON document.
 
-    In a ``with`` block, entered before anything is computed, which refuses what cannot be written.
-    All that a command writes takes its place together, when :meth:`keep` is called; from then on
-    Ctrl-C says what is written.
+    Entered as a ``with`` block before anything is computed, it refuses what cannot be written. All
+    that a command writes takes its place together, when :meth:`keep` is called; from then on Ctrl-C
+    says what is written.
 
     Parameters
     ----------

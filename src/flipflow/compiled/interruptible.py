@@ -46,11 +46,14 @@ def interruptible(run: Callable[[], R], *stops: Int, work: int = BRIEF + 1) -> R
         else:
             ended.put(None)
 
+    thread = threading.Thread(target=beside, name="flipflow kernel", daemon=True)
     try:
         with undisturbed():
-            threading.Thread(target=beside, name="flipflow kernel", daemon=True).start()
+            thread.start()
         failure = ended.get()
     except BaseException:
+        if thread.ident is None:  # nothing has begun that could be stopped
+            raise
         for stop in stops:
             stop[0] = 1
         with suppress(Empty):
