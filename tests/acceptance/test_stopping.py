@@ -337,7 +337,6 @@ def test_a_failure_beside_the_main_thread_is_raised_in_it():
 
 def test_an_interrupt_before_a_kernel_has_begun_stops_none(monkeypatch):
     """Its flag would stop the next one."""
-
     monkeypatch.setattr("flipflow.compiled.interruptible.undisturbed", lambda: 1 / 0)
     stop = np.zeros(1, np.int64)
     with pytest.raises(ZeroDivisionError):
