@@ -8,6 +8,7 @@ import gc
 import importlib
 import pickle
 import pkgutil
+import re
 import shutil
 import signal
 import subprocess
@@ -21,6 +22,7 @@ import typer.main
 
 import flipflow as ff
 from flipflow.cli.main import main
+from flipflow.compiled import cache
 from flipflow.continuation.branch import Branch
 from flipflow.dynamics.machine_columns import Named
 from flipflow.io.project import Project
@@ -166,6 +168,20 @@ def _blows_once() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(start_and_blows, "jump_risk", functools.cache(start_and_blows.jump_risk))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _arrays_of_one_layout() -> Iterator[None]:
+    """A kernel is compiled anew for arrays that lie otherwise in memory, which can take a minute."""
+    load = cache.KernelCache.load_overload
+
+    def checked(self: cache.KernelCache, sig: object, target: object) -> object:
+        assert not re.search(r"d, [AF]\)|readonly", str(sig)), f"arrays of another layout: {sig}"
+        return load(self, sig, target)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(cache.KernelCache, "load_overload", checked)
         yield
 
 

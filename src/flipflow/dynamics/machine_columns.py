@@ -106,7 +106,7 @@ def solved_columns(M: Real, parts: Mapping[str, Real]) -> Columns:
         return np.ascontiguousarray(array)
 
     def every(array: Real) -> Real:
-        return np.array(np.broadcast_to(array, (*leading, *array.shape)))
+        return np.array(np.broadcast_to(array, (*leading, *array.shape)), order="C")
 
     push = solved["force"][..., :forces, :] + 1j * solved["force"][..., forces:, :]
     return Columns(
