@@ -173,7 +173,7 @@ def _blows_once() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _arrays_of_one_layout() -> Iterator[None]:
-    """A kernel is compiled anew for arrays that lie otherwise in memory, which can take a minute."""
+    """A kernel is compiled anew for arrays that lie otherwise in memory: that can take a minute."""
     load = cache.KernelCache.load_overload
 
     def checked(self: cache.KernelCache, sig: object, target: object) -> object:

@@ -223,6 +223,11 @@ _ALL = (
         of_stops=True,
     ),
     Quantity(
+        "contact_share", "share of the turn in contact", "tc/T", "", "%",
+        "Share of the turn during which a stop pushes or pulls; of several the longest.",
+        of_stops=True, elsewhere="share of the turn in contact",
+    ),
+    Quantity(
         "foundation_force", "foundation force", "F1", "N", "kN",
         "Greatest dynamic force of all isolation springs on the foundation, in any direction.",
         needs=_NORMAL,
@@ -276,6 +281,11 @@ _ALL = (
             "at least", "Least distance of the speed from the jump, as a share of the jump speed.",
             "20 %", (0.0, 0.9), upper=1.0,
         ),
+    ),
+    Quantity(
+        "largest_multiplier", "largest multiplier", "|mu|", "", "",
+        "What a turn leaves of a small disturbance: size of the largest Floquet multiplier.",
+        elsewhere="largest multiplier",
     ),
     Quantity(
         "throw_number", "throw number", "Kv", "", "",

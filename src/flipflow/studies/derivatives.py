@@ -52,7 +52,7 @@ def orbit_sensitivity(orbit: Orbit, quantity: Asked, names: Sequence[str]) -> ND
     reading = _reading(orbit, quantity)
     parameters = [_named(orbit.machine, name) for name in asked if name != OMEGA]
     slopes = _slopes(orbit, parameters)
-    slopes.require_smooth(multipliers=quantity == MULTIPLIERS)
+    slopes.require_smooth(multipliers=quantity in (MULTIPLIERS, "largest_multiplier"))
     if quantity == STATE:
         found: NDArray[Any] = slopes.state
     elif quantity == MULTIPLIERS:

@@ -58,6 +58,11 @@ class LanePlan:
         return self.batch.bonded if asked else self.batch.bonded[:, :0]
 
     @property
+    def least_share(self) -> float:
+        """Share of the turn in which springs without gap act."""
+        return 1.0 if self.batch.bonded.shape[1] > 0 else 0.0
+
+    @property
     def leading(self) -> Any:
         """The coordinate by which motions are compared."""
         return leading_coordinate(self.system)
@@ -136,7 +141,7 @@ class LanePlan:
             along=along,
             across=across,
             means=bool(phases or quantities & {*SQUARED, "dissipated_power"}),
-            multipliers=False,
+            multipliers="largest_multiplier" in quantities,
             even=changes.keeps_mirror,
             corner=np.where(laws, 0, 1),
         )
@@ -192,6 +197,7 @@ class LaneMotions:
 
     plan: LanePlan
     read: Readings
+    multiplier: Complex  # (L, K, 2 N)
 
     @property
     def omega(self) -> Real:
@@ -246,6 +252,13 @@ class LaneMotions:
 
     def approach_speed(self) -> Real:
         return self.read.approach
+
+    def longest_contact(self) -> Real:
+        shares = self.read.share.max(axis=2, initial=self.plan.least_share)
+        return np.where(np.isnan(self.read.approach), np.nan, shares)
+
+    def largest_multiplier(self) -> Real:
+        return np.asarray(np.abs(self.multiplier).max(axis=2))
 
     def bearing_load(self) -> Real:
         return self._peak("bearing")

@@ -226,7 +226,7 @@ class _Question:
         told_by_lanes = tuple(one for one in self.quantities if on_lanes(self.machine, one))
         plan = LanePlan(self.machine, self.batch, fields, omega, told_by_lanes)
         found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
-        told = LaneMotions(plan, read)
+        told = LaneMotions(plan, read, found.multiplier)
         values = {one.name: told.value(one) for one in told_by_lanes}
         others = [one for one in self.quantities if one not in told_by_lanes]
         if others:
@@ -266,7 +266,7 @@ class _Question:
         slopes = solve_slopes(
             self.batch, changes.solved, plan.omega, plan.asked, wanted, found, self.threads
         )
-        tilted = TiltedLanes(plan, self.names, read, slopes)
+        tilted = TiltedLanes(plan, self.names, read, found.multiplier, slopes)
         tables = {slope_key(one.name): tilted.slope(one) for one in self.quantities}
         for table in tables.values():
             table[np.broadcast_to(~changes.known[:, None], table.shape)] = np.nan

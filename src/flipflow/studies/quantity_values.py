@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Complex, Real
-from flipflow.dynamics.contact_free import contact_free
+from flipflow.dynamics.contact_free import contact_free, slowest_decay
 from flipflow.dynamics.motion import longest_on
 from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
 from flipflow.model.constants import GRAVITY
@@ -96,6 +96,14 @@ class Motions(Protocol):
         """Greatest relative speed in m/s at which a contact begins; 0 without contact."""
         ...
 
+    def longest_contact(self) -> Values:
+        """Greatest share of the turn during which a stop has a force, 0 to 1."""
+        ...
+
+    def largest_multiplier(self) -> Values:
+        """Size of the largest Floquet multiplier of the period."""
+        ...
+
     def bearing_load(self) -> Values:
         """Greatest load on all exciter bearings together in N, with the frame's motion."""
         ...
@@ -130,6 +138,7 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     ),
     "stop_piece_force": lambda m: m.stop_force() / m.field("stop_pieces"),
     "stop_approach_speed": lambda m: m.approach_speed(),
+    "contact_share": lambda m: m.longest_contact(),
     "foundation_force": lambda m: m.foundation_force(),
     "support_force": lambda m: m.foundation_force() / m.field("supports"),
     "exciter_force": lambda m: m.field("eccentric_moment") * m.omega**2,
@@ -143,6 +152,7 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     ),
     "dissipated_power": lambda m: m.dissipated_power(),
     "jump_margin": lambda m: m.jump_margin(),
+    "largest_multiplier": lambda m: m.largest_multiplier(),
     "throw_number": lambda m: (
         m.omega**2 * m.normal_amplitude() / (GRAVITY * np.cos(m.field("deck_angle")))
     ),
@@ -265,6 +275,12 @@ class Working(Frozen):
         speeds = np.abs(self.orbit.velocity("relative", begins)) if begins else np.zeros(1)
         return float(speeds.max())
 
+    def longest_contact(self) -> float:
+        return max((self.orbit.contact_share(j) for j in self.stops), default=0.0)
+
+    def largest_multiplier(self) -> float:
+        return float(np.abs(self.orbit.multipliers[0]))
+
     def bearing_load(self) -> float:
         return self._peak("bearing")
 
@@ -347,12 +363,17 @@ class ContactFree(Frozen):
         These are what isolation and shear springs see; each stiffness stands in one entry of the
         matrix, so that stiff springs cost no digits.
         """
+        return contact_free(*self._matrices, np.array([1.0, 0.0]), self.omega)
+
+    @cached_property
+    def _matrices(self) -> tuple[Real, Real, Real]:
+        """M, C, K of x1 and x2 = x1 - xf, (..., 2, 2)."""
         f = self.fields
         m1, m2 = f["main_mass"], f["floating_mass"]
         M = _symmetric(m1 + m2, -m2, m2)
         C = _symmetric(f["isolation_damping"], 0.0, f["shear_damping"])
         K = _symmetric(f["isolation_stiffness"], 0.0, f["shear_stiffness"])
-        return contact_free(M, C, K, np.array([1.0, 0.0]), self.omega)
+        return M, C, K
 
     @cached_property
     def main(self) -> Complex:
@@ -420,6 +441,12 @@ class ContactFree(Frozen):
 
     def approach_speed(self) -> Real:
         return np.zeros(self.force.shape)
+
+    def longest_contact(self) -> Real:
+        return np.zeros(self.force.shape)
+
+    def largest_multiplier(self) -> Real:
+        return np.exp(2.0 * math.pi / self.omega * slowest_decay(*self._matrices))
 
     def bearing_load(self) -> Real:
         inertia = self.fields["rotating_mass"] * self.omega**2

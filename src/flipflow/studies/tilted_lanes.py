@@ -19,7 +19,7 @@ from flipflow.dynamics.motion import phase_of
 from flipflow.model.quantities import Quantity
 from flipflow.studies.lane_quantities import LanePlan
 from flipflow.studies.quantity_values import MOTION_VALUES, Frame
-from flipflow.studies.tilted_motion import TILT, beside_zero
+from flipflow.studies.tilted_motion import TILT, beside_zero, size_of_multiplier
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +32,14 @@ class TiltedLanes:
         What was read.
     names
         The P parameters.
-    read, slopes
-        Readings and their derivatives.
+    read, multiplier, slopes
+        Readings, Floquet multipliers (L, K, 2 N), and the derivatives of both.
     """
 
     plan: LanePlan
     names: Sequence[str]
     read: Readings
+    multiplier: Complex
     slopes: Slopes
 
     def slope(self, quantity: Quantity) -> Real:
@@ -113,6 +114,15 @@ class TiltedLanes:
 
     def approach_speed(self) -> Complex:
         return _tilted(self.read.approach, self.slopes.approach)
+
+    def longest_contact(self) -> Complex:
+        shares = np.moveaxis(_tilted(self.read.share, self.slopes.share), 2, 0)
+        least = np.full((1, *shares.shape[1:]), self.plan.least_share, np.complex128)
+        return _greatest(np.concatenate([least, shares]))
+
+    def largest_multiplier(self) -> Complex:
+        sizes = size_of_multiplier(self.multiplier[..., None], self.slopes.multiplier)
+        return _greatest(np.moveaxis(sizes, 2, 0))
 
     def bearing_load(self) -> Complex:
         return self._peak("bearing")

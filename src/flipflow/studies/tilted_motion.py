@@ -205,6 +205,11 @@ class TiltedMotion:
         slope = np.diff(self.slopes.shifts, axis=0)[engaged].sum(axis=0) / self.period
         return np.append(share + 1j * TILT * slope, share)
 
+    def longest_contact(self) -> Complex:
+        """Greatest share of the period during which a stop has a force."""
+        acting = [j for j, one in enumerate(self._springs) if one.acts]
+        return self._highest([self.contact_share(j) for j in acting], "times of contact")
+
     def shear_force(self) -> Complex:
         """Greatest dynamic force of all shear springs in N."""
         k, c = self.field("shear_stiffness"), self.field("shear_damping")
@@ -240,6 +245,12 @@ class TiltedMotion:
         speed = speed * np.sign(speed.real)
         moved = speed[:, -1:].imag * self._shifts[begins]
         return self._highest(list(speed + 1j * moved), "speeds of approach")
+
+    def largest_multiplier(self) -> Complex:
+        """Size of the largest Floquet multiplier."""
+        values, slopes = self.slopes.multipliers
+        sizes = size_of_multiplier(values[:, None], slopes)
+        return self._highest([np.append(one, one[0].real) for one in sizes], "multipliers")
 
     def bearing_load(self) -> Complex:
         """Greatest load on all exciter bearings together in N, with the frame's motion."""
@@ -492,6 +503,12 @@ def beside_zero(mean: Complex, high: Complex, low: Complex) -> NDArray[np.bool_]
     """Where the mean of two tilted numbers is zero and moves, so that its size has a kink."""
     moves = np.abs(mean.imag) > AGREE * (np.abs(high.imag) + np.abs(low.imag))
     return np.asarray(moves & (np.abs(mean.real) <= TIED * np.abs(high.real)))
+
+
+def size_of_multiplier(value: Complex, slope: Complex) -> Complex:
+    """|mu| of multipliers (..., 1) with derivatives (..., P), tilted."""
+    size = np.abs(value)
+    return np.asarray(size + 1j * TILT * (value.conjugate() * slope).real / size)
 
 
 def _size_of(formula: Formula) -> Formula:
