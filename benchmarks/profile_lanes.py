@@ -137,8 +137,7 @@ def main():
     found = new_found(1, omega.size, system.size, NOT_COMPUTED)
     readings = new_readings(1, omega.size, machine, asked)
     run_lanes(
-        batch.arrays, 0, 1, omega, length, nearby.state, nearby.even, work, reading, asked, found,
-        readings,
+        batch.arrays, 0, 1, omega, length, nearby, work, reading, asked, found, readings,
     )  # fmt: skip
     assert (found.reason == FOUND).all()
     assert readings.share[0, -1, 0] > 0.0

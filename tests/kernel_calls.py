@@ -18,7 +18,7 @@ from flipflow.dynamics.contact_search import extremes, next_change, prepare_sear
 from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.dynamics.machine_series import set_machine
 from flipflow.periodic.shooting import shooting_step
-from flipflow.periodic.two_event import force_excess
+from flipflow.periodic.two_event import force_excess, two_event_state
 
 NO_STEPS = Course(0.0, math.inf, math.nan, math.nan, 1.0, 1.0)
 
@@ -81,6 +81,12 @@ def balance(problem, work, u, omega, r, J):
 def excess(machine, work, omega, share):
     """``force_excess``."""
     return force_excess(machine, work, omega, share)
+
+
+@kernel(entry=True)
+def touched_twice(machine, work, omega, share):
+    """``two_event_state``."""
+    return two_event_state(machine, work, omega, share)
 
 
 @kernel(entry=True)

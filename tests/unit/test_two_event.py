@@ -46,6 +46,23 @@ def test_all_touching_motions_are_found_without_a_guess(screen, exact, omega):
         np.testing.assert_allclose(states[nearest], orbit.state, rtol=1e-8, atol=1e-10)
 
 
+@pytest.mark.parametrize("omega", [85.0, 120.0, 190.0])
+def test_from_a_share_close_by(screen, exact, omega):
+    """Phase 0 lies within the touch or outside of it, before or behind the middle of the turn."""
+    problem = TwoEventProblem(machine_arrays(screen.system()))
+    orbit = exact.orbit_from_below(omega)
+    for factor in (0.97, 1.0, 1.02):
+        share = factor * orbit.contact_share()
+        assert kernel_calls.touched_twice(problem._machine, problem._work, omega, share)
+        np.testing.assert_allclose(problem._work.z, orbit.state, rtol=1e-8, atol=1e-10)
+
+
+def test_a_share_that_leads_nowhere(screen):
+    weak = screen.replace(eccentric_moment=1e-3 * screen.eccentric_moment)
+    problem = TwoEventProblem(machine_arrays(weak.system()))
+    assert not kernel_calls.touched_twice(problem._machine, problem._work, 120.0, 0.5)
+
+
 def test_shooting_has_the_last_word_where_motion_leans():
     """e = 2 mm at 57.7 rad/s: of the scalar problem's candidates one is a motion.
 

@@ -33,6 +33,7 @@ from flipflow.dynamics.contact_free_range import contact_free_up_to
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
 from flipflow.periodic.shooting import Shooting
+from flipflow.periodic.two_event import has_two_events, two_event_state
 
 BEHIND = 1e-3  # share of a frequency at which a motion ends, behind which the next one is sought
 LEAPS = 8  # from motion to motion on the way to one frequency
@@ -49,6 +50,14 @@ class Found(NamedTuple):
     leaning: Int  # (L, F) 1 where an even machine moves without symmetry
     jumps: Int  # (L, F) of the path up to here
     reason: Int  # (L, F) one of FOUND, UNSTABLE, ...
+
+
+class Nearby(NamedTuple):
+    """Motions of a machine nearby at F frequencies, as first guesses."""
+
+    state: Real  # (F, 2 N), NaN where there is none
+    even: Int  # (F,) 1 where it is even
+    share: Real  # (F,) of the turn in which it touches its one stop, 0 of other machines
 
 
 def new_found(lanes: int, speeds: int, degrees: int, reason: int) -> Found:
@@ -85,28 +94,23 @@ def problem_of(machine: MachineArrays, half: bool, length: float) -> Shooting:
 
 @kernel(entry=True)
 def run_lanes(
-    batch: MachineArrays, first: int, last: int, omega: Real, length: float, guess: Real,
-    guess_even: Int, work: LaneWork, reading: ReadingWork, asked: Asked, found: Found,
-    readings: Readings,
+    batch: MachineArrays, first: int, last: int, omega: Real, length: float, nearby: Nearby,
+    work: LaneWork, reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
 ) -> None:  # fmt: skip
     """Lanes ``first`` to ``last`` - 1 at frequencies (F,) in the order given.
 
-    Rising frequencies are reached from below, falling ones from above. ``guess`` (F, 2 N) are
-    motions of a machine nearby, NaN where there is none; ``guess_even`` (F,) tells which of them
-    are even.
+    Rising frequencies are reached from below, falling ones from above.
     """
     for lane in range(first, last):
         forget(work)
         machine = machine_of(batch, lane)
-        run_lane(
-            machine, lane, omega, length, guess, guess_even, work, reading, asked, found, readings
-        )
+        run_lane(machine, lane, omega, length, nearby, work, reading, asked, found, readings)
 
 
 @kernel
 def run_lane(
-    machine: MachineArrays, lane: int, omega: Real, length: float, guess: Real, guess_even: Int,
-    work: LaneWork, reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
+    machine: MachineArrays, lane: int, omega: Real, length: float, nearby: Nearby, work: LaneWork,
+    reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
 ) -> None:  # fmt: skip
     """One lane: its motion is followed from speed to speed, and flown where it jumps."""
     even = is_even(machine)
@@ -115,8 +119,9 @@ def run_lane(
         begun = not math.isnan(work.omega[0])
         rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
-            half = even and guess_even[f] != 0
-            begun = start_from_guess(problem_of(machine, half, length), work, omega[f], guess[f])
+            half = even and nearby.even[f] != 0
+            problem = problem_of(machine, half, length)
+            begun = start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f])
             if not begun:
                 half = even
                 problem = problem_of(machine, half, length)
@@ -145,13 +150,35 @@ def run_lane(
 
 
 @kernel
-def start_from_guess(problem: Shooting, work: LaneWork, omega: float, guess: Real) -> bool:
-    """Begin the path with the stable motion that Newton reaches from a guess close by."""
+def start_from_guess(
+    problem: Shooting, work: LaneWork, omega: float, guess: Real, share: float
+) -> bool:
+    """Begin the path with the stable motion that Newton reaches from a guess close by.
+
+    Where it is a motion of two events, the scalar problem brings the guess closer.
+    """
     for k in range(guess.shape[0]):
         if math.isnan(guess[k]):
             return False
         work.guess[k] = guess[k]
+    touching = problem.sign < 0.0 and share > 0.0 and has_two_events(problem.machine)
+    if touching and two_event_state(problem.machine, work.touch, omega, share):
+        closer = work.touch.z
+        near = is_near(closer, guess, omega, problem.length)
+        for k in range(guess.shape[0] if near else 0):
+            work.guess[k] = closer[k]
     return begun(problem, work, omega, FAR_FROM_GUESS)
+
+
+@kernel
+def is_near(z: Real, guess: Real, omega: float, length: float) -> bool:
+    """Whether a state is as near to a guess as Newton's first step may lead away from it."""
+    n = z.shape[0] // 2
+    large, apart = length, 0.0
+    for k in range(n):
+        large = max(large, abs(guess[k]), abs(guess[n + k]) / omega)
+        apart = max(apart, abs(z[k] - guess[k]), abs(z[n + k] - guess[n + k]) / omega)
+    return apart < FAR_FROM_GUESS * large
 
 
 @kernel

@@ -35,6 +35,7 @@ from flipflow.periodic.shooting import (
     shooting_residual,
 )
 from flipflow.periodic.turn_by_turn import next_turn
+from flipflow.periodic.two_event import TwoEvent, new_two_event
 
 NEWTON_MOST = 8
 CONVERGED = 1e-9  # last Newton step, as a share of the motion; the error left is about its square
@@ -73,6 +74,7 @@ class LaneWork(NamedTuple):
     pivot: Int  # (2 N,)
     step: Real  # (3,) last Newton step, as a share of the motion and in m; the motion's size in m
     mu: Complex  # (2 N,) eigenvalues of the return map, with the problem's sign
+    touch: TwoEvent
     largest: Real  # (1,) their largest modulus, NaN: not looked for since Newton's last step
 
 
@@ -84,8 +86,10 @@ def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
     shooting = new_shooting_work(machine)
     n = 2 * machine.direction.shape[1]
     vectors = ("z", "slope", "guess", "flown", "r", "slope_here", "slope_behind")
+    flow = shooting.flow._replace(stop=stop)
     return LaneWork(
-        shooting=shooting._replace(flow=shooting.flow._replace(stop=stop)),
+        shooting=shooting._replace(flow=flow),
+        touch=new_two_event(flow),
         schur=new_schur(n),
         path=np.zeros((KEPT, n)),
         omega=np.zeros(KEPT),

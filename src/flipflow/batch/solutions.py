@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from flipflow.batch.lane_kernels import Found, new_found, run_lanes
+from flipflow.batch.lane_kernels import Found, Nearby, new_found, run_lanes
 from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
 from flipflow.batch.lane_slopes import slope_lanes
@@ -30,29 +29,23 @@ from flipflow.periodic.solver import characteristic_length
 CHUNK = 64  # lanes that one task of a thread runs
 
 
-@dataclass(frozen=True, eq=False)
-class Nearby:
-    """Motions (F, 2 N) of a machine nearby, NaN where there is none, and which are even, (F,)."""
-
-    state: Real
-    even: Int
-
-
 def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Real) -> Nearby:
     """Motions of a machine up to its first jump along the frequencies, (F,) in their order.
 
     None where its coordinates and stops are other ones than those of ``like``.
     """
-    nothing = Nearby(np.full((omega.size, 2 * like.size), np.nan), np.zeros(omega.size, np.int64))
+    none = np.zeros(omega.size)
+    nothing = Nearby(np.full((omega.size, 2 * like.size), np.nan), none.astype(np.int64), none)
     if (nominal.size, len(nominal.springs)) != (like.size, len(like.springs)):
         return nothing
     arrays = stacked([machine_arrays(nominal)])
     bonded = bonded_terms(nominal)[None]
     alone = Batch(np.zeros(1, np.int64), nominal, arrays, bonded, nominal.M[None])
-    found, _ = solve_lanes(alone, omega, nothing_asked(nominal.size, omega.size), nothing)
+    found, read = solve_lanes(alone, omega, nothing_asked(nominal.size, omega.size), nothing)
     good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
     even = np.where(nominal.symmetric & (found.leaning[0] == 0), 1, 0)
-    return Nearby(np.where(good[:, None], found.state[0], np.nan), even)
+    share = read.share[0, :, 0] if len(nominal.springs) == 1 else none
+    return Nearby(np.where(good[:, None], found.state[0], np.nan), even, np.where(good, share, 0.0))
 
 
 def nothing_asked(degrees: int, speeds: int) -> Asked:
@@ -100,7 +93,8 @@ def solve_lanes(
     readings = new_readings(lanes, speeds, nominal, asked)
     length = characteristic_length(batch.system, nominal)
     # A read-only array is another type to the compiler, and would be compiled for anew.
-    speeds_in_order, guess, even = np.array(omega), np.array(nearby.state), np.array(nearby.even)
+    speeds_in_order = np.array(omega)
+    guesses = Nearby(np.array(nearby.state), np.array(nearby.even), np.array(nearby.share))
 
     own = threading.local()
 
@@ -110,7 +104,7 @@ def solve_lanes(
             own.work = new_lane_work(nominal, stop)
             own.reading = new_reading_work(own.work.shooting.flow, nominal, asked)
         run_lanes(
-            batch.arrays, part.start, part.stop, speeds_in_order, length, guess, even, own.work,
+            batch.arrays, part.start, part.stop, speeds_in_order, length, guesses, own.work,
             own.reading, asked, found, readings,
         )  # fmt: skip
 

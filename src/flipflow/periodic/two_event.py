@@ -19,21 +19,24 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.contact_search import exponential
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, new_flow, prepare_drive, run_flow
+from flipflow.dynamics.flow import Flow, new_flow, prepare_drive
 from flipflow.dynamics.modes import Modes, prepare
+from flipflow.model.contact_law import NUMBER
 
 if TYPE_CHECKING:
     from flipflow.model.system import MechanicalSystem
 
+PAPER = NUMBER["paper"]
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
+MOST_SECANTS = 8  # steps from a share close by; four are usual
+ON_ZERO = 1e-10  # |f| from which the state is that of the motion
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 
 
@@ -49,7 +52,23 @@ class TwoEvent(NamedTuple):
     begin: Real  # (2 N, 3) state at contact: constant, per real and per imaginary part of F
     end: Real  # (2 N, 3) the same at release
     z: Real  # (2 N,) state at contact
-    rate: Real  # (2 N,)
+
+
+def new_two_event(flow: Flow) -> TwoEvent:
+    """Scratch of the scalar problem beside that of a machine's flow."""
+    size = flow.z.shape[0]
+    square = (size, size)
+    return TwoEvent(
+        flow=flow,
+        engaged=np.zeros(square),
+        open=np.zeros(square),
+        A=np.zeros(square),
+        pivot=np.zeros(size, np.int64),
+        column=np.zeros(size),
+        begin=np.zeros((size, 3)),
+        end=np.zeros((size, 3)),
+        z=np.zeros(size),
+    )
 
 
 @kernel
@@ -194,8 +213,7 @@ def two_event_states(
 ) -> int:
     """All zeros of f that lie more than one sample apart: states at t = 0 and shares; their number.
 
-    The state at contact is carried on by the exact flow to the next t = 0; whether its touches
-    are those assumed is for the caller to see.
+    Whether their touches are those assumed is for the caller to see.
     """
     found = 0
     before, f_before = 0.0, math.nan
@@ -205,40 +223,82 @@ def two_event_states(
         if f * f_before < 0.0 and found < states.shape[0]:
             root = root_between(machine, work, omega, before, s, f_before, f)
             F = required_force(machine, work, omega, root)
-            phase = math.atan2(F.imag, F.real) % (2.0 * math.pi)
-            start = phase / omega
+            to_phase_zero(machine, work, omega, root, F)
             for k in range(work.z.shape[0]):
-                work.flow.z[k] = work.z[k]
-            rest = 2.0 * math.pi / omega - start
-            code = run_flow(machine, work.flow, omega, start, rest, work.rate)
-            if code == status.OK:
-                for k in range(work.z.shape[0]):
-                    states[found, k] = work.flow.z[k]
-                shares[found] = root
-                found += 1
+                states[found, k] = work.z[k]
+            shares[found] = root
+            found += 1
         before, f_before = s, f
     return found
+
+
+@kernel
+def has_two_events(machine: MachineArrays) -> bool:
+    """Whether an even machine has the one stop and the one force of these motions."""
+    one = machine.direction.shape[0] == 1 and machine.power.shape[0] == 1
+    return one and machine.order[0] == 1 and machine.stops.law[0] == PAPER
+
+
+@kernel
+def two_event_state(machine: MachineArrays, work: TwoEvent, omega: float, share: float) -> bool:
+    """The zero of f near a share, by the secant method: its state at phase 0 into work.z."""
+    before, s = 0.99 * share, share
+    f_before = force_excess(machine, work, omega, before)
+    for _ in range(MOST_SECANTS):
+        F = required_force(machine, work, omega, s)
+        f = math.hypot(F.real, F.imag) - 1.0
+        if abs(f) < ON_ZERO:
+            to_phase_zero(machine, work, omega, s, F)
+            return True
+        before, s, f_before = s, s - f * (s - before) / (f - f_before), f
+        if not 0.0 < s < 1.0:
+            return False
+    return False
+
+
+@kernel
+def to_phase_zero(
+    machine: MachineArrays, work: TwoEvent, omega: float, s: float, F: complex
+) -> None:
+    """Carry the state at contact to phase 0 of the force, or to pi and turn it round."""
+    phase, size = math.atan2(F.imag, F.real), work.z.shape[0]
+    ahead = -phase if phase <= 0.0 else math.pi - phase
+    begin = 0.0 if ahead < s * math.pi else s * math.pi
+    slot = PLUS_SLOT if begin == 0.0 else OPEN_SLOT
+    modes, drive = work.flow.modes, work.flow.drive
+    before, after = F * exponential(1j * begin), F * exponential(1j * ahead)
+    for k in range(size):
+        z = work.z[k]
+        if begin > 0.0:
+            z = work.end[k, 0] + F.real * work.end[k, 1] + F.imag * work.end[k, 2]
+        rest = _rest(machine, work, slot, k)
+        work.column[k] = z - rest - (before * drive[slot, 0, k]).real
+        work.z[k] = rest + (after * drive[slot, 0, k]).real
+    for i in range(modes.mode_count[slot]):
+        q = 0j
+        for k in range(size):
+            q += modes.left[slot, i, k] * work.column[k]
+        q *= modes.weight[slot, i] * exponential(modes.rate[slot, i] * ((ahead - begin) / omega))
+        for k in range(size):
+            work.z[k] += (modes.right[slot, k, i] * q).real
+    for k in range(size if phase > 0.0 else 0):
+        work.z[k] = -work.z[k]
+
+
+@kernel
+def _rest(machine: MachineArrays, work: TwoEvent, slot: int, k: int) -> float:
+    """Where the machine stays that is not driven, state k: at the gap an engaged stop holds it."""
+    if slot == OPEN_SLOT or k >= machine.direction.shape[1]:
+        return 0.0
+    return float(machine.stops.gap[0, 0] * work.flow.modes.rest[PLUS_SLOT, 0, k])
 
 
 class TwoEventProblem:
     """The scalar problem f(s) = |F(s, omega)| - 1 of a machine with one symmetric stop."""
 
     def __init__(self, machine: MachineArrays) -> None:
-        size = 2 * machine.direction.shape[1]
-        square = (size, size)
         self._machine = machine
-        self._work = TwoEvent(
-            flow=new_flow(machine),
-            engaged=np.zeros(square),
-            open=np.zeros(square),
-            A=np.zeros(square),
-            pivot=np.zeros(size, np.int64),
-            column=np.zeros(size),
-            begin=np.zeros((size, 3)),
-            end=np.zeros((size, 3)),
-            z=np.zeros(size),
-            rate=np.zeros(size),
-        )
+        self._work = new_two_event(new_flow(machine))
 
     @staticmethod
     def applies(system: MechanicalSystem) -> bool:
