@@ -181,8 +181,8 @@ class Free:
 DAMPING = 0.06
 SPAN = (0.2, 2.5)
 OF_ANY = (
-    "stop_force", "dissipated_power", "jump_margin", "peak_amplitude", "peak_frequency", "omega_cs",
-    "omega_lb", "omega_ub",
+    "stop_force", "contact_share", "dissipated_power", "jump_margin", "largest_multiplier",
+    "peak_amplitude", "peak_frequency", "omega_cs", "omega_lb", "omega_ub",
 )  # fmt: skip
 
 
@@ -270,7 +270,7 @@ def test_samples_are_machines_of_their_values(seed: int) -> None:
 @pytest.mark.parametrize("name", OF_ANY)
 def test_every_machine_has_these_quantities(name: str) -> None:
     """At the ends of the gap, by hand; a dataclass and its plain system say the same."""
-    omega = 0.75 if name in OF_ANY[:3] else SPAN
+    omega = 0.75 if name in OF_ANY[:5] else SPAN
     ends = {}
     for machine, field in ((Chain(), "gap"), (Chain().system(), "springs[0].clearance")):
         result = ff.sensitivity(machine, {field: (0.35, 0.45)}, name, omega=omega, n=2)
@@ -288,7 +288,9 @@ def by_hand(machine, name: str) -> float:
     peak = branch.peak(0)
     return {
         "stop_force": orbit.stop_force_peak(),
+        "contact_share": sum(one.end - one.start for one in orbit.contact_intervals) / orbit.period,
         "dissipated_power": orbit.input_power(),
+        "largest_multiplier": max(map(abs, orbit.multipliers)),
         "jump_margin": min(abs(0.75 - fold) / fold for fold in (upper, lower)),
         "peak_amplitude": peak.amplitude(0),
         "peak_frequency": peak.omega,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.continuation.branch import _least
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.errors import InputError
 from flipflow.paper.claims import Number, Part, Verdict, agrees, decide, runs
@@ -112,6 +113,30 @@ def test_peaks_and_troughs_are_stationary_and_on_the_branch(exact):
         for step in (-0.05, 0.05):
             near = exact.orbit_from_below(point.omega + step)
             assert sign * near.amplitude("main") < sign * point.amplitude("main")
+        (slope,) = point.orbit.sensitivity(("amplitude", "main"), ["omega"])
+        assert abs(slope) * point.omega < 1e-5 * point.amplitude("main")
+
+
+@pytest.mark.parametrize(
+    ("function", "low", "high", "least"),
+    [
+        (lambda t: (t - 2.3) ** 2, 1.0, 3.0, 2.3),
+        (lambda t: abs(t - 1.7), 1.0, 3.0, 1.7),
+        (lambda t: (t - 1.7) ** 2, 1.0, 2.0, 1.7),
+        (lambda t: -t, 1.0, 2.0, 2.0),
+        (lambda t: (t - 2.9) ** 2, 1.0, 3.0, 2.9),
+    ],
+    ids=["smooth", "kink", "one step", "end", "beyond the point beside"],
+)
+def test_where_a_function_is_least(function, low, high, least):
+    assert _least(function, low, high) == pytest.approx(least, abs=2e-7)
+
+
+def test_a_branch_that_rises_to_its_end_peaks_there(screen):
+    rising = ff.frequency_response(screen, (5.0, 30.0))
+    top = rising.peak("relative")
+    assert top.omega == pytest.approx(30.0, rel=1e-6)
+    assert top.amplitude("relative") == pytest.approx(rising.amplitude("relative")[-1], rel=1e-6)
 
 
 def test_first_peak_is_that_of_the_linear_machine(exact, screen):

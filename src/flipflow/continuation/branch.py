@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import cast
 
@@ -36,6 +36,7 @@ from flipflow.periodic.stability import STABLE, stability_words
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result, above
 
+AT_TURN = 1e-7  # share of a step within which a peak is found
 Node = tuple[float, float]  # position along the branch, and omega there
 
 
@@ -396,37 +397,44 @@ class Branch(Frozen, Result):
         return tuple(self._refined(which, int(foot), "trough") for foot in feet)
 
     def _refined(self, which: Coordinate, top: int, kind: str) -> SpecialPoint:
+        """The peak or trough near point ``top``, each once."""
+        key = (*self.system.coordinate(which).tolist(), top, kind)
+        if key not in self._turned:
+            self._turned[key] = self._turn_near(which, top, kind)
+        return self._turned[key]
+
+    def _turn_near(self, which: Coordinate, top: int, kind: str) -> SpecialPoint:
         """The peak or trough near point ``top``, searched in the steps on both sides of it."""
         sign = -1.0 if kind == "peak" else 1.0
         vector = self.system.coordinate(which)[None]
         solver = self.formulation.solver()
         best = SpecialPoint(kind, self.orbit(top), float(top))
-        worst = sign * best.amplitude(which) + abs(best.amplitude(which))
-        for p in (top - 1, top):
-            if not 0 <= p < self.omega.size - 1:
-                continue
+        at_top = sign * best.amplitude(which)
+        worst = at_top + abs(at_top)
+        if self.omega.size == 1:
+            return best
 
-            def rise(share: float, p: int = p) -> float:
-                try:
-                    point = solver.between(self.traced, p, share)
-                except IncompleteError:
-                    return worst  # Newton may fail between two sharp bends
-                low, high, _ = solver.extremes(point.u[None], np.array([point.omega]), vector)
-                size = sign * 0.5 * float(high[0, 0] - low[0, 0])
-                return size if math.isfinite(size) else worst
+        def place(t: float) -> tuple[int, float]:
+            """Step of the branch and share of it; t is 2 at the point, 1 and 3 at those beside."""
+            return (top - 1, t - 1.0) if t < 2.0 else (top, t - 2.0)
 
-            share = float(
-                minimize_scalar(
-                    rise, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-7}
-                ).x
-            )
-            if rise(share) == worst:
-                continue
-            point = solver.between(self.traced, p, share)
-            orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
-            if sign * orbit.amplitude(which) < sign * best.amplitude(which):
-                best = SpecialPoint(kind, orbit, p + share)
-        return best
+        @cache  # a search that begins with known values asks for them again
+        def rise(t: float) -> float:
+            try:
+                point = solver.between(self.traced, *place(t))
+            except IncompleteError:
+                return worst  # Newton may fail between two sharp bends
+            low, high, _ = solver.extremes(point.u[None], np.array([point.omega]), vector)
+            size = sign * 0.5 * float(high[0, 0] - low[0, 0])
+            return size if math.isfinite(size) else worst
+
+        t = _least(rise, 1.0 if top > 0 else 2.0, 3.0 if top + 1 < self.omega.size else 2.0)
+        if not rise(t) < at_top:
+            return best
+        p, share = place(t)
+        point = solver.between(self.traced, p, share)
+        orbit = self._solved(point, rises=bool(self.omega[p + 1] > self.omega[p]))
+        return SpecialPoint(kind, orbit, p + share)
 
     def _extremes(self, which: Coordinate) -> tuple[Real, Real, NDArray[np.complex128]]:
         key = tuple(self.system.coordinate(which))
@@ -439,8 +447,22 @@ class Branch(Frozen, Result):
         return self._seen[key]
 
     @cached_property
+    def _turned(self) -> dict[tuple[object, ...], SpecialPoint]:
+        return {}
+
+    @cached_property
     def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real, NDArray[np.complex128]]]:
         return {}
+
+
+def _least(function: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function is least between two ends, of which at most one is 2, as inner point."""
+    if low < 2.0 < high and function(2.0) < min(function(low), function(high)):
+        # Steps of parabolas, which three points with the least amid begin.
+        found = minimize_scalar(function, bracket=(low, 2.0, high), tol=0.5 * AT_TURN)
+    else:
+        found = minimize_scalar(function, bounds=(low, high), options={"xatol": AT_TURN})
+    return float(found.x)
 
 
 def _inner_maxima(values: Real) -> NDArray[np.intp]:

@@ -192,7 +192,8 @@ def sensitivity(
         ``"omega_ar"``, ``"omega_cs"``, ``"omega_lb"``, ``"omega_ub"``. A machine that is no
         screen has ``"amplitude[0]"``, ``"phase[0]"`` and so on of its degrees of freedom,
         ``"left_amplitude"``, ``"left_phase"`` of a coordinate named "left"; ``"stop_force"``,
-        the greatest of all its stops; ``"dissipated_power"``, ``"jump_margin"``; and of the whole
+        the greatest of all its stops; ``"contact_share"``, ``"dissipated_power"``,
+        ``"jump_margin"``, ``"largest_multiplier"``; and of the whole
         response those above but for ``"omega_ea"`` and ``"omega_ar"``. Its peak is that of the
         coordinate "relative", else of the first that is named, else of the first degree of
         freedom.
