@@ -26,7 +26,9 @@ from flipflow.dynamics.parameter_tangent import Columns
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.solver import characteristic_length
 
-CHUNK = 64  # lanes that one task of a thread runs
+# Motions that one task of a thread finds: handing it over takes as long as some of them.
+LEAST, MOST = 128, 2048
+TASKS = 4  # of a thread at least, where each then has enough: the last to end is waited for
 
 
 def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Real) -> Nearby:
@@ -108,8 +110,14 @@ def solve_lanes(
             own.reading, asked, found, readings,
         )  # fmt: skip
 
-    side_by_side(chunk, lanes, CHUNK, threads, tell)
+    side_by_side(chunk, lanes, _lanes_of_task(lanes, speeds, threads), threads, tell)
     return found, readings
+
+
+def _lanes_of_task(lanes: int, speeds: int, threads: int) -> int:
+    """How many lanes a task has."""
+    shared = min(max(lanes // (TASKS * threads), LEAST // speeds), MOST // speeds)
+    return max(shared, 1)
 
 
 def _machine(arrays: MachineArrays, lane: int) -> MachineArrays:
@@ -158,5 +166,6 @@ def solve_slopes(
             own.work, found, slopes,
         )  # fmt: skip
 
-    side_by_side(chunk, batch.rows.size, CHUNK, threads, None)
+    lanes = batch.rows.size
+    side_by_side(chunk, lanes, _lanes_of_task(lanes, omega.size, threads), threads, None)
     return slopes
