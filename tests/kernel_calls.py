@@ -78,15 +78,15 @@ def balance(problem, work, u, omega, r, J):
 
 
 @kernel(entry=True)
-def excess(machine, work, omega, share):
+def excess(machine, flow, work, omega, share):
     """``force_excess``."""
-    return force_excess(machine, work, omega, share)
+    return force_excess(machine, flow, work, omega, share)
 
 
 @kernel(entry=True)
-def touched_twice(machine, work, omega, share):
+def touched_twice(machine, flow, work, omega, share):
     """``two_event_state``."""
-    return two_event_state(machine, work, omega, share)
+    return two_event_state(machine, flow, work, omega, share)
 
 
 @kernel(entry=True)

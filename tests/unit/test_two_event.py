@@ -28,7 +28,7 @@ def test_every_contact_point_of_the_branch_is_a_zero(response, changes):
     omega = np.array([orbit.omega for orbit in touching])
     share = np.array([orbit.contact_share() for orbit in touching])
     excess = [
-        kernel_calls.excess(problem._machine, problem._work, w, s)
+        kernel_calls.excess(problem._machine, problem._flow, problem._work, w, s)
         for w, s in zip(omega, share, strict=True)
         if s > 0.02
     ]
@@ -53,14 +53,18 @@ def test_from_a_share_close_by(screen, exact, omega):
     orbit = exact.orbit_from_below(omega)
     for factor in (0.97, 1.0, 1.02):
         share = factor * orbit.contact_share()
-        assert kernel_calls.touched_twice(problem._machine, problem._work, omega, share)
+        assert kernel_calls.touched_twice(
+            problem._machine, problem._flow, problem._work, omega, share
+        )
         np.testing.assert_allclose(problem._work.z, orbit.state, rtol=1e-8, atol=1e-10)
 
 
 def test_a_share_that_leads_nowhere(screen):
     weak = screen.replace(eccentric_moment=1e-3 * screen.eccentric_moment)
     problem = TwoEventProblem(machine_arrays(weak.system()))
-    assert not kernel_calls.touched_twice(problem._machine, problem._work, 120.0, 0.5)
+    assert not kernel_calls.touched_twice(
+        problem._machine, problem._flow, problem._work, 120.0, 0.5
+    )
 
 
 def test_shooting_has_the_last_word_where_motion_leans():

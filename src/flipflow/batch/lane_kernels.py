@@ -161,8 +161,9 @@ def start_from_guess(
         if math.isnan(guess[k]):
             return False
         work.guess[k] = guess[k]
-    touching = problem.sign < 0.0 and share > 0.0 and has_two_events(problem.machine)
-    if touching and two_event_state(problem.machine, work.touch, omega, share):
+    machine, flow = problem.machine, work.shooting.flow
+    touching = problem.sign < 0.0 and share > 0.0 and has_two_events(machine)
+    if touching and two_event_state(machine, flow, work.touch, omega, share):
         closer = work.touch.z
         near = is_near(closer, guess, omega, problem.length)
         for k in range(guess.shape[0] if near else 0):

@@ -86,10 +86,9 @@ def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
     shooting = new_shooting_work(machine)
     n = 2 * machine.direction.shape[1]
     vectors = ("z", "slope", "guess", "flown", "r", "slope_here", "slope_behind")
-    flow = shooting.flow._replace(stop=stop)
     return LaneWork(
-        shooting=shooting._replace(flow=flow),
-        touch=new_two_event(flow),
+        shooting=shooting._replace(flow=shooting.flow._replace(stop=stop)),
+        touch=new_two_event(machine),
         schur=new_schur(n),
         path=np.zeros((KEPT, n)),
         omega=np.zeros(KEPT),

@@ -35,7 +35,7 @@ PAPER = NUMBER["paper"]
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
-MOST_SECANTS = 8  # steps from a share close by; four are usual
+MOST_SECANTS = 9  # values of f from a share close by; six are usual
 ON_ZERO = 1e-10  # |f| from which the state is that of the motion
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 
@@ -43,7 +43,6 @@ MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 class TwoEvent(NamedTuple):
     """Scratch of the scalar problem for 2 N states."""
 
-    flow: Flow
     engaged: Real  # (2 N, 2 N) exp(A t) over the touch
     open: Real  # (2 N, 2 N) over the open piece
     A: Real  # (2 N, 2 N)
@@ -54,12 +53,11 @@ class TwoEvent(NamedTuple):
     z: Real  # (2 N,) state at contact
 
 
-def new_two_event(flow: Flow) -> TwoEvent:
-    """Scratch of the scalar problem beside that of a machine's flow."""
-    size = flow.z.shape[0]
+def new_two_event(machine: MachineArrays) -> TwoEvent:
+    """Scratch of the scalar problem of a machine."""
+    size = 2 * machine.direction.shape[1]
     square = (size, size)
     return TwoEvent(
-        flow=flow,
         engaged=np.zeros(square),
         open=np.zeros(square),
         A=np.zeros(square),
@@ -88,9 +86,10 @@ def piece_exponential(modes: Modes, slot: int, length: float, out: Real) -> None
 
 
 @kernel
-def required_force(machine: MachineArrays, work: TwoEvent, omega: float, s: float) -> complex:
+def required_force(
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, s: float
+) -> complex:
     """F of the motion that touches for the share s; its state at contact into work.z."""
-    flow = work.flow
     size = work.z.shape[0]
     half = math.pi / omega
     for slot in (OPEN_SLOT, PLUS_SLOT):
@@ -102,7 +101,7 @@ def required_force(machine: MachineArrays, work: TwoEvent, omega: float, s: floa
     piece_exponential(flow.modes, PLUS_SLOT, s * half, work.engaged)
     piece_exponential(flow.modes, OPEN_SLOT, (1.0 - s) * half, work.open)
     turn = exponential(1j * (s * math.pi))
-    _end_of_touch(machine, work, turn)
+    _end_of_touch(machine, flow, work, turn)
     # -z = open z_end + ..., with z_end = engaged z + end: (I + open engaged) z = right sides.
     for r in range(size):
         for c in range(size):
@@ -113,14 +112,13 @@ def required_force(machine: MachineArrays, work: TwoEvent, omega: float, s: floa
     if not lu_factor(work.A, work.pivot):
         return complex(math.nan, math.nan)
     for part in range(3):
-        _solve_begin(work, turn, part)
+        _solve_begin(flow, work, turn, part)
     return _solve_force(machine, work, s * half)
 
 
 @kernel
-def _end_of_touch(machine: MachineArrays, work: TwoEvent, turn: complex) -> None:
+def _end_of_touch(machine: MachineArrays, flow: Flow, work: TwoEvent, turn: complex) -> None:
     """work.end: the state at release less exp(A t) z, constant and per part of F."""
-    flow = work.flow
     size = work.z.shape[0]
     n, gap = size // 2, machine.stops.gap[0, 0]
     for r in range(size):
@@ -138,9 +136,8 @@ def _end_of_touch(machine: MachineArrays, work: TwoEvent, turn: complex) -> None
 
 
 @kernel
-def _solve_begin(work: TwoEvent, turn: complex, part: int) -> None:
+def _solve_begin(flow: Flow, work: TwoEvent, turn: complex, part: int) -> None:
     """One column of work.begin, and of work.end with exp(A t) z added."""
-    flow = work.flow
     size = work.z.shape[0]
     for r in range(size):
         # At the end of the half turn the drive has the opposite sign.
@@ -183,20 +180,29 @@ def _solve_force(machine: MachineArrays, work: TwoEvent, touch: float) -> comple
 
 
 @kernel
-def force_excess(machine: MachineArrays, work: TwoEvent, omega: float, s: float) -> float:
+def force_excess(
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, s: float
+) -> float:
     """f(s) = |F| - 1."""
-    F = required_force(machine, work, omega, s)
+    F = required_force(machine, flow, work, omega, s)
     return math.sqrt(F.real * F.real + F.imag * F.imag) - 1.0
 
 
 @kernel
 def root_between(
-    machine: MachineArrays, work: TwoEvent, omega: float, a: float, b: float, f_a: float, f_b: float
+    machine: MachineArrays,
+    flow: Flow,
+    work: TwoEvent,
+    omega: float,
+    a: float,
+    b: float,
+    f_a: float,
+    f_b: float,
 ) -> float:
     """Zero of f in [a, b] by false position with halving of the stale end (Illinois)."""
     for _ in range(MOST_ROOT_STEPS):
         s = (a * f_b - b * f_a) / (f_b - f_a)
-        f = force_excess(machine, work, omega, s)
+        f = force_excess(machine, flow, work, omega, s)
         if abs(f) < 1e-14 or abs(b - a) < 1e-14:
             return s
         if f * f_b < 0.0:
@@ -209,7 +215,13 @@ def root_between(
 
 @kernel(entry=True)
 def two_event_states(
-    machine: MachineArrays, work: TwoEvent, omega: float, samples: int, states: Real, shares: Real
+    machine: MachineArrays,
+    flow: Flow,
+    work: TwoEvent,
+    omega: float,
+    samples: int,
+    states: Real,
+    shares: Real,
 ) -> int:
     """All zeros of f that lie more than one sample apart: states at t = 0 and shares; their number.
 
@@ -219,11 +231,11 @@ def two_event_states(
     before, f_before = 0.0, math.nan
     for i in range(samples):
         s = (i + 0.5) / samples
-        f = force_excess(machine, work, omega, s)
+        f = force_excess(machine, flow, work, omega, s)
         if f * f_before < 0.0 and found < states.shape[0]:
-            root = root_between(machine, work, omega, before, s, f_before, f)
-            F = required_force(machine, work, omega, root)
-            to_phase_zero(machine, work, omega, root, F)
+            root = root_between(machine, flow, work, omega, before, s, f_before, f)
+            F = required_force(machine, flow, work, omega, root)
+            to_phase_zero(machine, flow, work, omega, root, F)
             for k in range(work.z.shape[0]):
                 states[found, k] = work.z[k]
             shares[found] = root
@@ -240,17 +252,19 @@ def has_two_events(machine: MachineArrays) -> bool:
 
 
 @kernel
-def two_event_state(machine: MachineArrays, work: TwoEvent, omega: float, share: float) -> bool:
+def two_event_state(
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, share: float
+) -> bool:
     """The zero of f near a share, by the secant method: its state at phase 0 into work.z."""
-    before, s = 0.99 * share, share
-    f_before = force_excess(machine, work, omega, before)
-    for _ in range(MOST_SECANTS):
-        F = required_force(machine, work, omega, s)
+    before, s, f_before = share, 0.99 * share, math.nan
+    for k in range(MOST_SECANTS):
+        F = required_force(machine, flow, work, omega, s)
         f = math.hypot(F.real, F.imag) - 1.0
         if abs(f) < ON_ZERO:
-            to_phase_zero(machine, work, omega, s, F)
+            to_phase_zero(machine, flow, work, omega, s, F)
             return True
-        before, s, f_before = s, s - f * (s - before) / (f - f_before), f
+        new = share if k == 0 else s - f * (s - before) / (f - f_before)
+        before, s, f_before = s, new, f
         if not 0.0 < s < 1.0:
             return False
     return False
@@ -258,20 +272,20 @@ def two_event_state(machine: MachineArrays, work: TwoEvent, omega: float, share:
 
 @kernel
 def to_phase_zero(
-    machine: MachineArrays, work: TwoEvent, omega: float, s: float, F: complex
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, s: float, F: complex
 ) -> None:
     """Carry the state at contact to phase 0 of the force, or to pi and turn it round."""
     phase, size = math.atan2(F.imag, F.real), work.z.shape[0]
     ahead = -phase if phase <= 0.0 else math.pi - phase
     begin = 0.0 if ahead < s * math.pi else s * math.pi
     slot = PLUS_SLOT if begin == 0.0 else OPEN_SLOT
-    modes, drive = work.flow.modes, work.flow.drive
+    modes, drive = flow.modes, flow.drive
     before, after = F * exponential(1j * begin), F * exponential(1j * ahead)
     for k in range(size):
         z = work.z[k]
         if begin > 0.0:
             z = work.end[k, 0] + F.real * work.end[k, 1] + F.imag * work.end[k, 2]
-        rest = _rest(machine, work, slot, k)
+        rest = _rest(machine, flow, slot, k)
         work.column[k] = z - rest - (before * drive[slot, 0, k]).real
         work.z[k] = rest + (after * drive[slot, 0, k]).real
     for i in range(modes.mode_count[slot]):
@@ -286,11 +300,11 @@ def to_phase_zero(
 
 
 @kernel
-def _rest(machine: MachineArrays, work: TwoEvent, slot: int, k: int) -> float:
+def _rest(machine: MachineArrays, flow: Flow, slot: int, k: int) -> float:
     """Where the machine stays that is not driven, state k: at the gap an engaged stop holds it."""
     if slot == OPEN_SLOT or k >= machine.direction.shape[1]:
         return 0.0
-    return float(machine.stops.gap[0, 0] * work.flow.modes.rest[PLUS_SLOT, 0, k])
+    return float(machine.stops.gap[0, 0] * flow.modes.rest[PLUS_SLOT, 0, k])
 
 
 class TwoEventProblem:
@@ -298,7 +312,7 @@ class TwoEventProblem:
 
     def __init__(self, machine: MachineArrays) -> None:
         self._machine = machine
-        self._work = new_two_event(new_flow(machine))
+        self._flow, self._work = new_flow(machine), new_two_event(machine)
 
     @staticmethod
     def applies(system: MechanicalSystem) -> bool:
@@ -315,5 +329,7 @@ class TwoEventProblem:
         """States at t = 0, (k, 2 N), and contact shares, (k,), of the candidates at ``omega``."""
         states = np.empty((MOST_MOTIONS, self._work.z.size))
         shares = np.empty(MOST_MOTIONS)
-        found = two_event_states(self._machine, self._work, omega, SAMPLES, states, shares)
+        found = two_event_states(
+            self._machine, self._flow, self._work, omega, SAMPLES, states, shares
+        )
         return states[:found], shares[:found]
