@@ -55,11 +55,11 @@ def rate(batch, machine, omega, threads):
 
 
 def slopes_asked(omega):
-    """Derivatives of states, extremes, forces and contact, not of multipliers."""
+    """Derivatives of states, extremes and forces, not of contact and multipliers."""
     none = np.zeros((1, omega.size, 0, len(FIELDS)), complex)
     return SlopesAsked(
         linear=np.zeros((1, 0, 3, 2, len(FIELDS))), along=none, across=none, means=False,
-        multipliers=False, even=True, corner=np.zeros(1, np.int64),
+        contacts=False, multipliers=False, even=True, corner=np.zeros(1, np.int64),
     )  # fmt: skip
 
 
@@ -75,7 +75,7 @@ def derivative_ratios(batch, machine, columns, omega):
         for k, multipliers in ((1, False), (2, True)):
             clock = time.process_time()
             changes = lane_columns(machine, columns, batch, FIELDS)
-            one = wanted._replace(multipliers=multipliers)
+            one = wanted._replace(contacts=multipliers, multipliers=multipliers)
             solve_slopes(batch, changes.solved, omega, asked, one, found)
             spent[k].append(time.process_time() - clock)
     alone, slopes, maps = (statistics.median(one[1:]) for one in spent)

@@ -455,8 +455,10 @@ def test_at_grazing_a_kick_has_two_sides_and_the_papers_law_has_one(leaning) -> 
         else:
             with pytest.raises(IncompleteError, match="grazes stop 0"):
                 point.orbit.sensitivity("state", ["clearance"])
-        with pytest.raises(IncompleteError, match="grazes stop 0"):
-            point.orbit.sensitivity("multipliers", ["clearance"])
+        rough = ("multipliers", "largest_multiplier", "contact_share", "stop_approach_speed")
+        for asked in (*rough, ("contact_share", 0)):
+            with pytest.raises(IncompleteError, match="grazes stop 0"):
+                point.orbit.sensitivity(asked, ["clearance"])
 
 
 def test_at_a_fold_the_motion_moves_infinitely_fast(screen) -> None:

@@ -84,7 +84,7 @@ def solved(machine, columns, omega, names):
     none = np.zeros((1, omega.size, 0, P), complex)
     wanted = SlopesAsked(
         linear=np.zeros((1, 0, 3, system.size, P)), along=none, across=none, means=False,
-        multipliers=True, even=changes.keeps_mirror,
+        contacts=True, multipliers=True, even=changes.keeps_mirror,
         corner=np.zeros(len(system.springs), np.int64),
     )  # fmt: skip
     return found, solve_slopes(batch, changes.solved, omega, asked, wanted, found)
@@ -289,6 +289,8 @@ def test_a_motion_that_grazes_has_none_under_a_law_with_a_corner(beside):
     for law, known in (("paper", True), ("compression-only", False)):
         grazing = machine(law, free * beside)
         asked = [one for one in quantities_for(grazing).values() if one.part == "amplitude"]
+        rough = [quantity_named(name, grazing) for name in ("contact_share", "largest_multiplier")]
+        asked += rough
         found, why = lane_values(
             grazing, {"forcing": np.ones(1)}, asked, np.array([0.7]), (0.1, 2.0), "from-below",
             names=("forcing",),
@@ -296,6 +298,22 @@ def test_a_motion_that_grazes_has_none_under_a_law_with_a_corner(beside):
         assert why[0, 0] == FOUND
         assert found[asked[0].name][0, 0] == pytest.approx(free, rel=1e-12)
         assert np.isfinite(found[slope_key(asked[0].name)][0, 0, 0]) == known
+        assert all(np.isnan(found[slope_key(one.name)]).all() for one in rough)
+
+
+def test_small_multipliers_without_a_derivative_leave_the_largest_its_own():
+    """They lie so close to zero, and to each other, that they count as one."""
+    K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    stop = ff.ClearanceSpring([1.0, 0.0, 0.0], 5.0, 0.3, 0.3, np.inf)
+    chain = ff.MechanicalSystem(np.eye(3), 0.5 * K, K, (stop,), ff.HarmonicForce([0.0, 0.0, 1.0]))
+    name = "springs[0].stiffness"
+    asked = quantity_named("largest_multiplier", chain)
+    found, why = read(chain, {"forcing": np.array([1.0, 1.1])}, [asked], [0.1, 0.2], [name])
+    assert (why == FOUND).all()
+    for k, omega in enumerate((0.1, 0.2)):
+        orbit = ff.frequency_response(chain, (0.05, 0.5)).orbit_from_below(omega)
+        (own,) = orbit.sensitivity("largest_multiplier", [name])
+        assert found[slope_key(asked.name)][0, k, 0] == pytest.approx(own, rel=1e-7)
 
 
 @pytest.fixture(scope="module")

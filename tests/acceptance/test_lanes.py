@@ -110,6 +110,30 @@ def test_the_scalar_problem_leads_to_the_motion_that_newton_finds(screen, omega)
     np.testing.assert_allclose(read.share, read_other.share, rtol=1e-8)
 
 
+def test_the_scalar_problem_leads_no_farther_than_newton_may():
+    """It knew a motion of 39.7 mm that no rising speed leads to."""
+    screen = ff.load("ffs0827").replace(
+        main_mass=234.63124976310314, floating_mass=201.2073112014225,
+        eccentric_moment=0.957780936401668, isolation_stiffness=1192.2653025091504,
+        isolation_damping=191.67410427173826, shear_stiffness=83831.1732169575,
+        shear_damping=245.435507901628, stop_stiffness=1097490.2702883426,
+        stop_damping=56.53040534939669, clearance=0.024566787188451296,
+    )  # fmt: skip
+    other = {
+        "floating_mass": 187.52042440730116, "shear_stiffness": 78205.99084802427,
+        "stop_stiffness": 1280077.0588340985, "clearance": 0.03046831878514744,
+        "eccentric_moment": 0.8411377930584173, "shear_damping": 301.9760990129001,
+        "stop_damping": 68.00318879056836,
+    }  # fmt: skip
+    columns = {name: np.array([getattr(screen, name), value]) for name, value in other.items()}
+    speed = np.array([44.81634894528885])
+    found, why = values(screen, columns, "relative_amplitude", speed)
+    assert (why == FOUND).all()
+    branch = ff.frequency_response(screen.replace(**other), (5.0, 60.0))
+    alone = branch.orbit_from_below(float(speed[0])).amplitude("relative")
+    assert found[1, 0] == pytest.approx(alone, rel=1e-8)
+
+
 def test_upper_and_lower_motions_are_kept_apart(screen):
     columns = drawn(screen, FIELDS, 20, 0.05, seed=9)
     omega = np.array([195.0, 203.0])

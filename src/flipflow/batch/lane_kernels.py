@@ -29,7 +29,7 @@ from flipflow.batch.reasons import FOUND, NO_MOTION, UNSTABLE
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.contact_free_range import contact_free_up_to
+from flipflow.dynamics.contact_free_range import contact_free_up_to, is_contact_free_below
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import Stops
 from flipflow.periodic.shooting import Shooting
@@ -120,8 +120,10 @@ def run_lane(
         rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
             half = even and nearby.even[f] != 0
-            problem = problem_of(machine, half, length)
-            begun = start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f])
+            problem, modes = problem_of(machine, half, length), work.shooting.flow.modes
+            # A motion nearby may be one that a machine does not come to which meets no stop.
+            if not (rising and is_contact_free_below(machine, modes, omega[f])):
+                begun = start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f])
             if not begun:
                 half = even
                 problem = problem_of(machine, half, length)
@@ -155,25 +157,26 @@ def start_from_guess(
 ) -> bool:
     """Begin the path with the stable motion that Newton reaches from a guess close by.
 
-    Where it is a motion of two events, the scalar problem brings the guess closer.
+    Where it is a motion of two events, the scalar problem has the motion itself.
     """
     for k in range(guess.shape[0]):
         if math.isnan(guess[k]):
             return False
-        work.guess[k] = guess[k]
-    machine, flow = problem.machine, work.shooting.flow
-    touching = problem.sign < 0.0 and share > 0.0 and has_two_events(machine)
-    if touching and two_event_state(machine, flow, work.touch, omega, share):
-        closer = work.touch.z
-        near = is_near(closer, guess, omega, problem.length)
-        for k in range(guess.shape[0] if near else 0):
-            work.guess[k] = closer[k]
-    return begun(problem, work, omega, FAR_FROM_GUESS)
+    machine, found = problem.machine, work.touch.z
+    near = problem.sign < 0.0 and share > 0.0 and has_two_events(machine)
+    near = near and two_event_state(machine, work.shooting.flow, work.touch, omega, share)
+    near = near and is_near(found, guess, omega, problem.length)
+    for of_guess in range(0 if near else 1, 2):
+        for k in range(guess.shape[0]):
+            work.guess[k] = guess[k] if of_guess else found[k]
+        if begun(problem, work, omega, FAR_FROM_GUESS if of_guess else SAME):
+            return True
+    return False
 
 
 @kernel
 def is_near(z: Real, guess: Real, omega: float, length: float) -> bool:
-    """Whether a state is as near to a guess as Newton's first step may lead away from it."""
+    """Whether a state lies no farther from a guess than Newton's first step may lead."""
     n = z.shape[0] // 2
     large, apart = length, 0.0
     for k in range(n):

@@ -58,6 +58,7 @@ class LaneWork(NamedTuple):
 
     shooting: ShootingWork
     schur: Schur
+    touch: TwoEvent
     z: Real  # (2 N,) the state at phase 0
     slope: Real  # (2 N,) dz / d omega
     guess: Real  # (2 N,)
@@ -74,7 +75,6 @@ class LaneWork(NamedTuple):
     pivot: Int  # (2 N,)
     step: Real  # (3,) last Newton step, as a share of the motion and in m; the motion's size in m
     mu: Complex  # (2 N,) eigenvalues of the return map, with the problem's sign
-    touch: TwoEvent
     largest: Real  # (1,) their largest modulus, NaN: not looked for since Newton's last step
 
 

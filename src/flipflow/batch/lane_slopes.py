@@ -35,6 +35,8 @@ from flipflow.dynamics.parameter_variation import set_limits
 from flipflow.periodic.near_grazing import GRAZES, near_grazing_of
 from flipflow.periodic.shooting import Shooting
 
+CLEAR, GRAZED, KICKED = 0, 1, 2  # how a motion grazes a stop
+
 
 @kernel(inline=True)
 def columns_of(batch: Columns, lane: int) -> Columns:
@@ -63,15 +65,16 @@ def slope_lanes(
             z = found.state[lane, f]
             if not state_slopes(problem, columns, omega[f], z, work, out.state[lane, f]):
                 continue
-            torn = grazes(problem, work, omega[f], wanted, z, True)
-            if wanted.multipliers and not grazes(problem, work, omega[f], wanted, z, False):
+            grazed = grazing(problem, work, omega[f], wanted, z)
+            if wanted.multipliers and grazed == CLEAR:
                 multiplier_slopes(
                     machine, work.lane.shooting.flow, omega[f], columns, problem.sign, half,
                     work.shift, work.tangents, found.multiplier[lane, f], work.lane.schur,
                     work.multiplier, work.columns, out.multiplier[lane, f],
                 )  # fmt: skip
-            if not torn:
-                read_slopes(problem, columns, omega[f], asked, wanted, work, out, lane, f)
+            if grazed != KICKED:
+                contacts = wanted.contacts and grazed == CLEAR
+                read_slopes(problem, columns, omega[f], asked, wanted, contacts, work, out, lane, f)
 
 
 @kernel
@@ -128,29 +131,30 @@ def solve_states(
 
 
 @kernel
-def grazes(
-    problem: Shooting, work: SlopeWork, omega: float, wanted: SlopesAsked, z: Real, corners: bool
-) -> bool:
-    """Whether the motion grazes a stop; of ``corners`` one that kicks the tangent there."""
-    n, stops = z.shape[0] // 2, problem.machine.stops
+def grazing(problem: Shooting, work: SlopeWork, omega: float, wanted: SlopesAsked, z: Real) -> int:
+    """How the motion grazes a stop: KICKED where its tangent jumps, else GRAZED, or CLEAR.
+
+    Of what moves as a square root beside a grazing nothing need be asked.
+    """
+    n, stops, worst = z.shape[0] // 2, problem.machine.stops, CLEAR
     large = problem.length
     for k in range(n):
         large = max(large, abs(z[k]), abs(z[n + k]) / omega)
     for j in range(stops.damping.shape[0]):
-        if corners and (wanted.corner[j] == 0 or stops.damping[j] == 0.0):
-            continue
-        room, depth = near_grazing_of(problem, work.lane.shooting, omega, j)
-        if min(room, depth) < GRAZES * large:
-            return True
-    return False
+        kicks = wanted.corner[j] != 0 and stops.damping[j] != 0.0
+        if kicks or wanted.multipliers or wanted.contacts:
+            room, depth = near_grazing_of(problem, work.lane.shooting, omega, j)
+            if min(room, depth) < GRAZES * large:
+                worst = max(worst, KICKED if kicks else GRAZED)
+    return worst
 
 
 @kernel
 def read_slopes(
     problem: Shooting, columns: Columns, omega: float, asked: Asked, wanted: SlopesAsked,
-    work: SlopeWork, out: Slopes, lane: int, f: int,
+    contacts: bool, work: SlopeWork, out: Slopes, lane: int, f: int,
 ) -> None:  # fmt: skip
-    """Derivatives of all readings of the motion whose flow is recorded."""
+    """Derivatives of all readings of the motion whose flow is recorded; of contacts if wanted."""
     machine = problem.machine
     turn = problem.fraction * 2.0 * math.pi / omega
     for g in range(asked.coordinate.shape[0]):
@@ -158,8 +162,9 @@ def read_slopes(
         coordinate_slopes(problem, columns, omega, asked.coordinate, g, work, upper, lower)
     for j in range(machine.direction.shape[0]):
         force_slopes(machine, columns, omega, j, work, out.force[lane, f, j])
-    share, approach = out.share[lane, f], out.approach[lane, f]
-    contact_slopes(machine, columns, omega, turn, work, share, approach)
+    if contacts:
+        share, approach = out.share[lane, f], out.approach[lane, f]
+        contact_slopes(machine, columns, omega, turn, work, share, approach)
     if wanted.means:
         first, square = out.first[lane, f], out.square[lane, f]
         mean_slopes(machine, columns, omega, turn, asked, work, first, square)

@@ -51,6 +51,7 @@ class SlopesAsked(NamedTuple):
     along: Complex  # (L, F, Q, P) of A
     across: Complex  # (L, F, Q, P) of B
     means: bool  # first harmonics and mean squares, too
+    contacts: bool  # shares of contact and the speed of approach, too
     multipliers: bool
     even: bool  # whether an even machine stays so with every parameter
     corner: Int  # (m,) 1 where the law kicks the tangent of what grazes the stop

@@ -26,9 +26,8 @@ from flipflow.dynamics.parameter_tangent import Columns
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.solver import characteristic_length
 
-# Motions that one task of a thread finds: handing it over takes as long as some of them.
-LEAST, MOST = 128, 2048
-TASKS = 4  # of a thread at least, where each then has enough: the last to end is waited for
+MOST = 2048  # motions that one task finds
+TASKS = 4  # of each thread at least, since the last one to end is waited for
 
 
 def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Real) -> Nearby:
@@ -116,8 +115,7 @@ def solve_lanes(
 
 def _lanes_of_task(lanes: int, speeds: int, threads: int) -> int:
     """How many lanes a task has."""
-    shared = min(max(lanes // (TASKS * threads), LEAST // speeds), MOST // speeds)
-    return max(shared, 1)
+    return max(min(lanes // (TASKS * threads), MOST // speeds), 1)
 
 
 def _machine(arrays: MachineArrays, lane: int) -> MachineArrays:

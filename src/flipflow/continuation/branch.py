@@ -397,7 +397,7 @@ class Branch(Frozen, Result):
         return tuple(self._refined(which, int(foot), "trough") for foot in feet)
 
     def _refined(self, which: Coordinate, top: int, kind: str) -> SpecialPoint:
-        """The peak or trough near point ``top``, each once."""
+        """The peak or trough near point ``top``, sought once and kept."""
         key = (*self.system.coordinate(which).tolist(), top, kind)
         if key not in self._turned:
             self._turned[key] = self._turn_near(which, top, kind)
@@ -415,10 +415,10 @@ class Branch(Frozen, Result):
             return best
 
         def place(t: float) -> tuple[int, float]:
-            """Step of the branch and share of it; t is 2 at the point, 1 and 3 at those beside."""
+            """Step and share of it; t is 2 at the point, since tolerances are shares of |t|."""
             return (top - 1, t - 1.0) if t < 2.0 else (top, t - 2.0)
 
-        @cache  # a search that begins with known values asks for them again
+        @cache  # the search asks again for the values that it begins with, and we for its last
         def rise(t: float) -> float:
             try:
                 point = solver.between(self.traced, *place(t))
@@ -456,7 +456,7 @@ class Branch(Frozen, Result):
 
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function is least between two ends, of which at most one is 2, as inner point."""
+    """Where a function is least between two ends, 1 or 2 and 2 or 3, within AT_TURN."""
     if low < 2.0 < high and function(2.0) < min(function(low), function(high)):
         # Steps of parabolas, which three points with the least amid begin.
         found = minimize_scalar(function, bracket=(low, 2.0, high), tol=0.5 * AT_TURN)

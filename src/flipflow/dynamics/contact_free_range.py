@@ -52,6 +52,16 @@ def contact_free_up_to(machine: MachineArrays, modes: Modes, omega: float) -> fl
     return free
 
 
+@kernel
+def is_contact_free_below(machine: MachineArrays, modes: Modes, omega: float) -> bool:
+    """Whether no motion without contact meets a gap up to ``omega``; soon told where one does."""
+    if modes.ready[0] == 0:
+        prepare(machine, modes, 0)
+    if modes.ready[0] != 1 or not _stays_below(machine, modes, omega, omega, True):
+        return False
+    return contact_free_up_to(machine, modes, omega) == omega
+
+
 @kernel(inline=True)
 def _stays_below(
     machine: MachineArrays, modes: Modes, low: float, high: float, only_there: bool

@@ -284,7 +284,7 @@ _ALL = (
     ),
     Quantity(
         "largest_multiplier", "largest multiplier", "|mu|", "", "",
-        "What a turn leaves of a small disturbance: size of the largest Floquet multiplier.",
+        "What a period leaves of a small disturbance: size of the largest Floquet multiplier.",
         elsewhere="largest multiplier",
     ),
     Quantity(

@@ -194,22 +194,27 @@ class MotionDerivatives:
         )  # fmt: skip
         return value, slope
 
-    def require_smooth(self, *, multipliers: bool = False) -> None:
+    def require_smooth(self, *, roots: bool = False) -> None:
         """Refuse a motion that grazes a stop where the derivative has two sides.
+
+        Parameters
+        ----------
+        roots
+            Whether multipliers or times of contact are asked for: beside any grazing they move as
+            a square root.
 
         Raises
         ------
         IncompleteError
-            Where it grazes a stop whose law kicks on entry, or any one and multipliers are asked
-            for, which move there as a square root.
+            Where it grazes a stop whose law kicks on entry, or any one and ``roots`` holds.
         """
         for j, spring in enumerate(self.solver.springs):
             corner = spring.damping > 0.0 and spring.law not in SMOOTH_LAWS
-            if (corner or multipliers) and self._grazes(j):
-                what = "multipliers" if multipliers else "motion"
+            if (corner or roots) and self._grazes(j):
+                what = "its multipliers and times of contact have" if roots else "it has"
                 raise IncompleteError(
-                    f"The motion grazes stop {j} at {self.omega:.9g} rad/s, where its {what} has "
-                    "another derivative to each side; ask a little beside it."
+                    f"The motion grazes stop {j} at {self.omega:.9g} rad/s, where {what} another "
+                    "derivative to each side; ask a little beside it."
                 )
 
     def _grazes(self, j: int) -> bool:

@@ -187,7 +187,7 @@ class Orbit(Frozen, Result):
         )
 
     def contact_share(self, spring: int = 0) -> float:
-        """Share of the period during which a stop is touched, 0 to 1; 1 for one without gap."""
+        """Share of the period during which a stop has a force, 0 to 1; 1 for one without gap."""
         if self._spring(spring).bonded:
             return 1.0
         touches = (c for c in self.contact_intervals if c.spring == spring)

@@ -50,7 +50,7 @@ class TwoEvent(NamedTuple):
     column: Real  # (2 N,)
     begin: Real  # (2 N, 3) state at contact: constant, per real and per imaginary part of F
     end: Real  # (2 N, 3) the same at release
-    z: Real  # (2 N,) state at contact
+    z: Real  # (2 N,) state at contact, and at last at phase 0
 
 
 def new_two_event(machine: MachineArrays) -> TwoEvent:
@@ -184,7 +184,11 @@ def force_excess(
     machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, s: float
 ) -> float:
     """f(s) = |F| - 1."""
-    F = required_force(machine, flow, work, omega, s)
+    return _excess(required_force(machine, flow, work, omega, s))
+
+
+@kernel
+def _excess(F: complex) -> float:
     return math.sqrt(F.real * F.real + F.imag * F.imag) - 1.0
 
 
@@ -246,7 +250,7 @@ def two_event_states(
 
 @kernel
 def has_two_events(machine: MachineArrays) -> bool:
-    """Whether an even machine has the one stop and the one force of these motions."""
+    """Whether a machine, an even one, has the one stop and the one force of these motions."""
     one = machine.direction.shape[0] == 1 and machine.power.shape[0] == 1
     return one and machine.order[0] == 1 and machine.stops.law[0] == PAPER
 
@@ -259,7 +263,7 @@ def two_event_state(
     before, s, f_before = share, 0.99 * share, math.nan
     for k in range(MOST_SECANTS):
         F = required_force(machine, flow, work, omega, s)
-        f = math.hypot(F.real, F.imag) - 1.0
+        f = _excess(F)
         if abs(f) < ON_ZERO:
             to_phase_zero(machine, flow, work, omega, s, F)
             return True
@@ -280,14 +284,14 @@ def to_phase_zero(
     begin = 0.0 if ahead < s * math.pi else s * math.pi
     slot = PLUS_SLOT if begin == 0.0 else OPEN_SLOT
     modes, drive = flow.modes, flow.drive
-    before, after = F * exponential(1j * begin), F * exponential(1j * ahead)
+    turned, at_end = F * exponential(1j * begin), F * exponential(1j * ahead)
     for k in range(size):
         z = work.z[k]
         if begin > 0.0:
             z = work.end[k, 0] + F.real * work.end[k, 1] + F.imag * work.end[k, 2]
         rest = _rest(machine, flow, slot, k)
-        work.column[k] = z - rest - (before * drive[slot, 0, k]).real
-        work.z[k] = rest + (after * drive[slot, 0, k]).real
+        work.column[k] = z - rest - (turned * drive[slot, 0, k]).real
+        work.z[k] = rest + (at_end * drive[slot, 0, k]).real
     for i in range(modes.mode_count[slot]):
         q = 0j
         for k in range(size):
@@ -301,7 +305,7 @@ def to_phase_zero(
 
 @kernel
 def _rest(machine: MachineArrays, flow: Flow, slot: int, k: int) -> float:
-    """Where the machine stays that is not driven, state k: at the gap an engaged stop holds it."""
+    """State k at rest without drive: an engaged stop holds the machine beside its gap."""
     if slot == OPEN_SLOT or k >= machine.direction.shape[1]:
         return 0.0
     return float(machine.stops.gap[0, 0] * flow.modes.rest[PLUS_SLOT, 0, k])

@@ -42,6 +42,8 @@ READINGS: Mapping[str, Callable[[TiltedMotion, Coordinate], Complex]] = {
     "contact_share": lambda motion, spring: motion.contact_share(_spring(motion, spring)),
     "stop_force_peak": lambda motion, spring: motion.stop_force_peak(_spring(motion, spring)),
 }
+# What moves as a square root beside a grazing.
+ROOTS = (MULTIPLIERS, "largest_multiplier", "contact_share", "stop_approach_speed")
 NULL = 1e-4  # share of the largest singular value of I - M below which one is that of a fold
 JUMPED = 1e-3  # distance of a multiplier from what it is at a special point beyond which it jumps
 
@@ -52,7 +54,7 @@ def orbit_sensitivity(orbit: Orbit, quantity: Asked, names: Sequence[str]) -> ND
     reading = _reading(orbit, quantity)
     parameters = [_named(orbit.machine, name) for name in asked if name != OMEGA]
     slopes = _slopes(orbit, parameters)
-    slopes.require_smooth(multipliers=quantity in (MULTIPLIERS, "largest_multiplier"))
+    slopes.require_smooth(roots=(quantity[0] if isinstance(quantity, tuple) else quantity) in ROOTS)
     if quantity == STATE:
         found: NDArray[Any] = slopes.state
     elif quantity == MULTIPLIERS:

@@ -58,8 +58,8 @@ class LanePlan:
         return self.batch.bonded if asked else self.batch.bonded[:, :0]
 
     @property
-    def least_share(self) -> float:
-        """Share of the turn in which springs without gap act."""
+    def bonded_share(self) -> float:
+        """Share of the turn in which springs without gap act: all of it, where there are any."""
         return 1.0 if self.batch.bonded.shape[1] > 0 else 0.0
 
     @property
@@ -141,6 +141,7 @@ class LanePlan:
             along=along,
             across=across,
             means=bool(phases or quantities & {*SQUARED, "dissipated_power"}),
+            contacts=bool(quantities & {"contact_share", "stop_approach_speed"}),
             multipliers="largest_multiplier" in quantities,
             even=changes.keeps_mirror,
             corner=np.where(laws, 0, 1),
@@ -254,8 +255,9 @@ class LaneMotions:
         return self.read.approach
 
     def longest_contact(self) -> Real:
-        shares = self.read.share.max(axis=2, initial=self.plan.least_share)
-        return np.where(np.isnan(self.read.approach), np.nan, shares)
+        shares = self.read.share.max(axis=2, initial=self.plan.bonded_share)
+        no_motion = np.isnan(self.read.approach)
+        return np.where(no_motion, np.nan, shares)
 
     def largest_multiplier(self) -> Real:
         return np.asarray(np.abs(self.multiplier).max(axis=2))

@@ -193,10 +193,9 @@ def sensitivity(
         screen has ``"amplitude[0]"``, ``"phase[0]"`` and so on of its degrees of freedom,
         ``"left_amplitude"``, ``"left_phase"`` of a coordinate named "left"; ``"stop_force"``,
         the greatest of all its stops; ``"contact_share"``, ``"dissipated_power"``,
-        ``"jump_margin"``, ``"largest_multiplier"``; and of the whole
-        response those above but for ``"omega_ea"`` and ``"omega_ar"``. Its peak is that of the
-        coordinate "relative", else of the first that is named, else of the first degree of
-        freedom.
+        ``"jump_margin"``, ``"largest_multiplier"``; and of the whole response those above but for
+        ``"omega_ea"`` and ``"omega_ar"``. Its peak is that of the coordinate "relative", else of
+        the first that is named, else of the first degree of freedom.
     omega
         Frequency in rad/s, one or (n_omega,). For a quantity of the whole response the interval
         (low, high) analysed; None: from well below the first natural frequency of the machine to

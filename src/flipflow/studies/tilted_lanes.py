@@ -117,7 +117,7 @@ class TiltedLanes:
 
     def longest_contact(self) -> Complex:
         shares = np.moveaxis(_tilted(self.read.share, self.slopes.share), 2, 0)
-        least = np.full((1, *shares.shape[1:]), self.plan.least_share, np.complex128)
+        least = np.full((1, *shares.shape[1:]), self.plan.bonded_share, np.complex128)
         return _greatest(np.concatenate([least, shares]))
 
     def largest_multiplier(self) -> Complex:
@@ -154,12 +154,14 @@ class TiltedLanes:
 
 
 def _tilted(values: Real, slopes: Real) -> Complex:
-    """Numbers (...) with derivatives (..., P)."""
-    return np.asarray(values[..., None] + 1j * TILT * slopes)
+    """Numbers (...) with derivatives (..., P): one without a derivative stays a number."""
+    found = np.empty(slopes.shape, np.complex128)
+    found.real, found.imag = values[..., None], TILT * slopes
+    return found
 
 
 def _greatest(choices: Complex) -> Complex:
-    """The greatest of the first axis; its derivative is NaN where another one has another."""
+    """The greatest of the first axis; its derivative is NaN where one as great has another."""
     best = np.take_along_axis(choices, choices.real.argmax(axis=0)[None], axis=0)[0].copy()
     near = choices.real >= best.real - TIED * np.abs(best.real)
     unknown = np.isnan(choices.imag)

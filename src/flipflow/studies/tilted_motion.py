@@ -196,7 +196,7 @@ class TiltedMotion:
         return np.asarray(self._summit(lambda path: sign * np.sum(d * path.x, axis=1)) - gap)
 
     def contact_share(self, spring: int = 0) -> Complex:
-        """Share of the period during which a stop is touched."""
+        """Share of the period during which a stop has a force."""
         own, kept = self._springs[spring], self._kept
         if own.bonded or spring not in kept:
             return self._tilted(float(own.bonded))
@@ -506,9 +506,12 @@ def beside_zero(mean: Complex, high: Complex, low: Complex) -> NDArray[np.bool_]
 
 
 def size_of_multiplier(value: Complex, slope: Complex) -> Complex:
-    """|mu| of multipliers (..., 1) with derivatives (..., P), tilted."""
+    """|mu| of multipliers (..., 1) with derivatives (..., P), tilted; 0 has none."""
     size = np.abs(value)
-    return np.asarray(size + 1j * TILT * (value.conjugate() * slope).real / size)
+    found = np.empty(slope.shape, np.complex128)
+    with np.errstate(invalid="ignore"):
+        found.real, found.imag = size, TILT * (value.conjugate() * slope).real / size
+    return found
 
 
 def _size_of(formula: Formula) -> Formula:
