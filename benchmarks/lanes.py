@@ -54,6 +54,20 @@ def rate(batch, machine, omega, threads):
     return touching / statistics.median(processors), touching / statistics.median(walls), failed
 
 
+def newton_ratio(batch, machine, omega):
+    """Time by Newton's method alone over that with a start from the scalar problem, in turn."""
+    asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
+    nearby = nearby_motions(machine.system(), machine.system(), omega)
+    starts, spent = (nearby, nearby._replace(share=np.zeros(omega.size))), ([], [])
+    for _ in range(4 * ROUNDS):
+        for start, times in zip(starts, spent, strict=True):
+            clock = time.process_time()
+            solve_lanes(batch, omega, asked, start)
+            times.append(time.process_time() - clock)
+    scalar, newton = map(statistics.median, spent)
+    return newton / scalar
+
+
 def slopes_asked(omega):
     """Derivatives of states, extremes and forces, not of contact and multipliers."""
     none = np.zeros((1, omega.size, 0, len(FIELDS)), complex)
@@ -130,6 +144,8 @@ def main():
             of_processor, of_wall, failed = rate(batch, machine, omega, threads)
             label = f"{name}, {threads} thread{'s' if threads > 1 else ''}"
             print(f"{label:34s}{of_processor:14,.0f}{of_wall:14,.0f}{failed:12d}")
+    ratio = newton_ratio(batch, machine, single)
+    print(f"unrelated, by Newton alone                 {ratio:.2f} times as long")
     for name, omega in (("along speed", along), ("unrelated, one speed", single)):
         slopes, maps = derivative_ratios(batch, machine, columns, omega)
         label = f"with derivatives, {name}"
