@@ -194,15 +194,9 @@ def _excess(F: complex) -> float:
 
 @kernel
 def root_between(
-    machine: MachineArrays,
-    flow: Flow,
-    work: TwoEvent,
-    omega: float,
-    a: float,
-    b: float,
-    f_a: float,
-    f_b: float,
-) -> float:
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float,
+    f_a: float, f_b: float,
+) -> float:  # fmt: skip
     """Zero of f in [a, b] by false position with halving of the stale end (Illinois)."""
     for _ in range(MOST_ROOT_STEPS):
         s = (a * f_b - b * f_a) / (f_b - f_a)
@@ -219,14 +213,9 @@ def root_between(
 
 @kernel(entry=True)
 def two_event_states(
-    machine: MachineArrays,
-    flow: Flow,
-    work: TwoEvent,
-    omega: float,
-    samples: int,
-    states: Real,
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, samples: int, states: Real,
     shares: Real,
-) -> int:
+) -> int:  # fmt: skip
     """All zeros of f that lie more than one sample apart: states at t = 0 and shares; their number.
 
     Whether their touches are those assumed is for the caller to see.
