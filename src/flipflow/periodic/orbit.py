@@ -312,7 +312,8 @@ class Orbit(Frozen, Result):
             For an unknown quantity or name, and where the machine has a kink in a parameter.
         IncompleteError
             At a fold, and where a derivative has two sides: at grazing under a law whose force
-            kicks on entry (for multipliers under every law), at two peaks of one height.
+            kicks on entry (for multipliers and times of contact under every law), at two peaks of
+            one height.
         """
         found = above("studies.derivatives", "orbit_sensitivity")(self, quantity, names)
         return cast("NDArray[Any]", found)
