@@ -101,7 +101,7 @@ def repeated_slopes(
         elif stage == STATES:
             state_slopes(problem, columns, omega, z, work, slopes.state[0, 0])
         elif stage == OF_READINGS:
-            read_slopes(problem, columns, omega, asked, wanted, False, work, slopes, 0, 0)
+            read_slopes(problem, columns, omega, asked, wanted, True, work, slopes, 0, 0)
         else:
             multiplier_slopes(
                 machine, flow, omega, columns, problem.sign, half, work.shift, work.tangents, mu,

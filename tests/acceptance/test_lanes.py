@@ -107,11 +107,12 @@ def test_the_scalar_problem_leads_to_the_motion_that_newton_finds(screen, omega)
     other, read_other = solve_lanes(batch, speeds, asked, nearby._replace(share=np.zeros(1)))
     np.testing.assert_array_equal(found.reason, other.reason)
     np.testing.assert_allclose(found.state, other.state, rtol=1e-8, atol=1e-10)
+    assert not np.array_equal(found.state, other.state)  # another way there rounds otherwise
     np.testing.assert_allclose(read.share, read_other.share, rtol=1e-8)
 
 
-def test_the_scalar_problem_leads_no_farther_than_newton_may():
-    """It knew a motion of 39.7 mm that no rising speed leads to."""
+def test_a_lane_that_meets_no_stop_is_not_led_to_a_motion_nearby_that_does():
+    """From its neighbour's motion the scalar problem finds one of 39.7 mm that stands alone."""
     screen = ff.load("ffs0827").replace(
         main_mass=234.63124976310314, floating_mass=201.2073112014225,
         eccentric_moment=0.957780936401668, isolation_stiffness=1192.2653025091504,

@@ -122,12 +122,13 @@ def run_lane(
             half = even and nearby.even[f] != 0
             problem, modes = problem_of(machine, half, length), work.shooting.flow.modes
             # A motion nearby may be one that a machine does not come to which meets no stop.
-            if not (rising and is_contact_free_below(machine, modes, omega[f])):
+            free = rising and is_contact_free_below(machine, modes, omega[f])
+            if not free:
                 begun = start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f])
             if not begun:
                 half = even
                 problem = problem_of(machine, half, length)
-                begun = start_without_contact(problem, work, omega[f], rising)
+                begun = start_without_contact(problem, work, omega[f], rising and not free)
             if not begun and rising and f == 0:
                 begun, half = start_far_below(machine, work, omega[f], length, even)
         reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
@@ -186,10 +187,10 @@ def is_near(z: Real, guess: Real, omega: float, length: float) -> bool:
 
 
 @kernel
-def start_without_contact(problem: Shooting, work: LaneWork, omega: float, rising: bool) -> bool:
-    """Begin the path with a motion without contact: below a frequency that rises, or at it."""
+def start_without_contact(problem: Shooting, work: LaneWork, omega: float, below: bool) -> bool:
+    """Begin the path with a motion without contact, at omega or below the first contact."""
     machine, modes = problem.machine, work.shooting.flow.modes
-    at = contact_free_up_to(machine, modes, omega) if rising else omega
+    at = contact_free_up_to(machine, modes, omega) if below else omega
     if not at > 0.0 or not contact_free_state(machine, work, at):
         return False
     return begun(problem, work, at, FAR)

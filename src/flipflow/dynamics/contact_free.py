@@ -50,15 +50,14 @@ def complex_amplitudes(system: MechanicalSystem, omega: Real, order: int = 1) ->
     return contact_free(system.M, system.C, system.K, force, order * omega)
 
 
-def slowest_decay(M: Real, C: Real, K: Real) -> Real:
-    """Greatest real part in 1/s of the eigenvalues of M x'' + C x' + K x = 0, (...)."""
+def state_matrix(M: Real, C: Real, K: Real) -> Real:
+    """A of z' = A z, z = (x, x'), for M x'' + C x' + K x = 0, (..., 2 N, 2 N); axes broadcast."""
     shape = np.broadcast_shapes(M.shape, C.shape, K.shape)
-    damping, stiffness = (np.linalg.solve(M, np.broadcast_to(one, shape)) for one in (C, K))
-    size = shape[-1]
-    A = np.zeros((*shape[:-2], 2 * size, 2 * size))
-    A[..., :size, size:] = np.eye(size)
-    A[..., size:, :size], A[..., size:, size:] = -stiffness, -damping
-    return np.asarray(np.linalg.eigvals(A).real.max(axis=-1))
+    n = shape[-1]
+    A = np.zeros((*shape[:-2], 2 * n, 2 * n))
+    A[..., :n, n:] = np.eye(n)
+    A[..., n:, :n], A[..., n:, n:] = -np.linalg.solve(M, K), -np.linalg.solve(M, C)
+    return A
 
 
 def span(orders: Sequence[int], amplitudes: Complex) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Complex, Real
-from flipflow.dynamics.contact_free import contact_free, slowest_decay
+from flipflow.dynamics.contact_free import contact_free, state_matrix
 from flipflow.dynamics.motion import longest_on
 from flipflow.dynamics.normal import NormalMotion, normal_amplitude, normal_motion, peak_of_both
 from flipflow.model.constants import GRAVITY
@@ -446,7 +446,8 @@ class ContactFree(Frozen):
         return np.zeros(self.force.shape)
 
     def largest_multiplier(self) -> Real:
-        return np.exp(2.0 * math.pi / self.omega * slowest_decay(*self._matrices))
+        slowest = np.linalg.eigvals(state_matrix(*self._matrices)).real.max(axis=-1)
+        return np.asarray(np.exp(2.0 * math.pi / self.omega * slowest))
 
     def bearing_load(self) -> Real:
         inertia = self.fields["rotating_mass"] * self.omega**2

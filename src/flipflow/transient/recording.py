@@ -10,6 +10,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_arrays
+from flipflow.dynamics.contact_free import state_matrix
 from flipflow.dynamics.contact_search import new_gap_motion
 from flipflow.dynamics.flow import MOST_SEGMENTS
 from flipflow.errors import IncompleteError
@@ -41,8 +42,7 @@ def work_rate(system: MechanicalSystem, omega: float) -> float:
             square = share * np.outer(spring.direction, spring.direction)
             K += spring.stiffness * square
             C += spring.damping * square
-        force = np.linalg.solve(system.M, np.concatenate([-K, -C], axis=1))
-        A = np.concatenate([np.eye(n, 2 * n, n), force])
+        A = state_matrix(system.M, C, K)
         fastest = max(fastest, float(np.abs(np.linalg.eigvals(A)).max()))
     return fastest * n**2 / PANEL
 
