@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 import typer.main
+from numba import types
 
 import flipflow as ff
 from flipflow.cli.main import main
@@ -171,13 +172,20 @@ def _blows_once() -> Iterator[None]:
         yield
 
 
+def _told(kind: types.Type) -> str:
+    """A type as numba words it, a structure with its fields."""
+    fields = getattr(kind, "fields", getattr(kind, "types", ()))
+    return " ".join([str(kind), *map(_told, fields)])
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _arrays_of_one_layout() -> Iterator[None]:
     """A kernel is compiled anew for arrays that lie otherwise in memory: that can take a minute."""
     load = cache.KernelCache.load_overload
 
-    def checked(self: cache.KernelCache, sig: object, target: object) -> object:
-        assert not re.search(r"d, [AF]\)|readonly", str(sig)), f"arrays of another layout: {sig}"
+    def checked(self: cache.KernelCache, sig: Sequence[types.Type], target: object) -> object:
+        told = " ".join(_told(kind) for kind in sig)
+        assert not re.search(r"d, [AF]\)|readonly", told), f"arrays of another layout: {told}"
         return load(self, sig, target)
 
     with pytest.MonkeyPatch.context() as patched:

@@ -14,9 +14,9 @@ from flipflow.batch.lane_path import (
     PUSH,
     SAME,
     LaneWork,
+    begin_lane,
     contact_free_state,
     follow,
-    forget,
     forget_path,
     is_even,
     largest_multiplier,
@@ -28,10 +28,10 @@ from flipflow.batch.lane_readings import Asked, Readings, ReadingWork, read_lane
 from flipflow.batch.reasons import FOUND, NO_MOTION, UNSTABLE
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_free_range import contact_free_up_to, is_contact_free_below
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.law import Stops
 from flipflow.periodic.shooting import Shooting
 from flipflow.periodic.two_event import has_two_events, two_event_state
 
@@ -41,6 +41,7 @@ OCTAVES_BELOW = 4  # below a frequency at which a machine that rests on a stop i
 OCTAVES = 3  # away from a frequency at which a machine is let settle where it does not there
 
 
+@by_reference
 class Found(NamedTuple):
     """The motions of L lanes at F frequencies; NaN until they are found."""
 
@@ -52,6 +53,7 @@ class Found(NamedTuple):
     reason: Int  # (L, F) one of FOUND, UNSTABLE, ...
 
 
+@by_reference
 class Nearby(NamedTuple):
     """Motions of a machine nearby at F frequencies, as first guesses."""
 
@@ -74,17 +76,6 @@ def new_found(lanes: int, speeds: int, degrees: int, reason: int) -> Found:
     )
 
 
-@kernel(inline=True)
-def machine_of(batch: MachineArrays, lane: int) -> MachineArrays:
-    """One machine of many: a slice of each array, but for the kinds of laws and excitations."""
-    stops = batch.stops
-    return MachineArrays(
-        batch.stiffness[lane], batch.damping[lane], batch.direction[lane], batch.reach[lane],
-        batch.static[lane], batch.push[lane], batch.power, batch.wave, batch.order,
-        Stops(stops.law, stops.stiffness[lane], stops.damping[lane], stops.gap[lane]),
-    )  # fmt: skip
-
-
 @kernel
 def problem_of(machine: MachineArrays, half: bool, length: float) -> Shooting:
     """Shooting over half a turn, with sign, or over a whole one."""
@@ -102,9 +93,8 @@ def run_lanes(
     Rising frequencies are reached from below, falling ones from above.
     """
     for lane in range(first, last):
-        forget(work)
-        machine = machine_of(batch, lane)
-        run_lane(machine, lane, omega, length, nearby, work, reading, asked, found, readings)
+        begin_lane(batch, lane, work)
+        run_lane(work.machine, lane, omega, length, nearby, work, reading, asked, found, readings)
 
 
 @kernel

@@ -16,12 +16,13 @@ turn, with sign. Where that motion loses its symmetry, the lane is flown to one 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
 from flipflow.compiled.eigen import Schur, new_schur, real_schur
@@ -53,9 +54,11 @@ PUSH = 1e-2  # share of the state by which an even motion is pushed out of symme
 SAME = 1e-6  # first Newton step, as a share of the motion, within which two motions are one
 
 
+@by_reference
 class LaneWork(NamedTuple):
     """Scratch of one thread for machines of N degrees of freedom; one lane after the other."""
 
+    machine: MachineArrays  # of the lane
     shooting: ShootingWork
     schur: Schur
     touch: TwoEvent
@@ -81,12 +84,14 @@ class LaneWork(NamedTuple):
 def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
     """Scratch for lanes of machines that differ from a given one in numbers alone.
 
+    Each lane's machine is written into the arrays of the given one.
     ``stop`` (1,) is the flag at which their flows end; none is followed any more.
     """
     shooting = new_shooting_work(machine)
     n = 2 * machine.direction.shape[1]
     vectors = ("z", "slope", "guess", "flown", "r", "slope_here", "slope_behind")
     return LaneWork(
+        machine=machine,
         shooting=shooting._replace(flow=shooting.flow._replace(stop=stop)),
         touch=new_two_event(machine),
         schur=new_schur(n),
@@ -105,8 +110,25 @@ def new_lane_work(machine: MachineArrays, stop: Int) -> LaneWork:
 
 
 @kernel
-def forget(work: LaneWork) -> None:
-    """Make the scratch that of another machine."""
+def take(batch: Any, lane: int, one: Any) -> None:
+    """Copy what an array of many machines holds for one of them."""
+    for place, value in np.ndenumerate(batch[lane]):
+        one[place] = value
+
+
+@kernel
+def begin_lane(batch: MachineArrays, lane: int, work: LaneWork) -> None:
+    """Make the scratch that of one machine of many, which have laws and excitations in common."""
+    machine = work.machine
+    take(batch.stiffness, lane, machine.stiffness)
+    take(batch.damping, lane, machine.damping)
+    take(batch.direction, lane, machine.direction)
+    take(batch.reach, lane, machine.reach)
+    take(batch.static, lane, machine.static)
+    take(batch.push, lane, machine.push)
+    take(batch.stops.stiffness, lane, machine.stops.stiffness)
+    take(batch.stops.damping, lane, machine.stops.damping)
+    take(batch.stops.gap, lane, machine.stops.gap)
     flow = work.shooting.flow
     for s in range(flow.driven_at.shape[0]):
         flow.modes.ready[s] = 0

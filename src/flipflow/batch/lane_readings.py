@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
     GapMotion,
@@ -26,6 +27,7 @@ from flipflow.dynamics.pieces import longest
 from flipflow.periodic.readings import observe_record
 
 
+@by_reference
 class Asked(NamedTuple):
     """What is read off every lane, besides what every motion has; L is 1 where all lanes agree."""
 
@@ -36,6 +38,7 @@ class Asked(NamedTuple):
     across: Complex  # (L, F, Q) B
 
 
+@by_reference
 class Readings(NamedTuple):
     """What was read, lanes and frequencies first."""
 
@@ -49,6 +52,7 @@ class Readings(NamedTuple):
     peak: Real  # (L, F, Q)
 
 
+@by_reference
 class ReadingWork(NamedTuple):
     """Scratch: sums of exponentials."""
 

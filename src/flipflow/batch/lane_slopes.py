@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from flipflow.batch.lane_kernels import Found, machine_of, problem_of
-from flipflow.batch.lane_path import forget, is_even
+from flipflow.batch.lane_kernels import Found, problem_of
+from flipflow.batch.lane_path import begin_lane, is_even, take
 from flipflow.batch.lane_readings import Asked
 from flipflow.batch.mean_slopes import mean_slopes
 from flipflow.batch.reasons import FOUND
@@ -38,14 +38,19 @@ from flipflow.periodic.shooting import Shooting
 CLEAR, GRAZED, KICKED = 0, 1, 2  # how a motion grazes a stop
 
 
-@kernel(inline=True)
-def columns_of(batch: Columns, lane: int) -> Columns:
-    """Columns of one machine of many."""
-    return Columns(
-        batch.inertia[lane], batch.damping[lane], batch.stiffness[lane], batch.direction[lane],
-        batch.reach[lane], batch.static[lane], batch.push[lane], batch.stop_stiffness[lane],
-        batch.stop_damping[lane], batch.gap[lane], batch.touches,
-    )  # fmt: skip
+@kernel
+def take_columns(batch: Columns, lane: int, columns: Columns) -> None:
+    """Write those of one machine of many; what they touch is the same for all."""
+    take(batch.inertia, lane, columns.inertia)
+    take(batch.damping, lane, columns.damping)
+    take(batch.stiffness, lane, columns.stiffness)
+    take(batch.direction, lane, columns.direction)
+    take(batch.reach, lane, columns.reach)
+    take(batch.static, lane, columns.static)
+    take(batch.push, lane, columns.push)
+    take(batch.stop_stiffness, lane, columns.stop_stiffness)
+    take(batch.stop_damping, lane, columns.stop_damping)
+    take(batch.gap, lane, columns.gap)
 
 
 @kernel(entry=True)
@@ -55,8 +60,9 @@ def slope_lanes(
 ) -> None:  # fmt: skip
     """Derivatives of the stable motions that were found of lanes ``first`` to ``last`` - 1."""
     for lane in range(first, last):
-        forget(work.lane)
-        machine, columns = machine_of(batch, lane), columns_of(batch_columns, lane)
+        begin_lane(batch, lane, work.lane)
+        machine, columns = work.lane.machine, work.machine_columns
+        take_columns(batch_columns, lane, columns)
         for f in range(omega.shape[0]):
             if found.reason[lane, f] != FOUND:
                 continue

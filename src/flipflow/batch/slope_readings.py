@@ -17,6 +17,7 @@ from flipflow.batch.lane_kernels import Found
 from flipflow.batch.lane_path import LaneWork, new_lane_work
 from flipflow.batch.lane_readings import Asked, ReadingWork, new_reading_work
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
     GapMotion,
@@ -44,6 +45,7 @@ AGREE = 1e-6  # share of a derivative to which those of two summits must agree
 AT_END = 1e-12  # share of a segment from its end within which its last sample stands
 
 
+@by_reference
 class SlopesAsked(NamedTuple):
     """What is differentiated besides states, extremes and forces; L is 1 where no vector is."""
 
@@ -57,6 +59,7 @@ class SlopesAsked(NamedTuple):
     corner: Int  # (m,) 1 where the law kicks the tangent of what grazes the stop
 
 
+@by_reference
 class Slopes(NamedTuple):
     """Derivatives with respect to P parameters, lanes and frequencies first; NaN: there is none."""
 
@@ -72,6 +75,7 @@ class Slopes(NamedTuple):
     multiplier: Complex  # (L, F, 2 N, P) in the order of those found
 
 
+@by_reference
 class Place(NamedTuple):
     """A place of the motion that is read."""
 
@@ -81,6 +85,7 @@ class Place(NamedTuple):
     rate: Real  # (2 N,) and its rate
 
 
+@by_reference
 class Summits(NamedTuple):
     """The greatest value in each part of a turn."""
 
@@ -90,10 +95,12 @@ class Summits(NamedTuple):
     side: Real  # (2 E,) +1 or -1 times the coordinate
 
 
+@by_reference
 class SlopeWork(NamedTuple):
     """Scratch of one thread for flows of up to E segments."""
 
     lane: LaneWork
+    machine_columns: Columns  # of the lane's machine
     reading: ReadingWork
     columns: ColumnWork
     multiplier: MultiplierWork
@@ -109,14 +116,20 @@ class SlopeWork(NamedTuple):
     weight: Real  # (K,)
 
 
-def new_slope_work(machine: MachineArrays, asked: Asked, parameters: int, stop: Int) -> SlopeWork:
-    """Scratch for lanes like a given machine."""
+def new_slope_work(machine: MachineArrays, asked: Asked, batch: Columns, stop: Int) -> SlopeWork:
+    """Scratch for lanes like a given machine, with P parameters.
+
+    Each lane's machine is written into the arrays of the given one.
+    """
+    parameters = batch.touches.shape[0]
+    first = {name: getattr(batch, name)[0].copy() for name in batch._fields if name != "touches"}
     lane = new_lane_work(machine, stop)
     n = machine.direction.shape[1]
     size, segments = 2 * n, lane.shooting.flow.start.shape[0]
     node, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     return SlopeWork(
         lane=lane,
+        machine_columns=Columns(**first, touches=batch.touches),
         reading=new_reading_work(lane.shooting.flow, machine, asked),
         columns=new_column_work(machine, parameters),
         multiplier=new_multiplier_work(size, parameters),

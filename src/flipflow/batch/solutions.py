@@ -102,7 +102,7 @@ def solve_lanes(
     def chunk(part: slice, stop: Int) -> None:
         # At one frequency a chunk's scratch would take a tenth of its time.
         if not hasattr(own, "work"):
-            own.work = new_lane_work(nominal, stop)
+            own.work = new_lane_work(_machine(batch.arrays, 0), stop)
             own.reading = new_reading_work(own.work.shooting.flow, nominal, asked)
         run_lanes(
             batch.arrays, part.start, part.stop, speeds_in_order, length, guesses, own.work,
@@ -158,7 +158,7 @@ def solve_slopes(
 
     def chunk(part: slice, stop: Int) -> None:
         if not hasattr(own, "work"):
-            own.work = new_slope_work(nominal, asked, parameters, stop)
+            own.work = new_slope_work(_machine(batch.arrays, 0), asked, columns, stop)
         slope_lanes(
             batch.arrays, columns, part.start, part.stop, speeds_in_order, length, asked, wanted,
             own.work, found, slopes,

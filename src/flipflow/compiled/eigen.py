@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 
 EPS = 2.220446049250313e-16  # relative rounding: spacing of floating-point numbers at 1
@@ -29,6 +30,7 @@ BALANCED = 0.95  # a scaling that saves less than this is not worth its pass
 MOST_PASSES = 20  # of balancing over all rows
 
 
+@by_reference
 class Schur(NamedTuple):
     """Scratch for one matrix of n rows."""
 

@@ -48,6 +48,10 @@ class EntryLibrary(JITCodeLibrary):
         for each in self._final_module.functions:
             if not each.is_declaration and each.linkage == Linkage.linkonce_odr:
                 each.linkage = Linkage.internal
+            elif not each.is_declaration:
+                # Taken into the call from Python, which lays structures out in memory, it could
+                # read them before that is done: it takes them for what never changes.
+                each.add_function_attribute("noinline")
         super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:

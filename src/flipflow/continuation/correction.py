@@ -13,6 +13,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.continuation.problem import (
@@ -33,6 +34,7 @@ TOLERATED = 1e-4  # last Newton step, at most this share of the step along the b
 STALLED = 1e-2  # the same of one that shrinks no more, which QUICK bounds, too
 
 
+@by_reference
 class Course(NamedTuple):
     """Where the branch is followed, and how long a step is."""
 
@@ -52,6 +54,7 @@ class Course(NamedTuple):
         return self[:6]
 
 
+@by_reference
 class Corrector(NamedTuple):
     """Scratch of the bordered Newton solves, and the last two points, all at one section."""
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_sign, lu_spread
 from flipflow.continuation.corners import (
@@ -79,6 +80,7 @@ NOTHING = -1  # in place of an unknown that ends on a bound
 REASON_NONE, REASON_NEWTON, REASON_TURN, REASON_CONTACT, REASON_BOUND, REASON_STRAND = range(6)
 
 
+@by_reference
 class Record(NamedTuple):
     """Record of up to P points with n unknowns each."""
 

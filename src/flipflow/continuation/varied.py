@@ -19,6 +19,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor
 from flipflow.dynamics.flow import run_flow
@@ -66,6 +67,7 @@ class Varied(NamedTuple):
     opened: Int  # (m, 2) 1 for the gaps that are not met up to the grazing: those grazed at once
 
 
+@by_reference
 class VariedWork(NamedTuple):
     """Scratch of the problem."""
 

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.law import Stops, entered, exit_of, signed_gap
 from flipflow.model.contact_law import MOST_EXITS, NO_EXIT, OPEN
@@ -40,6 +41,7 @@ MOST_DERIVATIVES = 24  # that may vanish
 SMALLEST_STEP = 1e-11  # share of the horizon: least step, which bounds their number at grazing
 
 
+@by_reference
 class GapMotion(NamedTuple):
     """Sum of exponentials at m gaps; the scratch in which a segment or series is written."""
 

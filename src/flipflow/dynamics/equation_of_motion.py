@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.dynamics.law import Stops
 
 
+@by_reference
 class MachineArrays(NamedTuple):
     """x'' = static - stiffness x - damping x' - sum_j reach_j H_j + sum_e Re(F_e e^(i n omega t)).
 

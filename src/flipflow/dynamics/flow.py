@@ -19,6 +19,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
     GapMotion,
@@ -43,6 +44,7 @@ from flipflow.dynamics.modes import Modes, new_modes, state_number
 MOST_SEGMENTS = 600  # that a flow can record; a turn has one more than changes of contact
 
 
+@by_reference
 class Flow(NamedTuple):
     """Modes, scratch, and the record of one flow of up to E segments."""
 

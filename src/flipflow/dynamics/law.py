@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.model.contact_law import (
     ENTRY,
@@ -23,6 +24,7 @@ from flipflow.model.contact_law import (
 )
 
 
+@by_reference
 class Stops(NamedTuple):
     """Laws and numbers of m springs."""
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.equation_of_motion import MachineArrays
@@ -29,6 +30,7 @@ BETWEEN = (-1.0, -0.97, -0.88, -0.71, -0.45, -0.17, 0.13, 0.41, 0.68, 0.86, 0.96
 EXACT = 1e-12  # deviation of a series from the machine, relative to the largest value
 
 
+@by_reference
 class MachineSeries(NamedTuple):
     """Coefficients (T, S, entries) over both intervals; an infinite gap stays as it is."""
 
@@ -46,6 +48,7 @@ class MachineSeries(NamedTuple):
     gap: Real  # (T, S, m, 2)
 
 
+@by_reference
 class SeriesWork(NamedTuple):
     """Scratch."""
 

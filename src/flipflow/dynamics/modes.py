@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.compiled.eigen import Schur, eigenvector, new_schur, real_schur
@@ -37,6 +38,7 @@ MOST_STATES = 2**12  # contact states for which tables are kept
 MOST_BYTES = 2**32  # of tables, of which only what is met is ever touched
 
 
+@by_reference
 class Modes(NamedTuple):
     """Tables over S contact states, of up to R modes; ``ready`` tells which are filled."""
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve, multiply
 from flipflow.compiled.eigen import Schur, eigenvector, real_schur
@@ -29,6 +30,7 @@ from flipflow.dynamics.parameter_tangent import (
 APART = 1e-7  # distance of two multipliers, as a share of the largest, below which they are one
 
 
+@by_reference
 class MultiplierWork(NamedTuple):
     """Scratch for R = 2 N multipliers and P parameters."""
 

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import multiply
 from flipflow.dynamics.contact_search import exponential, reciprocal
@@ -36,6 +37,7 @@ from flipflow.dynamics.law import damping_share, signed_gap, stiffness_share
 CLOSE = 0.3  # half the difference of two exponents below which their quotient is a series
 
 
+@by_reference
 class Columns(NamedTuple):
     """Derivatives of a machine's arrays with respect to P parameters; P = 0 is the same type."""
 
@@ -52,6 +54,7 @@ class Columns(NamedTuple):
     touches: Int  # (P, 7) 1 where M, C, K, f_0, an excitation, a stop, a direction changes, else 0
 
 
+@by_reference
 class ColumnWork(NamedTuple):
     """Scratch for R modes, W multiples of omega, P parameters and omega."""
 

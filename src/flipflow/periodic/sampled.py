@@ -23,6 +23,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.periodic.balance import (
     prepare_receptance,
@@ -41,6 +42,7 @@ class Sampled(NamedTuple):
     sharpness: float  # s in 1/m
 
 
+@by_reference
 class SampledWork(NamedTuple):
     """Scratch of the problem."""
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
     GapMotion,
@@ -47,6 +48,7 @@ class Balance(NamedTuple):
     length: float  # length in m below which amplitudes count as small
 
 
+@by_reference
 class BalanceWork(NamedTuple):
     """Scratch of the problem, and what the series last set left."""
 

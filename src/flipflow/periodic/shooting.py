@@ -18,6 +18,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import extremes, prepare_search
 from flipflow.dynamics.equation_of_motion import MachineArrays
@@ -42,6 +43,7 @@ class Shooting(NamedTuple):
     rest: Real  # (N,) position in m from which they count
 
 
+@by_reference
 class ShootingWork(NamedTuple):
     """Scratch of the problem; the flow holds the record of the last motion."""
 

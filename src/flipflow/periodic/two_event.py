@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.contact_search import exponential
@@ -40,6 +41,7 @@ ON_ZERO = 1e-10  # |f| from which the state is that of the motion
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 
 
+@by_reference
 class TwoEvent(NamedTuple):
     """Scratch of the scalar problem for 2 N states."""
 

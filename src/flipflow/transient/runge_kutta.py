@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.model.contact_law import MOST_EXITS
 from flipflow.transient.shaft_equations import Equations, set_regimes, slopes, switch, switching
@@ -31,6 +32,7 @@ SMALLEST = 1e-12  # share of the longest step below which the run is given up
 WAYS = max(2, MOST_EXITS)  # switching functions of a spring, and of the shaft
 
 
+@by_reference
 class Walk(NamedTuple):
     """Method, running state, scratch and record of one run of up to R rows."""
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
 from flipflow.dynamics.equation_of_motion import MachineArrays
@@ -25,6 +26,7 @@ PANEL = 2.0  # radians of the fastest mode in a Gauss panel
 SLIVER = 1e-12  # share of a turn below which a remainder is no turn of its own
 
 
+@by_reference
 class Table(NamedTuple):
     """Samples at K given times, in order."""
 
@@ -36,6 +38,7 @@ class Table(NamedTuple):
     peak: Real  # (K, all springs) greatest size of the force since the sample before
 
 
+@by_reference
 class Springs(NamedTuple):
     """Where the flow's m springs stand among all, and the b that always act, in its matrices."""
 
@@ -47,6 +50,7 @@ class Springs(NamedTuple):
     motion: GapMotion  # scratch along them
 
 
+@by_reference
 class Changes(NamedTuple):
     """Changes of contact, as many as ``used`` tells."""
 
@@ -56,6 +60,7 @@ class Changes(NamedTuple):
     used: Int  # (1,)
 
 
+@by_reference
 class Budget(NamedTuple):
     """What the energies are summed from and into."""
 

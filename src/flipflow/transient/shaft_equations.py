@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from flipflow.compiled.arrays import Complex, Int, Real
+from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.law import (
     Stops,
@@ -29,6 +30,7 @@ SHAFT_STATES = 6  # phi, phi', speed of the field, work put in, work dissipated,
 MAINS, CONVERTER = 0, 1  # what a motor is fed by
 
 
+@by_reference
 class Shaft(NamedTuple):
     """The shaft and what turns it, all at the shaft."""
 
@@ -53,6 +55,7 @@ class Shaft(NamedTuple):
     field_rate: Real  # (1,) acceleration of the converter's field
 
 
+@by_reference
 class Equations(NamedTuple):
     """N degrees of freedom, m springs, one shaft."""
 
