@@ -455,22 +455,28 @@ def test_both_sides_that_graze_all_along_are_no_second_grazing() -> None:
     assert not curve.notes
 
 
-def test_a_fold_that_runs_into_its_grazing_ends_there() -> None:
-    """At 3.436 mm a fold with the second side's touch meets the one without; single branches."""
+def test_a_fold_that_meets_that_without_a_touch_turns_back_there() -> None:
+    """At 3.437 mm a fold with the second side's touch meets the one without; single branches."""
     screen = ff.FlipFlowScreen(
         main_mass=514.5, floating_mass=167.6, eccentric_moment=0.9312, isolation_stiffness=377.2e3,
         isolation_damping=1711.0, shear_stiffness=515.4e3, shear_damping=1276.4,
         stop_stiffness=9.86e6, stop_damping=2692.0, clearance=2.08e-3, clearance_minus=10.41e-3,
     )  # fmt: skip
-    fold = ff.frequency_response(screen, (20.0, 300.0)).folds[-1]
-    curve = ff.continue_fold(fold, "clearance", (2.08e-3, 5.55e-3))
-    assert curve.status is ff.BranchStatus.MEETS_GRAZING
-    assert curve.values.size < 2000
-    ends, speed = float(curve.values[-1]), float(curve.omega[-1])
-    close("where it ends", ends, 3.436e-3, rel=2e-3)
-    for gap, folds in ((0.99 * ends, 2), (1.01 * ends, 0)):
-        beside = ff.frequency_response(screen.replace(clearance=gap), (20.0, 300.0)).folds
-        assert sum(abs(fold.omega - speed) < 0.5 for fold in beside) == folds, gap
+
+    def folds(gap: float) -> tuple[ff.SpecialPoint, ...]:
+        return ff.frequency_response(screen.replace(clearance=gap), (20.0, 300.0)).folds
+
+    curve = ff.continue_fold(folds(2.08e-3)[-1], "clearance", (2.08e-3, 5.55e-3))
+    assert curve.status is ff.BranchStatus.FOLLOWED
+    assert curve.values.size < 1000
+    turn = int(np.argmax(curve.values * (curve.values < 4e-3) * (curve.omega > 100.0)))
+    meets, speed = float(curve.values[turn]), float(curve.omega[turn])
+    close("where they meet", meets, 3.4374e-3, rel=1e-4)
+    for gap, count in ((0.99 * meets, 2), (1.01 * meets, 0)):
+        assert sum(abs(fold.omega - speed) < 0.5 for fold in folds(gap)) == count, gap
+    for i in np.linspace(0, curve.values.size - 1, 7).astype(int):
+        alone = nearest(folds(float(curve.values[i])), float(curve.omega[i]))
+        close("fold", curve.omega[i], alone, rel=1e-9)
 
 
 def test_no_turn_where_a_parameter_has_no_part() -> None:

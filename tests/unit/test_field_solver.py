@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.continuation.conditions import FLIP, GRAZING, MOTION, PAIR, SADDLE_NODE
 from flipflow.continuation.field_solver import MOTIONS, FieldSolver, Sought
-from flipflow.continuation.varied import FLIP, GRAZING, MOTION, PAIR, SADDLE_NODE
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.machine_series import machine_series
 from judge import close

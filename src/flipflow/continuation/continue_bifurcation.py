@@ -16,6 +16,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
+from flipflow.continuation.conditions import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.continuation.continue_field import checked_bounds, course_over
 from flipflow.continuation.correction import QUICK, SHARP, Course
 from flipflow.continuation.curve_points import GRAZES, TURNING, curve_points, pair_sum
@@ -32,7 +33,6 @@ from flipflow.continuation.special_points import (
     SYMMETRY,
 )
 from flipflow.continuation.switching import follow_both_ways
-from flipflow.continuation.varied import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, members_of
 from flipflow.model.monitor import Monitor

@@ -18,6 +18,7 @@ import numpy as np
 
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.eigen import eigenvalues
+from flipflow.continuation.conditions import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.continuation.field_solver import FieldPoint, FieldSolver
 from flipflow.continuation.refinement import FOLD as OF_FOLD
 from flipflow.continuation.special_points import (
@@ -30,7 +31,6 @@ from flipflow.continuation.special_points import (
     Test,
     zeros_of,
 )
-from flipflow.continuation.varied import FLIP, GRAZING, PAIR, SADDLE_NODE
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import has_unit_pair, neimark_sacker
 

@@ -8,10 +8,13 @@ from typing import cast
 
 import numpy as np
 
+from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.eigen import eigenvalues
+from flipflow.continuation.conditions import GRAZING, MOTION
 from flipflow.continuation.correction import SHARP, Course
-from flipflow.continuation.varied import GRAZING, MOTION, PAIR, Varied, new_varied_work
+from flipflow.continuation.switching import distance_to
+from flipflow.continuation.varied import Varied, new_varied_work
 from flipflow.dynamics.assembly import machine_parts, with_springs
 from flipflow.dynamics.machine_series import machine_series
 from flipflow.errors import IncompleteError
@@ -47,6 +50,7 @@ class Sought:
 
 
 MOTIONS = Sought()
+ASTRAY = 0.1  # share of motion or parameter by which a curve's first point may lie off its start
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +123,7 @@ class FieldSolver(ExactSolver):
         self.problem = Varied(
             self.problem, series, omega, own, sought.own, sought.test, sought.gap, opened
         )
-        self.scratch = new_varied_work(
-            self.shooting_work, self.system.size, len(self.springs), pairs=sought.test == PAIR
-        )
+        self.scratch = new_varied_work(self.problem, self.shooting_work)
 
     @property
     def uneven(self) -> Real:
@@ -147,6 +149,19 @@ class FieldSolver(ExactSolver):
         """A solver of the motions at a value of the field."""
         system = self.system_at(value, self.sought.own)
         return ExactSolver(system, half_turn=self.half_turn, turns=self.turns)
+
+    def trace(self, u: Real, omega: float, course: Course) -> Traced:
+        traced = super().trace(u, omega, course)
+        if self.branches_off or traced.omega.size == 0:
+            return traced
+        first, size = traced.u[0], 2 * self.system.size
+        off = distance_to(first[:size], u[:size], self.omega or float(u[-1]))
+        low, high = self.sought.bounds
+        beside = max(abs(u[-1]), abs(self.sought.own)) or high - low
+        if max(off, abs(first[-1] - u[-1]) / beside) < ASTRAY:
+            return traced
+        # Newton has found a point of another curve.
+        return Traced.recorded(traced.record, 0, status.NO_CONVERGENCE, course)
 
     def solve(self, u: Real, omega: float) -> Point | None:
         low, high = self.bounds

@@ -6,8 +6,7 @@ or another field, and the value. A motion solves
     sign flow(z; omega, value) - z = 0,
 
 a point of a curve also g = 0, g being a test function of its return map or the depth beyond a gap.
-Derivatives in fields of the machine, and those of g, which hold the second ones of the flow, are
-central differences of second order; the rest is exact.
+All derivatives are exact, those of g, which hold the second ones of the flow, too.
 """
 
 from __future__ import annotations
@@ -21,16 +20,24 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_factor
-from flipflow.dynamics.flow import run_flow
+from flipflow.continuation.conditions import (
+    GRAZING,
+    MOTION,
+    ConditionWork,
+    all_columns,
+    critical_slopes,
+    depth_slopes,
+    field_columns,
+    new_condition_work,
+)
 from flipflow.dynamics.machine_series import (
     MachineSeries,
     SeriesWork,
     new_series_work,
+    set_columns,
     set_machine,
 )
 from flipflow.periodic import section
-from flipflow.periodic.near_grazing import near_grazing
 from flipflow.periodic.shooting import (
     Shooting,
     ShootingWork,
@@ -41,17 +48,9 @@ from flipflow.periodic.shooting import (
     state_scale,
 )
 
-# Step of a difference quotient, as a share of the unknown's own size: the same share of a wide
-# interval would swamp the value.
-DIFFERENCE = 1e-6
-OF_DEPTH = 0.01  # the same as a share of the depth to which a stop is touched
-SMALLEST = 1e-11  # least step; at a smaller one rounding would drown the difference
 BEYOND = 0.01  # share of the interval by which a correction may leave it on its way
 BESIDE_SHARE = 0.2  # size of the second parameter as an unknown, as a share of it
 VALUE_SHARE = 0.05  # longest step in the value, as a share of its size
-# What is followed: motions, or those with a multiplier +1, with one -1, with two of product 1, and
-# those that graze a gap.
-MOTION, SADDLE_NODE, FLIP, PAIR, GRAZING = range(5)
 
 
 class Varied(NamedTuple):
@@ -75,33 +74,29 @@ class VariedWork(NamedTuple):
     series: SeriesWork
     at: Real  # (3,) values of both parameters for which the machine stands; the last frequency
     gap: Real  # (m, 2) gaps, of which the flow does not see those that are opened
-    z: Real  # (2 N + 2,) unknowns moved for a difference
-    move: Real  # (2 N + 2,) how far
-    ahead: Real  # (2 N,)
+    z: Real  # (2 N + 1,) state and frequency on their way to another section
+    tangent: Real  # (2 N + 1,) and a tangent
     r: Real  # (2 N,)
     J: Real  # (2 N, 2 N + 1)
     depth: Real  # (m, 2)
-    square: Real  # (2 N, 2 N), or of as many rows as there are pairs of multipliers
-    pivot: Int  # one for each of its rows
+    slopes: ConditionWork
 
 
-def new_varied_work(shooting: ShootingWork, size: int, stops: int, *, pairs: bool) -> VariedWork:
-    """Scratch for N degrees of freedom; ``pairs`` where pairs of multipliers count."""
+def new_varied_work(problem: Varied, shooting: ShootingWork) -> VariedWork:
+    """Scratch of a problem."""
+    stops, size = problem.shooting.machine.direction.shape
     n = 2 * size
-    rows = n * (n - 1) // 2 if pairs else n
     return VariedWork(
         shooting=shooting,
         series=new_series_work(size),
         at=np.full(3, np.nan),
         gap=np.full((stops, 2), np.inf),
-        z=np.zeros(n + 2),
-        move=np.zeros(n + 2),
-        ahead=np.zeros(n),
+        z=np.zeros(n + 1),
+        tangent=np.zeros(n + 1),
         r=np.zeros(n),
         J=np.zeros((n, n + 1)),
         depth=np.zeros((stops, 2)),
-        square=np.zeros((rows, rows)),
-        pivot=np.zeros(rows, np.int64),
+        slopes=new_condition_work(problem.series, problem.shooting.machine, problem.test),
     )
 
 
@@ -178,54 +173,58 @@ def varied_residual(
     problem: Varied, work: VariedWork, u: Real, value: float, r: Real, J: Real
 ) -> int:
     """r and J = [dr/du, dr/d value] of a motion, or of one where a test function is zero."""
-    size, n = work.r.shape[0], r.shape[0]
-    for k in range(n):
-        work.z[k] = u[k]
-    work.z[n] = value
-    set_moves(problem, work, n, DIFFERENCE)
-    if n > size:
-        code, test = evaluate(problem, work, n)
-        if code != status.OK:
-            return code
-        set_moves(problem, work, n, step_share(problem, work))
-    for k in range(n + 1):
-        code = add_differences(problem, work, n, k, J)
-        if code != status.OK:
-            return code
-    code, test = evaluate(problem, work, n)
-    omega_column = size if problem.omega == 0.0 else size - 1
+    size, n, slopes = work.r.shape[0], r.shape[0], work.slopes
+    # The loop's unknowns end with the value.
+    omega, beside = frequency(problem, u[:n]), value_beside(problem, u[:n])
+    if not stand_at(problem, work, value, beside):
+        return status.NO_CONVERGENCE
+    work.at[2] = omega
+    shooting, flown = problem.shooting, work.shooting
+    code = shooting_residual(shooting, flown, u[:size], omega, work.r, work.J)
+    if code != status.OK:
+        return code
+    set_columns(problem.series, work.series, value, beside, slopes.columns)
     for i in range(size):
         r[i] = work.r[i]
-        for k in range(omega_column + 1):
+        for k in range(size):
             J[i, k] = work.J[i, k]
-    if n > size:
-        r[size] = test
-    return code
+        if n > size:
+            J[i, size] = work.J[i, size]
+    if n == size:
+        field_columns(shooting, flown, omega, slopes)
+        for i in range(size):
+            J[i, n] = shooting.sign * slopes.fields[i, 0]
+        return code
+    return condition_row(problem, work, omega, r, J)
 
 
 @kernel
-def step_share(problem: Varied, work: VariedWork) -> float:
-    """Step of a difference quotient of the last motion, as a share of the unknown's size.
-
-    Where a stop is hardly touched, or hardly not, be it by the highest summit of a turn or by
-    another, the map changes within that depth: the step is a share of it.
-    """
-    least = min(near_grazing(problem.shooting, work.shooting, float(work.at[2])))
-    state_scale(problem.shooting, work.z, float(work.at[2]), work.move)
-    return max(SMALLEST, min(DIFFERENCE, OF_DEPTH * least / float(work.move[0])))
-
-
-@kernel
-def set_moves(problem: Varied, work: VariedWork, n: int, share: float) -> None:
-    """Steps of the difference quotients about the n + 1 unknowns in work.z."""
-    size = work.r.shape[0]
-    omega = frequency(problem, work.z[:n])
-    state_scale(problem.shooting, work.z, omega, work.move)
+def condition_row(problem: Varied, work: VariedWork, omega: float, r: Real, J: Real) -> int:
+    """The test function of the motion just flown, its derivatives, and the state's in fields."""
+    size, shooting, flown, slopes = work.r.shape[0], problem.shooting, work.shooting, work.slopes
+    all_columns(shooting, flown, omega, slopes)
+    if problem.test == GRAZING:
+        show_gaps(problem, work)
+        r[size] = depth_slopes(shooting, flown, omega, problem.gap, slopes)
+        if problem.opened[problem.gap // 2, problem.gap % 2] != 0:
+            open_gaps(problem)
+    else:
+        code, r[size] = critical_slopes(shooting, flown, omega, problem.test, work.J, slopes)
+        if code != status.OK:
+            return code
+    # The columns: one field or both, the state, and omega last.
+    last = slopes.row.shape[0] - 1
+    fields = last - size
     for k in range(size):
-        work.move[k] *= share
-    if n > size:
-        work.move[size] = share * size_beside(problem, float(work.z[size]))
-    work.move[n] = share * value_size(problem, float(work.z[n]))
+        J[size, k] = slopes.row[fields + k]
+    J[size, size] = slopes.row[last] if problem.omega == 0.0 else slopes.row[1]
+    J[size, size + 1] = slopes.row[0]
+    end = slopes.starts[flown.flow.segments[0]]
+    for i in range(size):
+        J[i, size + 1] = shooting.sign * end[i, 0]
+        if problem.omega > 0.0:
+            J[i, size] = shooting.sign * end[i, 1]
+    return status.OK
 
 
 @kernel
@@ -242,102 +241,6 @@ def size_beside(problem: Varied, value: float) -> float:
         return value
     width, own = problem.series.beside_high - problem.series.beside_low, abs(problem.beside)
     return min(width, max(abs(value), own)) if own != 0.0 else width
-
-
-@kernel
-def add_differences(problem: Varied, work: VariedWork, n: int, k: int, J: Real) -> int:
-    """What of column k of J are central differences: of a field all of it, else the last row.
-
-    At an end of an interval of a field they are one-sided: beyond it may lie another law.
-    """
-    size, here, step = work.r.shape[0], float(work.z[k]), float(work.move[k])
-    field = k == n or (k == size and problem.omega > 0.0)
-    if not field and n == size:
-        return status.OK
-    behind, ahead = here - step, here + step
-    if field:
-        series = problem.series
-        low, high = (series.low, series.high) if k == n else (series.beside_low, series.beside_high)
-        behind, ahead = max(behind, low), min(ahead, high)
-    work.z[k] = ahead
-    code, after = evaluate(problem, work, n)
-    for i in range(size):
-        work.ahead[i] = work.r[i]
-    work.z[k] = behind
-    if code == status.OK:
-        code, before = evaluate(problem, work, n)
-        if n > size:
-            J[size, k] = (after - before) / (ahead - behind)
-        if field:
-            for i in range(size):
-                J[i, k] = (work.ahead[i] - work.r[i]) / (ahead - behind)
-    work.z[k] = here
-    return code
-
-
-@kernel
-def evaluate(problem: Varied, work: VariedWork, n: int) -> tuple[int, float]:
-    """Status, and the test function, at the unknowns in work.z; the motion's are left in work."""
-    omega = frequency(problem, work.z[:n])
-    if not stand_at(problem, work, float(work.z[n]), value_beside(problem, work.z[:n])):
-        return status.NO_CONVERGENCE, math.nan
-    work.at[2] = omega
-    code = shooting_residual(problem.shooting, work.shooting, work.z, omega, work.r, work.J)
-    if code != status.OK or problem.test == MOTION:
-        return code, 0.0
-    if problem.test == GRAZING:
-        varied_depths(problem, work, 0.0, work.depth)
-        return code, float(work.depth[problem.gap // 2, problem.gap % 2])
-    return critical(problem, work)
-
-
-@kernel
-def critical(problem: Varied, work: VariedWork) -> tuple[int, float]:
-    """Status, and the determinant that is zero where multipliers of work.J + I are critical.
-
-    With one at +1 it is that of map - I, with one at -1 that of map + I, and with a product of two
-    of 1 that of the second compound matrix of the map, whose eigenvalues these products are, - I.
-    """
-    size, J = work.r.shape[0], work.J
-    total = 0.0
-    for i in range(size):
-        for k in range(size):
-            total += abs(J[i, k])
-    if not math.isfinite(total):
-        return status.NOT_FINITE, math.nan
-    if problem.test == PAIR:
-        set_compound(work)
-    else:
-        for i in range(size):
-            for k in range(size):
-                work.square[i, k] = J[i, k]
-            if problem.test == FLIP:
-                work.square[i, i] += 2.0
-    if not lu_factor(work.square, work.pivot):
-        return status.OK, 0.0  # singular to the last digit
-    product = 1.0
-    for k in range(work.square.shape[0]):
-        product *= work.square[k, k] if work.pivot[k] == k else -work.square[k, k]
-    return status.OK, product
-
-
-@kernel
-def set_compound(work: VariedWork) -> None:
-    """C - I into work.square, C the second compound matrix of the map: its minors of two rows."""
-    size, J, row = work.r.shape[0], work.J, 0
-    for i in range(size):
-        J[i, i] += 1.0
-    for p in range(size):
-        for q in range(p + 1, size):
-            column = 0
-            for s in range(size):
-                for t in range(s + 1, size):
-                    work.square[row, column] = J[p, s] * J[q, t] - J[p, t] * J[q, s]
-                    column += 1
-            work.square[row, row] -= 1.0
-            row += 1
-    for i in range(size):
-        J[i, i] -= 1.0
 
 
 @kernel
@@ -394,31 +297,30 @@ def varied_mirrored(problem: Varied) -> Varied:
 
 @kernel
 def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, end: float) -> int:
-    """Carry unknowns w and a tangent dw to another section; the tangent by differences."""
-    size, n = work.r.shape[0], w.shape[0] - 1
-    if end == work.shooting.section[0]:
+    """Carry unknowns w and a tangent dw to another section."""
+    size, n, shooting, flown = work.r.shape[0], w.shape[0] - 1, problem.shooting, work.shooting
+    omega, value, beside = frequency(problem, w[:n]), float(w[n]), value_beside(problem, w[:n])
+    if end == flown.section[0]:
         return status.OK
-    for k in range(n + 1):
-        work.z[k] = w[k]
-    set_moves(problem, work, n, DIFFERENCE)
-    share = 0.0
-    for k in range(n + 1):
-        share = max(share, abs(tangent[k]) / work.move[k])
-    step = 1.0 / share if share > 0.0 else 0.0
-    code_ahead = arrive_beside(problem, work, w, tangent, step, end)
+    if not omega > 0.0 or not stand_at(problem, work, value, beside):
+        return status.NO_CONVERGENCE
     for k in range(size):
-        work.ahead[k] = work.z[k]
-    code_behind = arrive_beside(problem, work, w, tangent, -step, end)
-    for k in range(size):
-        work.ahead[k] = 0.5 * share * (work.ahead[k] - work.z[k])
-    code = arrive_beside(problem, work, w, tangent, 0.0, end)
-    if code == status.OK:
-        code = code_ahead if code_ahead != status.OK else code_behind
+        work.z[k], work.tangent[k] = w[k], tangent[k]
+    work.z[size], work.tangent[size] = omega, 0.0
+    if problem.omega == 0.0:
+        work.tangent[size] = tangent[size]
+    # The next turn begins with the problem's sign.
+    sign = 1.0 if end > flown.section[0] else shooting.sign
+    code = section.carried(shooting, flown, work.z, work.tangent, end)
     if code != status.OK:
         return code
+    set_columns(problem.series, work.series, value, beside, work.slopes.columns)
+    field_columns(shooting, flown, omega, work.slopes)
     for k in range(size):
-        w[k] = work.z[k]
-        tangent[k] = work.ahead[k]
+        w[k], tangent[k] = work.z[k], work.tangent[k]
+        tangent[k] += sign * work.slopes.fields[k, 0] * tangent[n]
+        if n > size and problem.omega > 0.0:
+            tangent[k] += sign * work.slopes.fields[k, 1] * tangent[size]
     return code
 
 
@@ -426,33 +328,3 @@ def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, en
 def varied_home(problem: Varied, work: VariedWork, w: Real, tangent: Real) -> int:
     """Carry unknowns w and a tangent dw to phase 0."""
     return varied_carried(problem, work, w, tangent, 0.0)
-
-
-@kernel
-def arrive_beside(
-    problem: Varied, work: VariedWork, w: Real, tangent: Real, step: float, end: float
-) -> int:
-    """Carry the unknowns a step along the tangent to a section; the state is left in work.z."""
-    for k in range(w.shape[0]):
-        work.z[k] = w[k] + step * tangent[k]
-    return arrive(problem, work, w.shape[0] - 1, end)
-
-
-@kernel
-def arrive(problem: Varied, work: VariedWork, n: int, end: float) -> int:
-    """Carry the state in work.z to a section ahead, with the problem's sign in the next turn."""
-    size, flow, shooting = work.r.shape[0], work.shooting.flow, problem.shooting
-    omega = frequency(problem, work.z[:n])
-    beside = value_beside(problem, work.z[:n])
-    if not omega > 0.0 or not stand_at(problem, work, float(work.z[n]), beside):
-        return status.NO_CONVERGENCE
-    sign, angle = 1.0, end - work.shooting.section[0]
-    if angle < 0.0:
-        sign, angle = shooting.sign, angle + shooting.fraction * 2.0 * math.pi
-    for k in range(size):
-        flow.z[k] = work.z[k]
-    begin = work.shooting.section[0] / omega
-    code = run_flow(shooting.machine, flow, omega, begin, angle / omega, work.shooting.rate)
-    for k in range(size):
-        work.z[k] = sign * flow.z[k]
-    return code

@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_parts, with_springs
 from flipflow.dynamics.machine_series import EXACT, MachineSeries, machine_series
-from flipflow.dynamics.parameter_tangent import Columns
+from flipflow.dynamics.parameter_tangent import CHANGED_TOGETHER, Columns
 from flipflow.errors import InputError
 from flipflow.model.system import MechanicalSystem
 
@@ -126,13 +126,9 @@ def solved_columns(M: Real, parts: Mapping[str, Real]) -> Columns:
 
 def _touches(parts: Mapping[str, Real]) -> Int:
     """Which of M, C, K, f_0, excitation, stops, directions each parameter changes, (P, 7)."""
-    groups = (
-        ("inertia",), ("damping",), ("stiffness",), ("static",), ("force",),
-        ("stop", "gap", "direction"), ("direction",),
-    )  # fmt: skip
     changes = [
         np.any([parts[name].any(axis=tuple(range(1, parts[name].ndim))) for name in names], axis=0)
-        for names in groups
+        for names in CHANGED_TOGETHER
     ]
     return np.stack(changes, axis=1).astype(np.int64)
 

@@ -23,10 +23,12 @@ from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.equation_of_motion import MachineArrays
+from flipflow.dynamics.parameter_tangent import CHANGED_TOGETHER, Columns
 
 MOST_TERMS = 65  # in a parameter; one that needs more is not smooth
 # Where a series is held against the machine, in [-1, 1].
 BETWEEN = (-1.0, -0.97, -0.88, -0.71, -0.45, -0.17, 0.13, 0.41, 0.68, 0.86, 0.96, 1.0)
+VALUES, IN_VALUE, IN_BESIDE = range(3)  # what is summed: a series, or its derivative in x or y
 EXACT = 1e-12  # deviation of a series from the machine, relative to the largest value
 
 
@@ -71,8 +73,8 @@ def set_machine(
     if not lu_factor(work.solved, work.pivot):
         return False
     for j in range(n):
-        solve_column(work, series.stiffness, x, y, j, machine.stiffness)
-        solve_column(work, series.damping, x, y, j, machine.damping)
+        solve_column(work, series.stiffness, x, y, VALUES, j, machine.stiffness)
+        solve_column(work, series.damping, x, y, VALUES, j, machine.damping)
     for j in range(m):
         for i in range(n):
             machine.direction[j, i] = term_sum(series.direction, x, y, j, i)
@@ -95,11 +97,75 @@ def place(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def solve_column(work: SeriesWork, terms: Real, x: float, y: float, j: int, out: Real) -> None:
-    """Column j of M^-1 A, A given by its terms."""
+def set_columns(
+    series: MachineSeries, work: SeriesWork, value: float, beside: float, columns: Columns
+) -> None:
+    """Derivatives of the machine that ``set_machine`` has just written, in the value alone or both.
+
+    They are the first one or two of the columns; others are left as they are.
+    """
+    x = place(value, series.low, series.high)
+    y = place(beside, series.beside_low, series.beside_high)
+    set_column(series, work, x, y, IN_VALUE, 2.0 / (series.high - series.low), 0, columns)
+    if series.beside_high > series.beside_low:
+        rate = 2.0 / (series.beside_high - series.beside_low)
+        set_column(series, work, x, y, IN_BESIDE, rate, 1, columns)
+
+
+@kernel
+def set_column(
+    series: MachineSeries, work: SeriesWork, x: float, y: float, along: int, rate: float, p: int,
+    columns: Columns,
+) -> None:  # fmt: skip
+    """Column p: the derivative along one of both parameters, whose place changes at a rate."""
+    n, m, count = work.pivot.shape[0], columns.direction.shape[1], columns.push.shape[1]
+    for j in range(n):
+        solve_column(work, series.inertia, x, y, along, j, columns.inertia[p])
+        solve_column(work, series.damping, x, y, along, j, columns.damping[p])
+        solve_column(work, series.stiffness, x, y, along, j, columns.stiffness[p])
+    for j in range(m):
+        solve_row(work, series.direction, x, y, along, j)
+        for i in range(n):
+            columns.direction[p, j, i] = rate * term_slope(series.direction, x, y, along, j, i)
+            columns.reach[p, j, i] = rate * work.column[i]
+        columns.stop_stiffness[p, j] = rate * term_slope(series.stop, x, y, along, 0, j)
+        columns.stop_damping[p, j] = rate * term_slope(series.stop, x, y, along, 1, j)
+        for side in range(2):
+            columns.gap[p, j, side] = rate * term_slope(series.gap, x, y, along, j, side)
+    for i in range(n):
+        for j in range(n):
+            columns.inertia[p, i, j] *= rate
+            columns.damping[p, i, j] *= rate
+            columns.stiffness[p, i, j] *= rate
+    for part in range(2 * count):
+        solve_row(work, series.force, x, y, along, part)
+        e = part % count
+        for i in range(n):
+            force, push = rate * work.column[i], columns.push[p, e, i]
+            columns.push[p, e, i] = (
+                complex(force, 0.0) if part < count else complex(push.real, force)
+            )
+    solve_row(work, series.static, x, y, along, 0)
+    for i in range(n):
+        columns.static[p, i] = rate * work.column[i]
+
+
+@kernel
+def solve_row(work: SeriesWork, terms: Real, x: float, y: float, along: int, row: int) -> None:
+    """M^-1 of a row given by its terms, or of its derivative, into work.column."""
+    for i in range(work.pivot.shape[0]):
+        work.column[i] = term(terms, x, y, along, row, i)
+    lu_solve(work.solved, work.pivot, work.column)
+
+
+@kernel
+def solve_column(
+    work: SeriesWork, terms: Real, x: float, y: float, along: int, j: int, out: Real
+) -> None:
+    """Column j of M^-1 A, A given by its terms, or of its derivative."""
     n = work.pivot.shape[0]
     for i in range(n):
-        work.column[i] = term_sum(terms, x, y, i, j)
+        work.column[i] = term(terms, x, y, along, i, j)
     lu_solve(work.solved, work.pivot, work.column)
     for i in range(n):
         out[i, j] = work.column[i]
@@ -112,18 +178,44 @@ def set_push(
     """M^-1 f of each excitation, and M^-1 f_0."""
     count, n = machine.push.shape
     for part in range(2 * count):
-        for i in range(n):
-            work.column[i] = term_sum(series.force, x, y, part, i)
-        lu_solve(work.solved, work.pivot, work.column)
+        solve_row(work, series.force, x, y, VALUES, part)
         e = part % count
         for i in range(n):
             force, push = work.column[i], machine.push[e, i]
             machine.push[e, i] = complex(force, 0.0) if part < count else complex(push.real, force)
-    for i in range(n):
-        work.column[i] = term_sum(series.static, x, y, 0, i)
-    lu_solve(work.solved, work.pivot, work.column)
+    solve_row(work, series.static, x, y, VALUES, 0)
     for i in range(n):
         machine.static[i] = work.column[i]
+
+
+@kernel
+def term(terms: Real, x: float, y: float, along: int, i: int, j: int) -> float:
+    """Entry (i, j) of a series at a place, or of its derivative there."""
+    if along == VALUES:
+        return float(term_sum(terms, x, y, i, j))
+    return float(term_slope(terms, x, y, along, i, j))
+
+
+@kernel
+def term_slope(terms: Real, x: float, y: float, along: int, i: int, j: int) -> float:
+    """Derivative of an entry in the place x or y, by the recurrences of T_k and T_k'.
+
+    What stands before T_0 alone is not read: it is infinite of a gap that is.
+    """
+    total = 0.0
+    outer, inner, a, b = terms.shape[0], terms.shape[1], x, y
+    if along == IN_BESIDE:
+        outer, inner, a, b = inner, outer, y, x
+    behind, here, slope_behind, slope = 1.0, a, 0.0, 1.0
+    for k in range(1, outer):
+        last, now = 1.0, b
+        for s in range(inner):
+            one = terms[k, s, i, j] if along == IN_VALUE else terms[s, k, i, j]
+            total += slope * last * one
+            last, now = now, 2.0 * b * now - last
+        slope_behind, slope = slope, 2.0 * here + 2.0 * a * slope - slope_behind
+        behind, here = here, 2.0 * a * here - behind
+    return total
 
 
 @kernel
@@ -202,6 +294,35 @@ def machine_series(
             return MachineSeries(low, high, beside[0], beside[1], **arrays)
         terms = 2 * terms - 1
     return None
+
+
+def new_columns(series: MachineSeries, machine: MachineArrays, others: int) -> Columns:
+    """Room for derivatives of a machine in one parameter or both, and as many of 0 behind them."""
+    n, (m, _), e = machine.stiffness.shape[0], machine.direction.shape, machine.push.shape[0]
+    own = 2 if series.beside_high > series.beside_low else 1
+    P = own + others
+    return Columns(
+        inertia=np.zeros((P, n, n)),
+        damping=np.zeros((P, n, n)),
+        stiffness=np.zeros((P, n, n)),
+        direction=np.zeros((P, m, n)),
+        reach=np.zeros((P, m, n)),
+        static=np.zeros((P, n)),
+        push=np.zeros((P, e, n), np.complex128),
+        stop_stiffness=np.zeros((P, m)),
+        stop_damping=np.zeros((P, m)),
+        gap=np.zeros((P, m, 2)),
+        touches=np.array([_touches(series, p) for p in range(own)] + [(0,) * 7] * others),
+    )
+
+
+def _touches(series: MachineSeries, p: int) -> tuple[int, ...]:
+    """Which of M, C, K, f_0, excitation, stops, directions a parameter changes."""
+    changes = [
+        any(np.any(np.moveaxis(getattr(series, name), p, 0)[1:]) for name in names)
+        for names in CHANGED_TOGETHER
+    ]
+    return tuple(map(int, changes))
 
 
 def new_series_work(size: int) -> SeriesWork:

@@ -78,10 +78,31 @@ def multiplier_slopes(
             work.change[p, c, 0], work.change[p, c, 1] = 0.0, 0.0
     for e in range(segments - 1, -1, -1):
         divided_differences(machine, flow, e, omega, flow.length[e], column)
-        _over_segment(machine, flow, e, omega, columns, shift, tangents, schur, work, column)
+        _over_segment(machine, flow, e, omega, columns, shift, tangents, schur.value, work, column)
     for k in range(size):
         if schur.value[k].imag >= 0.0 and _is_single(schur.value, k):
             _write(schur.value[k], squared, k, known, work, slopes)
+
+
+@kernel
+def weighted_slopes(
+    machine: MachineArrays, flow: Flow, omega: float, columns: Columns, shift: Real, tangents: Real,
+    value: Complex, work: MultiplierWork, column: ColumnWork,
+) -> None:  # fmt: skip
+    """Derivatives of sum_ij W_ij M_ji of the recorded flow's map, weights W in work.left.
+
+    They are left in work.change, a share for each column of the map. ``value`` (R,) is scratch.
+    """
+    size = work.pivot.shape[0]
+    for c in range(size):
+        value[c] = 0j  # no column and weight but those of one place belong together
+        for k in range(size):
+            work.right[k, c] = 1.0 if k == c else 0.0
+        for p in range(work.change.shape[0]):
+            work.change[p, c, 0] = 0.0
+    for e in range(flow.segments[0] - 1, -1, -1):
+        divided_differences(machine, flow, e, omega, flow.length[e], column)
+        _over_segment(machine, flow, e, omega, columns, shift, tangents, value, work, column)
 
 
 @kernel(inline=True)
@@ -129,17 +150,17 @@ def _set_vectors(schur: Schur, sign: float, work: MultiplierWork) -> bool:
 @kernel(inline=True)
 def _over_segment(
     machine: MachineArrays, flow: Flow, e: int, omega: float, columns: Columns, shift: Real,
-    tangents: Real, schur: Schur, work: MultiplierWork, column: ColumnWork,
+    tangents: Real, value: Complex, work: MultiplierWork, column: ColumnWork,
 ) -> None:  # fmt: skip
     """What segment e and the saltation behind it add, and the left vectors back to its start."""
     size = work.pivot.shape[0]
     multiply(tangents[e], work.right, work.there)
     if flow.kick[e] != 0.0:
         multiply(column.free, work.there, work.product)
-        _add_saltation(machine, flow, e, columns, schur, work)
+        _add_saltation(machine, flow, e, columns, value, work)
         _carry_left_over(machine, flow.spring[e], flow.kick[e], work.left)
     for c in range(size):
-        _add_exponential(machine, flow, e, omega, columns, shift, c, schur, work, column)
+        _add_exponential(machine, flow, e, omega, columns, shift, c, value, work, column)
     multiply(work.left, column.free, work.product)
     for r in range(size):
         for c in range(size):
@@ -149,7 +170,7 @@ def _over_segment(
 @kernel(inline=True)
 def _add_exponential(
     machine: MachineArrays, flow: Flow, e: int, omega: float, columns: Columns, shift: Real, c: int,
-    schur: Schur, work: MultiplierWork, column: ColumnWork,
+    value: Complex, work: MultiplierWork, column: ColumnWork,
 ) -> None:  # fmt: skip
     """What the exponential of segment e adds to right vector c, its length among what changes."""
     modes, slot, size = flow.modes, flow.slot[e], work.pivot.shape[0]
@@ -160,7 +181,7 @@ def _add_exponential(
             column.amplitude[i] += modes.left[slot, i, k] * work.there[k, c]
     spread_free(flow, slot, column.amplitude, column)
     mode_gains(machine, flow, e, omega, columns, 0.0, column)
-    first, last = _pair_of(schur.value, c)
+    first, last = _pair_of(value, c)
     for r in range(first, last):
         rate = 0.0
         for i in range(count):
@@ -180,8 +201,9 @@ def _add_exponential(
 
 @kernel(inline=True)
 def _add_saltation(
-    machine: MachineArrays, flow: Flow, e: int, columns: Columns, schur: Schur, work: MultiplierWork
-) -> None:
+    machine: MachineArrays, flow: Flow, e: int, columns: Columns, value: Complex,
+    work: MultiplierWork,
+) -> None:  # fmt: skip
     """What the changing saltation behind segment e adds, right vectors before it in ``product``."""
     j, size = flow.spring[e], work.pivot.shape[0]
     n, sign, damping = size // 2, flow.kick[e], machine.stops.damping[j]
@@ -193,7 +215,7 @@ def _add_saltation(
             for k in range(n):
                 gap += machine.direction[j, k] * work.product[k, c]
                 turned += columns.direction[p, j, k] * work.product[k, c]
-            first, last = _pair_of(schur.value, c)
+            first, last = _pair_of(value, c)
             for k in range(n):
                 reach = columns.reach[p, j, k]
                 for s in range(n):

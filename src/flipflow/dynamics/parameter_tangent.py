@@ -34,6 +34,11 @@ from flipflow.dynamics.flow import (
 )
 from flipflow.dynamics.law import damping_share, signed_gap, stiffness_share
 
+# What ``Columns.touches`` tells apart, by the names that a machine's parts have.
+CHANGED_TOGETHER = (
+    ("inertia",), ("damping",), ("stiffness",), ("static",), ("force",),
+    ("stop", "gap", "direction"), ("direction",),
+)  # fmt: skip
 CLOSE = 0.3  # half the difference of two exponents below which their quotient is a series
 
 
