@@ -92,7 +92,7 @@ def continue_bifurcation(
       without that contact.
 
     The curve is followed both ways by pseudo-arclength until either parameter meets a bound.
-    Derivatives of g are central differences of second order of what is exact in the flow.
+    All derivatives are exact, those of g, which hold the second ones of the flow, too.
 
     Parameters
     ----------
