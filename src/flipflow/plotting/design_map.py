@@ -1,4 +1,4 @@
-"""A design map: jump speeds, amplitude and steadiness over the gap, a line for each stop."""
+"""A design map: jump speeds, amplitude, region and steadiness over the gap, a line a stop."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MN = 1e-6
 
 
 def design_map_figure(found: DesignMap) -> Figure:
-    """Speeds of contact and of jumps, amplitude at working speed, its share under load."""
+    """Speeds of contact and of jumps, amplitude at working speed, width of the region, load."""
     axis, _ = field_axis("clearance", found.clearance)
     x = found.clearance * MM
     words = [f"k3 = {k * MN:.4g} MN/m" for k in found.stop_stiffness]
@@ -44,16 +44,20 @@ def design_map_figure(found: DesignMap) -> Figure:
         Panel(axis, Axis("shaft speed", "rpm"), traces=tuple(traces), lines=(speed,)),
         Panel(axis, Axis("amplitude (|x2|)", "mm"), _lines(x, found.amplitude * MM, words, True)),
     ]
+    if np.isfinite(found.width).any():
+        region = Axis("width of region", "rpm")
+        panels.append(Panel(axis, region, _lines(x, found.width * RPM, words, False)))
     under = ""
     if np.isfinite(found.steadiness).any():
         share = Axis("amplitude, loaded / empty")
         panels.append(Panel(axis, share, _lines(x, found.steadiness, words, False)))
-        under = " Below: what is left of it under load."
+        under = " Below: what is left of the amplitude under load."
     caption = (
         "Above: the speeds at which the machine jumps, a line for each stop in the colours of the "
         "panel below; where both speeds meet, in the cusp, the jump is gone. Dashed: contact "
         "begins, with unequal gaps on the side touched last. In the middle: the relative amplitude "
-        f"at working speed as it is reached from below.{under}"
+        "at working speed as it is reached from below, and the width of the operating region."
+        f"{under}"
     )
     caption = " ".join([caption, *found.notes])
     return Figure("Gap and stop stiffness", caption, tuple(panels), height=220 * len(panels))
