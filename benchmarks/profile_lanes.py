@@ -27,7 +27,7 @@ from flipflow.batch.lane_path import (
     predict,
 )
 from flipflow.batch.lane_readings import new_reading_work, new_readings, read_lane
-from flipflow.batch.lane_slopes import columns_of, read_slopes, state_slopes
+from flipflow.batch.lane_slopes import read_slopes, state_slopes
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
 from flipflow.batch.slope_readings import new_slope_work, new_slopes
 from flipflow.batch.solutions import nearby_motions, nothing_asked
@@ -84,11 +84,9 @@ def repeated(stage, repeats, machine, length, omega, work, reading, asked, readi
 
 
 @kernel(entry=True)
-def repeated_slopes(
-    stage, repeats, machine, batch_columns, length, omega, z, mu, work, asked, wanted, slopes
-):
+def repeated_slopes(stage, repeats, machine, length, omega, z, mu, work, asked, wanted, slopes):
     """One stage of the derivatives of a motion again and again."""
-    half, columns = is_even(machine), columns_of(batch_columns, 0)
+    half, columns = is_even(machine), work.machine_columns
     problem, flow = problem_of(machine, half, length), work.lane.shooting.flow
     turn = (1.0 if half else 2.0) * math.pi / omega
     for _ in range(repeats):
@@ -153,7 +151,7 @@ def main():
     columns = {name: np.array([getattr(screen, name)]) for name in FIELDS}
     (batch,), _ = batches(screen, columns)
     changes = lane_columns(screen, columns, batch, FIELDS).solved
-    slope_work = new_slope_work(machine, asked, len(FIELDS), np.zeros(1, np.int64))
+    slope_work = new_slope_work(machine, asked, changes, np.zeros(1, np.int64))
     slopes = new_slopes(found, machine, asked, len(FIELDS))
     wanted, z, mu = slopes_asked(omega), found.state[0, -1], found.multiplier[0, -1]
     for stage in range(len(OF_SLOPES)):
@@ -165,7 +163,6 @@ def main():
                 stage,
                 repeats,
                 machine,
-                changes,
                 length,
                 given.omega,
                 z,

@@ -5,8 +5,9 @@
 Machines are chains of ``chain_draw.py``; the seed is new each time unless one is given, and
 printed. On the branch of each machine a special point is drawn, and followed over speed and a
 parameter of the machine, 0.7 to 1.4 times its value. A curve ends on a bound, closes, or ends where
-another contact begins. "off" is the largest distance of a multiplier from its critical value on any
-curve of folds and doublings. Curves that end otherwise are listed, to be drawn again.
+another contact begins; those that end otherwise are listed, to be drawn again. "off" is the largest
+distance of a multiplier from its critical value on any curve of folds, doublings and lost symmetry,
+but for those that follow a grazing in their place.
 """
 
 import argparse

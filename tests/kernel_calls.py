@@ -13,7 +13,7 @@ from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve, lu_spread
 from flipflow.continuation.correction import Course, new_corrector
 from flipflow.continuation.frequency_loop import new_branch, predict
 from flipflow.continuation.refinement import TRACE_ALL, follow
-from flipflow.continuation.varied import varied_residual
+from flipflow.continuation.varied import varied_carried, varied_residual
 from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
 from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.dynamics.machine_series import set_machine
@@ -136,6 +136,12 @@ def number_of(flow, sided):
 def varied(problem, work, u, value, r, J):
     """``varied_residual``."""
     return varied_residual(problem, work, u, value, r, J)
+
+
+@kernel(entry=True)
+def varied_to(problem, work, w, tangent, end):
+    """``varied_carried``."""
+    return varied_carried(problem, work, w, tangent, end)
 
 
 @kernel(entry=True)

@@ -370,10 +370,7 @@ def tops(y: np.ndarray) -> np.ndarray:
 
 
 def test_a_curve_that_meets_a_valley_within_a_contact_goes_on() -> None:
-    """Three masses: within the outer one's contact a valley comes back to the gap; single branches.
-
-    The difference quotients have to stay on one side of it.
-    """
+    """Three masses: within the outer one's contact a valley comes back to the gap."""
     K = np.array([[3.6, -1.37, 0.0], [-1.37, 3.6, -2.23], [0.0, -2.23, 2.23]])
     stops = (
         ff.ClearanceSpring([0.0, 1.0, 0.0], 9.55, 4.72, 0.719, math.inf),

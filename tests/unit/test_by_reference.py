@@ -85,9 +85,17 @@ def test_a_structure_of_other_arrays_is_another_type() -> None:
     assert len({kind.name for kind in kinds}) == 4
 
 
+@kernel(entry=True)
+def misspelt(inner: Inner) -> float:
+    """Asks for a field that is none."""
+    return inner.matrx[0, 0]
+
+
 @compiled
 def test_what_no_kernel_can_read_is_refused() -> None:
     """A field of no type known to kernels, a name that is not a field, a plain tuple for one."""
+    with pytest.raises(numba.TypingError, match="matrx"):
+        misspelt(_inner())
     outer = Outer(2.0, _inner(), np.zeros(1), 1j)
     for wrong in (outer._replace(factor=object()), outer._replace(inner=tuple(_inner()))):
         with pytest.raises((TypeError, numba.TypingError)):

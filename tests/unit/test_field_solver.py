@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.compiled import status
+from flipflow.compiled.arrays import Real
 from flipflow.continuation.conditions import FLIP, GRAZING, MOTION, PAIR, SADDLE_NODE
 from flipflow.continuation.field_solver import MOTIONS, FieldSolver, Sought
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.machine_series import machine_series
 from judge import close
-from kernel_calls import residual_of, series_machine, varied
+from kernel_calls import residual_of, series_machine, varied, varied_to
 
 pytestmark = pytest.mark.numerical
 BOUNDS = (2e-3, 9e-3)
@@ -85,25 +88,73 @@ def lopsided(path: str, value: float) -> ff.MechanicalSystem:
     return ff.MechanicalSystem(M, C, K, stops, drives, static_force=static)
 
 
+OFF = np.array([-0.8, -0.9, -0.5, -0.7])  # a state from which both stops are touched
+
+
+def without_symmetry(sought, path: str) -> FieldSolver:
+    """Over a field of :func:`lopsided`, at a speed or with it or a second field beside."""
+    if sought.test == GRAZING:
+        sought = replace(sought, gap=1)  # the far side of the first stop, which is not met
+    if sought.own:
+        sought = replace(sought, bounds=(0.9, 1.2), own=1.0)
+
+    def system(value: float, beside: float) -> ff.MechanicalSystem:
+        one = lopsided(path, value)
+        return replace(one, C=one.C * beside) if sought.own else one
+
+    speed = 1.1 if sought.test == MOTION or sought.own else 0.0
+    return FieldSolver(
+        system, (0.8, 1.3), 1.0, speed, half_turn=False, turns=1, sought=sought
+    )  # fmt: skip
+
+
+def unknowns_off(ours: FieldSolver) -> Real:
+    """Those of the solver and the value, off any solution."""
+    beside = [] if ours.sought.test == MOTION else [1.1]
+    return np.array([*OFF, *beside, 1.05])
+
+
 @pytest.mark.parametrize("phase", [0.0, 1.3])
 @pytest.mark.parametrize("path", ["masses", "dampings", "directions", "stops", "forces"])
-@pytest.mark.parametrize("sought", [MOTIONS, *CURVES[::2]], ids=str)
+@pytest.mark.parametrize("sought", [MOTIONS, *CURVES], ids=str)
 def test_jacobians_of_a_machine_without_symmetry(sought, path: str, phase: float) -> None:
     """Of a whole turn, at any section, contacts that kick on entry among those met."""
-    if sought.test == GRAZING:
-        sought = Sought(GRAZING, 1)  # the far side of the first stop, which is not met
-    speed = 1.1 if sought.test == MOTION else 0.0
-    ours = FieldSolver(
-        lambda value, _: lopsided(path, value), (0.8, 1.3), 1.0, speed, half_turn=False, turns=1,
-        sought=sought,
-    )  # fmt: skip
+    ours = without_symmetry(sought, path)
     ours.scratch.shooting.section[0] = phase
     evaluate = residual_of(varied, ours.problem, ours.scratch, ours.unknowns)
-    w = np.array([-0.8, -0.9, -0.5, -0.7, *([] if speed else [1.1]), 1.05])
+    w = unknowns_off(ours)
     assert is_derivative_of_residual(evaluate, w, np.ones(w.size))
     flow = ours.flow
     met = flow.regimes[: flow.segments[0]].any(axis=0)
     assert met.all(), "both stops are touched on the way"
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.0, 1.3), (1.3, 0.0)])
+@pytest.mark.parametrize("half_turn", [False, True])
+@pytest.mark.parametrize("sought", [MOTIONS, *CURVES[:2]], ids=str)
+def test_tangents_are_carried_to_another_section(screen, exact, sought, half_turn, begin, end):
+    """Ahead, and to the next turn, that of a motion mirrored in its second half with its sign."""
+    if half_turn:
+        ours = solver(screen, sought)
+        beside = [] if sought.test == MOTION else [sought.own or 203.0]
+        w = np.concatenate([1.01 * exact.orbits_at(203.0)[0].state, beside, [6e-3]])
+    else:
+        ours = without_symmetry(sought, "stops")
+        w = unknowns_off(ours)
+    tangent = 0.01 * w * np.random.default_rng(3).uniform(0.5, 1.0, w.size)
+
+    def carried(step: float) -> tuple[Real, Real]:
+        ours.scratch.shooting.section[0] = begin
+        there, ahead = w + step * tangent, tangent.copy()
+        assert varied_to(ours.problem, ours.scratch, there, ahead, end) == status.OK
+        return there, ahead
+
+    _, ahead = carried(0.0)
+    h = 1e-4
+    wide, narrow = ((carried(s)[0] - carried(-s)[0]) / (2.0 * s) for s in (h, 0.5 * h))
+    expected, n = (4.0 * narrow - wide) / 3.0, OFF.size
+    close("states", ahead[:n], expected[:n], abs=1e-7 * np.abs(ahead[:n]).max())
+    close("parameters", ahead[n:], tangent[n:])
 
 
 def test_newton_on_a_curve_is_of_second_order(screen, exact) -> None:

@@ -2,16 +2,14 @@
 
 numba hands over a tuple of arrays as the hundreds of numbers that describe them, at every call
 anew; most of the time to compile went into that. A structure that is marked here lies in memory
-once, where a kernel is called from Python, and what is not read costs nothing.
-
-Kernels read its fields; they neither make one nor change which arrays it holds, so that what is
-read once need not be read again.
+once, where a kernel is called from Python, and what is not read costs nothing. Kernels read its
+fields; they do not make one, which would have no place that outlives the kernel.
 """
 
 from __future__ import annotations
 
 import hashlib
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, TypeVar
 
 from llvmlite import ir
@@ -46,6 +44,7 @@ class Reference(types.Type):
 
 
 register_model(Reference)(models.OpaqueModel)
+_OFFSETS: dict[Reference, list[int]] = {}
 
 
 def by_reference(structure: T) -> T:
@@ -59,14 +58,15 @@ def by_reference(structure: T) -> T:
     return structure
 
 
-@cache
 def _offsets(context: Any, kind: Reference) -> list[int]:
     """Bytes before each field, and of all."""
-    offsets = [0]
-    for field in kind.fields:
-        size = context.get_abi_sizeof(context.get_data_type(field))
-        offsets.append(offsets[-1] + -(-size // WORD) * WORD)
-    return offsets
+    if kind not in _OFFSETS:
+        offsets = [0]
+        for field in kind.fields:
+            size = context.get_abi_sizeof(context.get_data_type(field))
+            offsets.append(offsets[-1] + -(-size // WORD) * WORD)
+        _OFFSETS[kind] = offsets
+    return _OFFSETS[kind]
 
 
 def _field(context: Any, builder: Any, kind: types.Type, start: Any, offset: int) -> Any:
@@ -90,7 +90,6 @@ def _read(context: Any, builder: Any, kind: Reference, start: Any, name: str) ->
     field = kind.fields[place]
     address = _field(context, builder, field, start, _offsets(context, kind)[place])
     loaded = builder.load(address, align=WORD)
-    loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
     value = context.data_model_manager[field].from_data(builder, loaded)
     return impl_ret_borrowed(context, builder, field, value)
 

@@ -59,9 +59,8 @@ def kernel(
     are not, because kernels test for NaN. Only an ``entry`` can be called from Python: the
     wrappers that unpack its arguments cost more time to compile than most kernels do. A ``shared``
     kernel is compiled once for all entries that call it; its annotation says what it returns.
-    ``inline`` is for what runs at every step of a search: its scratch, dozens of arrays, is then
-    not passed. Kernels allocate nothing, and so they count no references either: that took half
-    of the time.
+    ``inline`` is for what runs at every step of a search. Kernels allocate nothing, and so they
+    count no references either: that took half of the time.
     """
     if function is None:
         return functools.partial(_compile, entry=entry, shared=shared, inline=inline)

@@ -43,15 +43,11 @@ class EntryLibrary(JITCodeLibrary):
     shared: list[tuple[Any, Any]]
 
     def _optimize_final_module(self) -> None:
-        # What only this code calls need not keep numba's way of passing arguments: a structure of
-        # arrays is handed over as hundreds of numbers, most of which no callee reads.
+        # What only this code calls need not keep numba's way of passing arguments: an array is
+        # handed over as half a dozen numbers, most of which no callee reads.
         for each in self._final_module.functions:
             if not each.is_declaration and each.linkage == Linkage.linkonce_odr:
                 each.linkage = Linkage.internal
-            elif not each.is_declaration:
-                # Taken into the call from Python, which lays structures out in memory, it could
-                # read them before that is done: it takes them for what never changes.
-                each.add_function_attribute("noinline")
         super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:

@@ -54,19 +54,19 @@ class ConditionWork(NamedTuple):
     """Scratch for F fields and, along a curve, 2 N components of the state: P of both together."""
 
     columns: Columns
-    work: ColumnWork
-    fields: Real  # (2 N, F) the state's derivatives in the fields alone
+    column: ColumnWork
+    fields: Real  # (2 N, P) columns that begin with 0: the first F, of fields, are not 0
     begin: Real  # (2 N, P + 1) where the flow begins
     ended: Real  # (2 N, P + 1)
     starts: Real  # (E + 1, 2 N, P + 1) at the starts of its segments, and at its end
     tangents: Real  # (E + 1, 2 N, 2 N) tangent maps up to there
     shift: Real  # (E + 1, P + 1) of their times
     multiplier: MultiplierWork
-    pair: Complex  # (2 N,)
+    value: Complex  # (2 N,) scratch
     square: Real  # (2 N, 2 N), or of as many rows as there are pairs of multipliers
     pivot: Int  # one for each of its rows
     adjugate: Real  # of the same
-    column: Real  # one of its columns
+    solved: Real  # one of its columns
     row: Real  # (P + 1,) derivatives of the test function
 
 
@@ -78,7 +78,7 @@ def new_condition_work(series: MachineSeries, machine: MachineArrays, test: int)
     rows = n * (n - 1) // 2 if test == PAIR else n
     return ConditionWork(
         columns=columns,
-        work=new_column_work(machine, P),
+        column=new_column_work(machine, P),
         fields=np.zeros((n, P)),
         begin=np.zeros((n, P + 1)),
         ended=np.zeros((n, P + 1)),
@@ -86,11 +86,11 @@ def new_condition_work(series: MachineSeries, machine: MachineArrays, test: int)
         tangents=np.zeros((segments + 1, n, n)),
         shift=np.zeros((segments + 1, P + 1)),
         multiplier=new_multiplier_work(n, P),
-        pair=np.zeros(n, np.complex128),
+        value=np.zeros(n, np.complex128),
         square=np.zeros((rows, rows)),
         pivot=np.zeros(rows, np.int64),
         adjugate=np.zeros((rows, rows)),
-        column=np.zeros(rows),
+        solved=np.zeros(rows),
         row=np.zeros(P + 1),
     )
 
@@ -99,16 +99,16 @@ def new_condition_work(series: MachineSeries, machine: MachineArrays, test: int)
 def field_columns(
     problem: Shooting, flown: ShootingWork, omega: float, slopes: ConditionWork
 ) -> None:
-    """Derivatives in all columns of the state at the end of the recorded flow, begun with 0."""
+    """Derivatives in the fields of the state at the end of the recorded flow, begun with 0."""
     U = slopes.fields
     for k in range(U.shape[0]):
         for p in range(U.shape[1]):
             U[k, p] = 0.0
-    carry_columns(problem.machine, flown.flow, omega, slopes.columns, U, slopes.work)
+    carry_columns(problem.machine, flown.flow, omega, slopes.columns, U, slopes.column)
 
 
 @kernel
-def all_columns(
+def curve_columns(
     problem: Shooting, flown: ShootingWork, omega: float, slopes: ConditionWork
 ) -> None:
     """Columns at the starts of all segments of the recorded flow, and how these move in time.
@@ -122,12 +122,10 @@ def all_columns(
         for p in range(last):
             begin[k, p] = 1.0 if p == last - size + k else 0.0
         begin[k, last] = flown.first_rate[k] * flow.start[0] / omega
-    carry_starts(
-        machine, flow, omega, columns, slopes.starts, slopes.tangents, slopes.work
-    )  # fmt: skip
+    carry_starts(machine, flow, omega, columns, slopes.starts, slopes.tangents, slopes.column)
     add_begin(flow.segments[0], begin, slopes.tangents, slopes.starts)
     set_limits(
-        machine, flow, omega, columns, slopes.starts, slopes.ended, slopes.shift, slopes.work
+        machine, flow, omega, columns, slopes.starts, slopes.ended, slopes.shift, slopes.column
     )
 
 
@@ -139,38 +137,43 @@ def critical_slopes(
 
     Its derivatives are left in slopes.row.
     """
-    size, work = slopes.begin.shape[0], slopes.multiplier
+    size, multiplier = slopes.begin.shape[0], slopes.multiplier
     total = 0.0
     for i in range(size):
         for k in range(size):
             total += abs(J[i, k])
     if not math.isfinite(total):
         return status.NOT_FINITE, math.nan
-    product = set_adjugate(test, J, total * SINGULAR, slopes)
+    product = set_adjugate(test, J, slopes)
+    if math.isnan(product):
+        return status.NOT_FINITE, product
     set_weights(test, J, slopes)
     for c in range(size):
         for k in range(size):
-            work.left[c, k] *= problem.sign
+            multiplier.left[c, k] *= problem.sign
     weighted_slopes(
         problem.machine, flown.flow, omega, slopes.columns, slopes.shift, slopes.tangents,
-        slopes.pair, work, slopes.work,
+        slopes.value, multiplier, slopes.column,
     )  # fmt: skip
     for p in range(slopes.row.shape[0]):
         slopes.row[p] = 0.0
         for c in range(size):
-            slopes.row[p] += work.change[p, c, 0]
+            slopes.row[p] += multiplier.change[p, c, 0]
     return status.OK, product
 
 
 @kernel
-def set_adjugate(test: int, J: Real, nudge: float, slopes: ConditionWork) -> float:
-    """Determinant of the matrix that the test asks for, and its adjugate."""
-    rows, product = slopes.square.shape[0], 1.0
+def set_adjugate(test: int, J: Real, slopes: ConditionWork) -> float:
+    """Determinant of the matrix that the test asks for, and its adjugate; NaN without one."""
+    rows, product, largest = slopes.square.shape[0], 1.0, 0.0
     set_square(test, J, slopes.square)
     if not lu_factor(slopes.square, slopes.pivot):
         set_square(test, J, slopes.square)
         for i in range(rows):
-            slopes.square[i, i] += nudge
+            for k in range(rows):
+                largest = max(largest, abs(slopes.square[i, k]))
+        for i in range(rows):
+            slopes.square[i, i] += SINGULAR * largest
         if not lu_factor(slopes.square, slopes.pivot):
             return math.nan
     for k in range(rows):
@@ -178,10 +181,10 @@ def set_adjugate(test: int, J: Real, nudge: float, slopes: ConditionWork) -> flo
         product *= entry if slopes.pivot[k] == k else -entry
     for c in range(rows):
         for i in range(rows):
-            slopes.column[i] = 1.0 if i == c else 0.0
-        lu_solve(slopes.square, slopes.pivot, slopes.column)
+            slopes.solved[i] = 1.0 if i == c else 0.0
+        lu_solve(slopes.square, slopes.pivot, slopes.solved)
         for i in range(rows):
-            slopes.adjugate[i, c] = product * slopes.column[i]
+            slopes.adjugate[i, c] = product * slopes.solved[i]
     return product
 
 
@@ -275,7 +278,7 @@ def depth_slopes(
     for k in range(U.shape[0]):
         for p in range(last + 1):
             U[k, p] = slopes.starts[summit, k, p]
-    advance_columns(machine, flow, summit, omega, columns, at, U, slopes.work)
+    advance_columns(machine, flow, summit, omega, columns, at, U, slopes.column)
     segment_state(machine, flow, summit, omega, at, flown.start, flown.first_rate)
     rate = 0.0
     for k in range(machine.direction.shape[1]):

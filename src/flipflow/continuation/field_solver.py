@@ -50,7 +50,7 @@ class Sought:
 
 
 MOTIONS = Sought()
-ASTRAY = 0.1  # share of motion or parameter by which a curve's first point may lie off its start
+SAME_CURVE = 0.1  # share of motion or parameter by which the first point may lie off the start
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +157,7 @@ class FieldSolver(ExactSolver):
         first, size = traced.u[0], 2 * self.system.size
         off = distance_to(first[:size], u[:size], self.omega or float(u[-1]))
         low, high = self.sought.bounds
-        beside = max(abs(u[-1]), abs(self.sought.own)) or high - low
-        if max(off, abs(first[-1] - u[-1]) / beside) < ASTRAY:
+        if max(off, abs(first[-1] - u[-1]) / (abs(u[-1]) or high - low)) < SAME_CURVE:
             return traced
         # Newton has found a point of another curve.
         return Traced.recorded(traced.record, 0, status.NO_CONVERGENCE, course)

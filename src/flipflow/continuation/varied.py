@@ -24,8 +24,8 @@ from flipflow.continuation.conditions import (
     GRAZING,
     MOTION,
     ConditionWork,
-    all_columns,
     critical_slopes,
+    curve_columns,
     depth_slopes,
     field_columns,
     new_condition_work,
@@ -78,7 +78,6 @@ class VariedWork(NamedTuple):
     tangent: Real  # (2 N + 1,) and a tangent
     r: Real  # (2 N,)
     J: Real  # (2 N, 2 N + 1)
-    depth: Real  # (m, 2)
     slopes: ConditionWork
 
 
@@ -95,7 +94,6 @@ def new_varied_work(problem: Varied, shooting: ShootingWork) -> VariedWork:
         tangent=np.zeros(n + 1),
         r=np.zeros(n),
         J=np.zeros((n, n + 1)),
-        depth=np.zeros((stops, 2)),
         slopes=new_condition_work(problem.series, problem.shooting.machine, problem.test),
     )
 
@@ -202,12 +200,11 @@ def varied_residual(
 def condition_row(problem: Varied, work: VariedWork, omega: float, r: Real, J: Real) -> int:
     """The test function of the motion just flown, its derivatives, and the state's in fields."""
     size, shooting, flown, slopes = work.r.shape[0], problem.shooting, work.shooting, work.slopes
-    all_columns(shooting, flown, omega, slopes)
+    curve_columns(shooting, flown, omega, slopes)
     if problem.test == GRAZING:
         show_gaps(problem, work)
         r[size] = depth_slopes(shooting, flown, omega, problem.gap, slopes)
-        if problem.opened[problem.gap // 2, problem.gap % 2] != 0:
-            open_gaps(problem)
+        open_gaps(problem)
     else:
         code, r[size] = critical_slopes(shooting, flown, omega, problem.test, work.J, slopes)
         if code != status.OK:
