@@ -538,3 +538,13 @@ def test_kernel_modules_import_only_what_kernels_need(module: str) -> None:
     tables = {"flipflow.errors", "flipflow.model", "flipflow.model.contact_law"}
     assert {name.split(".")[1] for name in found - tables} <= rooms
     assert "flipflow" not in found
+
+
+def test_a_profiler_has_nothing_compiled_anew(package: Path, cache: Path) -> None:
+    """Under one, numba changes the flags of a kernel's code when it is first called."""
+    calls = "from tiny.outer import answer; answer(2.0); answer(2)"
+    assert python(package.parent, calls, cache).returncode == 0
+    kept = {file.name for file in cache.rglob("*.kernel")}
+    profiled = f"import cProfile; cProfile.run({calls!r})"
+    assert python(package.parent, profiled, cache).returncode == 0
+    assert {file.name for file in cache.rglob("*.kernel")} == kept

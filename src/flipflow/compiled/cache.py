@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable
+from functools import cached_property
 from importlib import import_module
 from typing import Any
 
@@ -81,12 +82,17 @@ class KernelCache(_Cache):
         if (digest := self._digest()) is not None:
             FOLDERS.remove(digest, f"{self._name}-*{SUFFIX}")
 
+    @cached_property
+    def _described(self) -> str:
+        # As it is before the first call: under a profiler numba changes the flags of the code.
+        return describe_code(self._code)
+
     def _digest(self) -> str | None:
         return module_digest(self._module, self._compiled_by) if self._enabled else None
 
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
         """What the code is for: the function, its argument types and the processor."""
-        return (self._name, describe_code(self._code), sig, codegen.magic_tuple())
+        return (self._name, self._described, sig, codegen.magic_tuple())
 
     def _file(self, key: tuple[Any, ...]) -> str:
         return f"{self._name}-{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}{SUFFIX}"

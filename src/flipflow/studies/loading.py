@@ -250,11 +250,9 @@ def _region(
         words = f"it would begin at {ends[0]:.6g} and end at {ends[1]:.6g} rad/s"
         raise IncompleteError(f"The machine has no operating region: {words}.")
     omega = np.linspace(*ends, SAMPLES)
-    amplitudes = [
-        np.array([relative_from_below(branch, float(w)) for w in omega])
-        for branch in (unloaded, loaded)
-    ]
-    before, after = amplitudes
+    before, after = (
+        amplitudes_from_below(branch, omega, "relative") for branch in (unloaded, loaded)
+    )
     change = after - before
     if not np.isfinite(change).any():
         why = " ".join(one.status.value for one in (unloaded, loaded) if not one.complete)
@@ -297,5 +295,19 @@ def relative_from_below(branch: Branch, omega: float) -> float:
 
 def amplitude_from_below(branch: Branch, omega: float, which: Coordinate) -> float:
     """Amplitude of a coordinate in m, as :func:`relative_from_below`."""
-    orbit = branch.orbit_from_below(omega)
-    return math.nan if orbit is None else orbit.amplitude(which)
+    return float(amplitudes_from_below(branch, np.array([omega]), which)[0])
+
+
+def amplitudes_from_below(branch: Branch, omega: Real, which: Coordinate) -> Real:
+    """The same at several speeds, (n,)."""
+    found, amplitudes = (
+        [branch.orbit_from_below(float(w)) for w in omega],
+        np.full(omega.size, np.nan),
+    )
+    known = [k for k, orbit in enumerate(found) if orbit is not None]
+    if known:
+        u = np.array([orbit.point.u for orbit in found if orbit is not None])
+        with branch.formulation.lent() as solver:
+            low, high, _ = solver.extremes(u, omega[known], branch.system.coordinate(which)[None])
+        amplitudes[known] = 0.5 * (high - low)[:, 0]
+    return amplitudes

@@ -24,7 +24,7 @@ from flipflow.periodic.options import Method
 from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
-from flipflow.studies.loading import amplitude_from_below
+from flipflow.studies.loading import amplitude_from_below, amplitudes_from_below
 
 FREQUENCIES = 9  # equally spaced speeds of the common region at which members are compared
 
@@ -159,9 +159,14 @@ class ResponseFamily(Frozen, Result):
 
         Of a machine that is no screen, the amplitude of its leading coordinate.
         """
+        speeds = self.common_frequencies
         return np.array(
             [
-                [member.relative_amplitude(float(w)) for w in self.common_frequencies]
+                np.full(speeds.size, np.nan)
+                if member.failure
+                else amplitudes_from_below(
+                    member.branch, speeds, leading_coordinate(member.branch.system)
+                )
                 for member in self.members
             ]
         )
