@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flipflow import __version__
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Complex, Real
 from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
@@ -348,16 +348,17 @@ def _followed(
         solver, traced = _traced(plane, orbit, u, sought, half_turn, say)
     say("special points", SPECIAL_SHARE)
     found, unsettled = curve_points(solver, traced) if traced.omega.size else ([], [])
-    kept = _where_it_holds(solver, traced, plane)
     points = solver.points(traced)
+    kept = _before_grazing(solver, points, _where_it_holds(solver, traced, plane))
 
     def motion(at: Point) -> Orbit:
         one = cast("FieldPoint", at)
         known = Point(one.formulation, one.u, one.omega, one.omega_tangent, one.known_map)
         return Orbit(plane.machine_at(one.value, one.beside), known, UNDETERMINED)
 
+    orbits = tuple(map(motion, points[kept]))
     return Followed(
-        orbits=tuple(map(motion, points[kept])),
+        orbits=orbits,
         values=np.column_stack([traced.omega, traced.u[:, -1]])[kept],
         special_points=tuple(
             CurvePoint(
@@ -367,7 +368,7 @@ def _followed(
             for one in found
             if kept.start - 1 <= one.index < kept.stop
         ),
-        status=_ended(solver, traced, [motion(one) for one in (*points[:1], *points[-1:])], plane),
+        status=_ended(solver, traced, kept, orbits, plane),
         notes=(*notes, *unsettled),
     )  # fmt: skip
 
@@ -393,15 +394,17 @@ def _touches(solver: FieldSolver, traced: Traced, gaps: Sequence[int]) -> bool:
 
 
 def _ended(
-    solver: FieldSolver, traced: Traced, ends: Sequence[Orbit], plane: Plane
+    solver: FieldSolver, traced: Traced, kept: slice, orbits: Sequence[Orbit], plane: Plane
 ) -> BranchStatus:
     """How the curve ended; where it stalled, whether another contact begins at each end within."""
+    if traced.omega.size and not orbits:
+        return BranchStatus.NO_START
     stalled = traced.code == status.STEP_TOO_SMALL and solver.sought.test != GRAZING
-    grazing = stalled and bool(ends)
-    for k, orbit in zip((0, -1), ends, strict=True) if grazing else ():
+    grazing = stalled and bool(orbits)
+    for k, end in ((kept.start, 0), (kept.stop - 1, -1)) if grazing else ():
         place = traced.omega[k], traced.u[k, -1]
         within = all(low < x < high for x, (low, high) in zip(place, plane.bounds, strict=True))
-        if within and not _grazes(orbit, solver.length):
+        if within and not _grazes(orbits[end], solver.length):
             grazing = False
     return BranchStatus.MEETS_GRAZING if grazing else BranchStatus.from_code(traced.code)
 
@@ -432,15 +435,34 @@ def _values(point: Point) -> tuple[float, float]:
 
 
 def _where_it_holds(solver: FieldSolver, traced: Traced, plane: Plane) -> slice:
-    """The points of the curve: those of a pair of multipliers up to where it becomes real."""
-    if solver.sought.test != PAIR or traced.omega.size == 0:
-        return slice(0, traced.omega.size)
-    real = np.abs([pair_sum(row) for row in solver.own_multipliers(traced)]) > 2.0
+    """The points of the curve around its start that have the multipliers that it asks for.
+
+    A pair may become real. Where a contact begins multipliers may jump past their value.
+    """
+    test, size = solver.sought.test, traced.omega.size
+    if test == GRAZING or size == 0:
+        return slice(0, size)
+    lost = np.array([not _holds(test, row) for row in solver.own_multipliers(traced)])
     off = np.column_stack([traced.omega, traced.u[:, -1]]) - plane.own
     start = int(np.abs(off / np.ptp(plane.bounds, axis=1)).sum(axis=1).argmin())
-    before, after = np.flatnonzero(real[:start]), np.flatnonzero(real[start:])
+    before, after = np.flatnonzero(lost[:start]), np.flatnonzero(lost[start:])
     first = int(before[-1]) + 1 if before.size else 0
-    return slice(first, start + int(after[0]) if after.size else real.size)
+    return slice(first, start + int(after[0]) if after.size else size)
+
+
+def _before_grazing(solver: FieldSolver, points: Sequence[Point], kept: slice) -> slice:
+    """The curve without ends so near a grazing that, carried to phase 0, they lie beyond it."""
+    test, first, last = solver.sought.test, kept.start, kept.stop
+    while test != GRAZING and first < last and not _is_critical(points[first], test):
+        first += 1
+    while test != GRAZING and first < last and not _is_critical(points[last - 1], test):
+        last -= 1
+    return slice(first, last)
+
+
+def _holds(test: int, values: Complex) -> bool:
+    """Whether multipliers along a curve are those that it asks for."""
+    return _are_critical(test, values) and (test != PAIR or abs(pair_sum(values)) <= 2.0)
 
 
 def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
@@ -476,12 +498,15 @@ def _grazing(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
 
 def _is_critical(point: Point, test: int = SADDLE_NODE) -> bool:
     """Whether eigenvalues of the map are those that a test looks for."""
-    mu = point.eigenvalues
+    return _are_critical(test, point.eigenvalues)
+
+
+def _are_critical(test: int, values: Complex) -> bool:
     if test == PAIR:
-        i, j = np.triu_indices(mu.size, 1)
-        off = mu[i] * mu[j] - 1.0
+        i, j = np.triu_indices(values.size, 1)
+        off = values[i] * values[j] - 1.0
     else:
-        off = mu - 1.0 if test == SADDLE_NODE else mu + 1.0
+        off = values - 1.0 if test == SADDLE_NODE else values + 1.0
     return bool(np.abs(off).min() < CRITICAL)
 
 
