@@ -50,6 +50,7 @@ TESTS = {
     FOLD: SADDLE_NODE, SYMMETRY: FLIP, DOUBLING: FLIP, NEIMARK_SACKER: PAIR,
     CONTACT_BEGIN: GRAZING, CONTACT_END: GRAZING,
 }  # fmt: skip
+CREEPING = 1e-6  # share of the bounds below which a step leads hardly on
 CRITICAL = 1e-3  # distance of multipliers from critical ones beyond which a map has none
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
 FINE = 20.0  # steps in each of these intervals
@@ -349,7 +350,7 @@ def _followed(
     say("special points", SPECIAL_SHARE)
     found, unsettled = curve_points(solver, traced) if traced.omega.size else ([], [])
     points = solver.points(traced)
-    kept = _before_grazing(solver, points, _where_it_holds(solver, traced, plane))
+    kept = _where_it_holds(solver, traced, points, plane)
 
     def motion(at: Point) -> Orbit:
         one = cast("FieldPoint", at)
@@ -434,30 +435,31 @@ def _values(point: Point) -> tuple[float, float]:
     return one.value, one.beside
 
 
-def _where_it_holds(solver: FieldSolver, traced: Traced, plane: Plane) -> slice:
+def _where_it_holds(
+    solver: FieldSolver, traced: Traced, points: Sequence[Point], plane: Plane
+) -> slice:
     """The points of the curve around its start that have the multipliers that it asks for.
 
-    A pair may become real. Where a contact begins multipliers may jump past their value.
+    A pair may become real. Where a contact begins multipliers may jump past their value: where the
+    curve creeps towards it, a motion that is carried to phase 0 may lie beyond.
     """
     test, size = solver.sought.test, traced.omega.size
     if test == GRAZING or size == 0:
         return slice(0, size)
-    lost = np.array([not _holds(test, row) for row in solver.own_multipliers(traced)])
-    off = np.column_stack([traced.omega, traced.u[:, -1]]) - plane.own
-    start = int(np.abs(off / np.ptp(plane.bounds, axis=1)).sum(axis=1).argmin())
+    values = np.column_stack([traced.omega, traced.u[:, -1]])
+    off = (values - plane.own) / np.ptp(plane.bounds, axis=1)
+    creeps = np.abs(np.diff(off, axis=0)).max(axis=1, initial=0.0) < CREEPING
+    creeping = np.append(creeps, False) | np.insert(creeps, 0, False)
+    lost = np.array(
+        [
+            not _holds(test, row) or bool(creeping[k] and not _is_critical(points[k], test))
+            for k, row in enumerate(solver.own_multipliers(traced))
+        ]
+    )
+    start = int(np.abs(off).sum(axis=1).argmin())
     before, after = np.flatnonzero(lost[:start]), np.flatnonzero(lost[start:])
     first = int(before[-1]) + 1 if before.size else 0
     return slice(first, start + int(after[0]) if after.size else size)
-
-
-def _before_grazing(solver: FieldSolver, points: Sequence[Point], kept: slice) -> slice:
-    """The curve without ends so near a grazing that, carried to phase 0, they lie beyond it."""
-    test, first, last = solver.sought.test, kept.start, kept.stop
-    while test != GRAZING and first < last and not _is_critical(points[first], test):
-        first += 1
-    while test != GRAZING and first < last and not _is_critical(points[last - 1], test):
-        last -= 1
-    return slice(first, last)
 
 
 def _holds(test: int, values: Complex) -> bool:
