@@ -4,10 +4,6 @@ At least 300 points and steps of at most 2 rad/s from 5 to 250 rad/s, the stabil
 of every point, both folds refined to 1e-6 rad/s, and nothing else found but contact.
 """
 
-import importlib
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,13 +13,8 @@ pytestmark = pytest.mark.numerical
 
 
 @pytest.fixture(scope="module")
-def contract():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    try:
-        yield importlib.import_module("contract")
-    finally:
-        sys.path.remove(folder)
+def contract(script):
+    return script("contract")
 
 
 @pytest.fixture(

@@ -5,10 +5,6 @@ Sized-down twin of benchmarks/plausible_screens.py.
 
 from __future__ import annotations
 
-import importlib
-import sys
-from pathlib import Path
-
 import pytest
 
 import flipflow as ff
@@ -21,13 +17,8 @@ RPM = 0.10471975511965977
 
 
 @pytest.fixture(scope="module")
-def draws():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    try:
-        yield importlib.import_module("plausible_draw")
-    finally:
-        sys.path.remove(folder)
+def draws(script):
+    return script("plausible_draw")
 
 
 @pytest.fixture(scope="module")

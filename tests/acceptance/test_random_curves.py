@@ -1,9 +1,5 @@
 """The sized-down twin of benchmarks/random_curves.py: a curve in two parameters of each machine."""
 
-import importlib
-import sys
-from pathlib import Path
-
 import pytest
 
 MACHINES = 10
@@ -13,13 +9,8 @@ pytestmark = [pytest.mark.numerical, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def curves():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    try:
-        yield importlib.import_module("random_curves")
-    finally:
-        sys.path.remove(folder)
+def curves(script):
+    return script("random_curves")
 
 
 @pytest.mark.parametrize("number", range(MACHINES))

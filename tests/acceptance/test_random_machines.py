@@ -4,10 +4,6 @@ The whole run (issue: "a thousand random machines") is a benchmark; its numbers 
 that remain are in benchmarks/README.md.
 """
 
-import importlib
-import sys
-from pathlib import Path
-
 import pytest
 
 MACHINES = 12
@@ -17,19 +13,13 @@ pytestmark = [pytest.mark.numerical, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
-def records():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    try:
-        checks = importlib.import_module("machine_checks")
-        yield [checks.examine(SEED, number) for number in range(MACHINES)]
-    finally:
-        sys.path.remove(folder)
+def records(script):
+    return [script("machine_checks").examine(SEED, number) for number in range(MACHINES)]
 
 
 @pytest.fixture(scope="module")
-def summary(records):
-    return sys.modules["machine_checks"].summarise(records)
+def summary(script, records):
+    return script("machine_checks").summarise(records)
 
 
 @pytest.mark.parametrize("method", ["exact", "balance"])

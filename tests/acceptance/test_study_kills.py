@@ -5,10 +5,6 @@ The sized-down twin of benchmarks/study_kills.py. Its outcome does not hang on w
 
 from __future__ import annotations
 
-import importlib
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,13 +15,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
 
 @pytest.fixture(scope="module")
-def kills():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    try:
-        yield importlib.import_module("study_kills")
-    finally:
-        sys.path.remove(folder)
+def kills(script):
+    return script("study_kills")
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from flipflow.compiled.arrays import Int, Real
+from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import machine_parts, with_springs
 from flipflow.dynamics.machine_series import EXACT, MachineSeries, machine_series
-from flipflow.dynamics.parameter_tangent import CHANGED_TOGETHER, Columns
+from flipflow.dynamics.parameter_tangent import Columns, touched
 from flipflow.errors import InputError
 from flipflow.model.system import MechanicalSystem
 
@@ -120,17 +120,8 @@ def solved_columns(M: Real, parts: Mapping[str, Real]) -> Columns:
         stop_stiffness=every(parts["stop"][:, 0]),
         stop_damping=every(parts["stop"][:, 1]),
         gap=every(parts["gap"]),
-        touches=_touches(parts),
+        touches=touched(parts),
     )
-
-
-def _touches(parts: Mapping[str, Real]) -> Int:
-    """Which of M, C, K, f_0, excitation, stops, directions each parameter changes, (P, 7)."""
-    changes = [
-        np.any([parts[name].any(axis=tuple(range(1, parts[name].ndim))) for name in names], axis=0)
-        for names in CHANGED_TOGETHER
-    ]
-    return np.stack(changes, axis=1).astype(np.int64)
 
 
 def stop_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> dict[str, Real]:

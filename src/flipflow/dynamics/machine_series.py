@@ -23,7 +23,7 @@ from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.parameter_tangent import CHANGED_TOGETHER, Columns
+from flipflow.dynamics.parameter_tangent import Columns, touched
 
 MOST_TERMS = 65  # in a parameter; one that needs more is not smooth
 # Where a series is held against the machine, in [-1, 1].
@@ -301,6 +301,11 @@ def new_columns(series: MachineSeries, machine: MachineArrays, others: int) -> C
     n, (m, _), e = machine.stiffness.shape[0], machine.direction.shape, machine.push.shape[0]
     own = 2 if series.beside_high > series.beside_low else 1
     P = own + others
+    # What has no other term than the first does not change along that axis.
+    parts = {
+        name: np.array([np.any(np.moveaxis(getattr(series, name), p, 0)[1:]) for p in range(own)])
+        for name in MachineSeries._fields[4:]
+    }
     return Columns(
         inertia=np.zeros((P, n, n)),
         damping=np.zeros((P, n, n)),
@@ -312,17 +317,8 @@ def new_columns(series: MachineSeries, machine: MachineArrays, others: int) -> C
         stop_stiffness=np.zeros((P, m)),
         stop_damping=np.zeros((P, m)),
         gap=np.zeros((P, m, 2)),
-        touches=np.array([_touches(series, p) for p in range(own)] + [(0,) * 7] * others),
+        touches=np.pad(touched(parts), ((0, others), (0, 0))),
     )
-
-
-def _touches(series: MachineSeries, p: int) -> tuple[int, ...]:
-    """Which of M, C, K, f_0, excitation, stops, directions a parameter changes."""
-    changes = [
-        any(np.any(np.moveaxis(getattr(series, name), p, 0)[1:]) for name in names)
-        for names in CHANGED_TOGETHER
-    ]
-    return tuple(map(int, changes))
 
 
 def new_series_work(size: int) -> SeriesWork:

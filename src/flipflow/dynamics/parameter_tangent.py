@@ -16,9 +16,11 @@ velocity is kicked by c M^-1 d times d x_p + d_p x - e_p, the shift of the state
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.by_reference import by_reference
@@ -57,6 +59,15 @@ class Columns(NamedTuple):
     stop_damping: Real  # (P, m)
     gap: Real  # (P, m, 2)
     touches: Int  # (P, 7) 1 where M, C, K, f_0, an excitation, a stop, a direction changes, else 0
+
+
+def touched(parts: Mapping[str, NDArray[Any]]) -> Int:
+    """``touches`` of P parameters by what each changes of a machine's parts, (P, ...) each."""
+    changes = [
+        np.any([parts[name].any(axis=tuple(range(1, parts[name].ndim))) for name in names], axis=0)
+        for names in CHANGED_TOGETHER
+    ]
+    return np.stack(changes, axis=1).astype(np.int64)
 
 
 @by_reference
