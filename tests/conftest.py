@@ -113,9 +113,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
 
 @pytest.fixture(scope="session")
 def script() -> Iterator[Callable[[str], ModuleType]]:
-    """``script("paths")``: a script of ``benchmarks`` as a module; they import each other."""
+    """``script("paths")``: a script of ``benchmarks`` as a module; they import each other.
+
+    Their folder comes last: workers of later tests inherit the path.
+    """
     with pytest.MonkeyPatch.context() as patched:
-        patched.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
+        patched.setattr(sys, "path", [*sys.path, str(Path(__file__).parents[1] / "benchmarks")])
         yield importlib.import_module
 
 

@@ -1,7 +1,7 @@
 """Seeded fuzz of machine files, result files and calls: an InputError or what is documented.
 
 Each case is made from a seed and its number. ``acceptance/test_odd_input.py`` runs a few,
-``benchmarks/fuzz.py`` thousands.
+``benchmarks/long_fuzz.py`` thousands.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Each call is made with one argument replaced. What comes back has to be an error of flipflow, or a
 result of the type that is documented; anything else is a finding. Shared by
-``acceptance/test_odd_arguments.py`` and ``benchmarks/odd_arguments.py``.
+``acceptance/test_odd_arguments.py`` and ``benchmarks/every_odd_argument.py``.
 """
 
 from __future__ import annotations

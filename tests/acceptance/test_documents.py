@@ -193,7 +193,7 @@ def test_a_spoilt_document_opens_or_says_what_is_wrong(tmp_path, name):
     document, rng = old_document(name), np.random.default_rng(len(name))
     where = [(place, bad) for place in places(document) for bad in (*BAD, MISSING)]
     refused = []
-    for k in rng.permutation(len(where))[:12]:  # of thousands in benchmarks/fuzz.py
+    for k in rng.permutation(len(where))[:12]:  # of thousands in benchmarks/long_fuzz.py
         place, bad = where[k]
         try:
             assert repr(opened(spoilt(document, place, bad), tmp_path))

@@ -53,9 +53,10 @@ def test_valid_calls_are_valid(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_odd_arguments(kind):
-    """Each place of each call with a few odd arguments; all of them: benchmarks/odd_arguments.py.
+    """Each place of each call with a few odd arguments.
 
-    Dear calls have fewer draws, so that this stays a matter of seconds.
+    Dear calls have fewer draws, so that this stays a matter of seconds; all of them:
+    benchmarks/every_odd_argument.py.
     """
     print(f"seed {SEED}")  # noqa: T201  shown where it fails
     found = [

@@ -17,7 +17,7 @@ from flipflow.io.source import bundled_text
 from fuzz import findings
 
 SEED = 15
-# Of 3,000, 2,500 and 20,000, which benchmarks/fuzz.py runs.
+# Of 3,000, 2,500 and 20,000, which benchmarks/long_fuzz.py runs.
 CASES = {"machine files": 300, "result files": 60, "calls": 300}
 
 

@@ -45,6 +45,13 @@ def test_no_module_has_a_name_that_says_nothing():
     assert not vague
 
 
+def test_no_module_of_the_tests_has_the_name_of_a_script():
+    """Both folders are on the path of tests that run scripts."""
+    names = [{path.stem for path in (ROOT / of).glob("*.py")} for of in ("tests", "benchmarks")]
+    assert all(names)
+    assert not set.intersection(*names)
+
+
 def imports_of(path, names):
     """Modules among ``names`` that a module imports, those for type checkers left out."""
     waiting, found = [ast.parse(path.read_text(encoding="utf-8"))], set()
