@@ -5,9 +5,10 @@
 Machines are chains of ``chain_draw.py``; the seed is new each time unless one is given, and
 printed. On the branch of each machine a special point is drawn, and followed over speed and a
 parameter of the machine, 0.7 to 1.4 times its value. A curve ends on a bound, closes, or ends where
-another contact begins; those that end otherwise are listed, to be drawn again. "off" is the largest
-distance of a multiplier from its critical value on any curve of folds, doublings and lost symmetry,
-but for those that follow a grazing in their place.
+another contact begins; those that end otherwise are listed, to be drawn again. "SAYS_WHY" is a
+point without a curve, with a note about it. "off" is the largest distance of a multiplier from its
+critical value on any curve of folds, doublings and lost symmetry, but for those that follow a
+grazing in their place.
 """
 
 import argparse
@@ -29,6 +30,7 @@ CRITICAL = {"fold": 1.0, "period doubling": -1.0, "symmetry breaking": 1.0}
 KINDS = (*CRITICAL, "Neimark-Sacker", "contact begin", "contact end")
 PARAMETERS = ("forcing", "springs[0].stiffness", "springs[0].clearance")
 WHOLE = ("FOLLOWED", "CLOSED", "MEETS_GRAZING")
+SAYS_WHY = "SAYS_WHY"
 CHUNK = 5  # machines that a worker is given at a time
 
 
@@ -53,7 +55,8 @@ def follow(number, seed):
     seconds, off = time.perf_counter() - start, 0.0
     if curve.kind in CRITICAL and curve.orbits and not curve.notes:
         off = float(np.abs(curve.multipliers - CRITICAL[curve.kind]).min(axis=1).max())
-    return number, point.kind, curve.status.name, len(curve.orbits), seconds, off
+    end = curve.status.name if curve.orbits or not curve.notes else SAYS_WHY
+    return number, point.kind, end, len(curve.orbits), seconds, off
 
 
 def main():

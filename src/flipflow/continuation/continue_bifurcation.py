@@ -52,6 +52,7 @@ TESTS = {
 }  # fmt: skip
 CREEPING = 1e-6  # share of the bounds below which a step leads hardly on
 CRITICAL = 1e-3  # distance of multipliers from critical ones beyond which a map has none
+SETTLED = 1e-6  # the same where a fold of the map was found to rounding
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
 FINE = 20.0  # steps in each of these intervals
 NEAR = 1e-6  # share of the bounds within which a motion with that multiplier is looked for
@@ -71,6 +72,11 @@ AT_LOWER_CORNER = (
 AT_JUMP = (
     "The multipliers jump past their critical value where a contact begins: the curve is that of "
     "the grazing, and a {kind} as long as they jump past it there."
+)
+
+AT_LOWER_JUMP = (
+    "The multipliers jump past their critical value where a stop that is touched already in the "
+    "turn begins to be touched once more: no motion has it, and there is no curve to follow."
 )
 
 
@@ -441,7 +447,7 @@ def _where_it_holds(
     """The points of the curve around its start that have the multipliers that it asks for.
 
     A pair may become real. Where a contact begins multipliers may jump past their value: where the
-    curve creeps towards it, a motion that is carried to phase 0 may lie beyond.
+    curve creeps towards it or ends, a motion that is carried to phase 0 may lie beyond.
     """
     test, size = solver.sought.test, traced.omega.size
     if test == GRAZING or size == 0:
@@ -449,7 +455,7 @@ def _where_it_holds(
     values = np.column_stack([traced.omega, traced.u[:, -1]])
     off = (values - plane.own) / np.ptp(plane.bounds, axis=1)
     creeps = np.abs(np.diff(off, axis=0)).max(axis=1, initial=0.0) < CREEPING
-    creeping = np.append(creeps, False) | np.insert(creeps, 0, False)
+    creeping = np.append(creeps, True) | np.insert(creeps, 0, True)
     lost = np.array(
         [
             not _holds(test, row) or bool(creeping[k] and not _is_critical(points[k], test))
@@ -474,12 +480,17 @@ def _sought(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
     start, exact = _exact_start(point)
     if test == GRAZING:
         return test, 2 * point.spring + (0 if point.side > 0 else 1), start, []
-    if test != SADDLE_NODE or _is_critical(orbit.point):
+    if _is_critical(orbit.point, test, within=SETTLED):
         return test, 0, start, []
+    # At a corner multipliers may be close to critical by chance.
     gap = _grazed(start, exact)
     if gap is None:
-        # The fold of a truncated series is none of the exact motion that stands for it.
-        return test, 0, start, [AT_LOWER_CORNER] if own.kind is ExactSolver else []
+        # That of a truncated series is none of the exact motion that stands for it.
+        at_corner = own.kind is ExactSolver and not _is_critical(orbit.point, test)
+        words = AT_LOWER_CORNER if test == SADDLE_NODE else AT_LOWER_JUMP
+        return test, 0, start, [words] if at_corner else []
+    if test != SADDLE_NODE:
+        return test, 0, start, []
     beside = _fold_beside(start, exact)
     return (GRAZING, gap, start, [AT_CORNER]) if beside is None else (test, 0, beside, [])
 
@@ -498,18 +509,18 @@ def _grazing(point: SpecialPoint) -> tuple[int, int, Point, list[str]]:
     return GRAZING, _grazed(start, exact) or 0, start, [AT_JUMP.format(kind=point.kind)]
 
 
-def _is_critical(point: Point, test: int = SADDLE_NODE) -> bool:
+def _is_critical(point: Point, test: int = SADDLE_NODE, within: float = CRITICAL) -> bool:
     """Whether eigenvalues of the map are those that a test looks for."""
-    return _are_critical(test, point.eigenvalues)
+    return _are_critical(test, point.eigenvalues, within)
 
 
-def _are_critical(test: int, values: Complex) -> bool:
+def _are_critical(test: int, values: Complex, within: float = CRITICAL) -> bool:
     if test == PAIR:
         i, j = np.triu_indices(values.size, 1)
         off = values[i] * values[j] - 1.0
     else:
         off = values - 1.0 if test == SADDLE_NODE else values + 1.0
-    return bool(np.abs(off).min() < CRITICAL)
+    return bool(np.abs(off).min() < within)
 
 
 def _fold_beside(point: Point, solver: ExactSolver) -> Point | None:
