@@ -236,6 +236,20 @@ def test_units_and_coordinates() -> None:
         ff.figure(branch(), units="furlongs")
 
 
+def test_every_figure_of_a_screen_is_in_an_engineers_units() -> None:
+    """Families and loading stood over rad/s, as the paper's figures do."""
+    units = {
+        axis.unit for name in MADE for panel in ff.figure(made(name)).panels
+        for axis in (panel.x, panel.y)
+    }  # fmt: skip
+    assert {"rpm", "mm"} <= units
+    assert not {"rad/s", "m", "N"} & units
+    written = [line.text for panel in ff.figure(made("Loading")).panels for line in panel.lines]
+    assert all(text.endswith(" rpm") for text in written if text)
+    (over,) = ff.figure(made("ResponseFamily"), coordinate="main").panels
+    assert [unit for unit, _ in over.traces[0].x_also] == ["Hz", "rad/s"]
+
+
 def test_figures_of_a_journal_column(tmp_path) -> None:
     """84 mm wide, whatever the result, and below each other what stood side by side."""
     for name in MADE:

@@ -79,7 +79,7 @@ def _amplitudes(
     if (marks.lower, marks.upper) == (marks.omega_ea, marks.omega_ar):
         ends = ("w_ea", "w_ar")
     lines = tuple(
-        Line("x", at, f"{end} {at:.4g}".strip(), "mark")
+        Line("x", at, f"{end} {at:.4g} rad/s".strip(), "mark")
         for end, at in zip(ends, (low, high), strict=True)
     )
     return Panel(

@@ -16,11 +16,14 @@ from flipflow.plotting.scales import DEGREES, HZ, KN, MM, RPM
 
 Units = Literal["engineering", "SI", "dimensionless"]
 Way = Callable[[Any], Any]  # from a number in an axis' unit to one in another
-# What one of an axis' unit is in SI, and the SI unit.
+# What one of an axis' unit is in another, and that unit. Figures of the paper stand over rad/s.
+TO_ENGINEERING = {"rad/s": (RPM, "rpm")}
 TO_SI = {
     "mm": (1.0 / MM, "m"), "um": (1e-6, "m"), "kN": (1.0 / KN, "N"), "rpm": (1.0 / RPM, "rad/s"),
-    "Hz": (1.0 / HZ, "rad/s"), "deg": (1.0 / DEGREES, "rad"), "kW": (1e3, "W"),
+    "rad/s": (1.0, "rad/s"), "Hz": (1.0 / HZ, "rad/s"), "deg": (1.0 / DEGREES, "rad"),
+    "kW": (1e3, "W"),
 }  # fmt: skip
+TO = {"engineering": TO_ENGINEERING, "SI": TO_SI, "dimensionless": TO_SI}
 WORDS = {
     "shaft speed": "angular frequency", "frequency": "angular frequency",
     "shaft angle": "phase of the force",
@@ -57,9 +60,7 @@ def speed_of(owner: object, omega: float) -> str:
 
 
 def in_units(figure: Figure, units: str) -> Figure:
-    """The figure, which is drawn in an engineer's units, in others."""
-    if units == "engineering":
-        return figure
+    """The figure, which is drawn in an engineer's units or over rad/s, in those asked for."""
     panels = tuple(_rescaled(panel, units) for panel in figure.panels)
     return dataclasses.replace(figure, panels=panels)
 
@@ -67,7 +68,7 @@ def in_units(figure: Figure, units: str) -> Figure:
 def _rescaled(panel: Panel, units: str) -> Panel:
     (x, across), (y, upwards) = (_axis_in(axis, units) for axis in (panel.x, panel.y))
     scale = {"x": across, "y": upwards}
-    if (x, y) == (panel.x, panel.y) and units == "SI":
+    if (x, y) == (panel.x, panel.y) and units != "dimensionless":
         return panel
 
     def moved(part: Any, **ways: Way) -> Any:
@@ -77,14 +78,15 @@ def _rescaled(panel: Panel, units: str) -> Panel:
 
     def trace_in(trace: Trace) -> Trace:
         known: Trace = moved(trace, x=across, y=upwards, lower=upwards)
-        return dataclasses.replace(known, x_also=())
+        also = (*(one for one in trace.x_also if one[0] != x.unit), (panel.x.unit, trace.x))
+        return dataclasses.replace(known, x_also=also if units == "engineering" else ())
 
     def line_in(line: Line) -> Line:
         known: Line = moved(line, at=scale[line.axis])
         words, _, unit = line.text.rpartition(" ")
-        if unit not in TO_SI:
+        if unit not in TO[units]:
             return known
-        value, to = f"{known.at:.4g}", TO_SI[unit][1] if units == "SI" else ""
+        value, to = f"{known.at:.4g}", "" if units == "dimensionless" else TO[units][unit][1]
         text = " ".join(filter(None, (words.rpartition(" ")[0], value, to)))
         return dataclasses.replace(known, text=text)
 
@@ -103,8 +105,8 @@ def _rescaled(panel: Panel, units: str) -> Panel:
 
 
 def _axis_in(axis: Axis, units: str) -> tuple[Axis, Way]:
-    """The axis in SI, or without a unit, and the way there of what is drawn."""
-    factor, unit = TO_SI.get(axis.unit, (1.0, axis.unit))
+    """The axis in other units, or without one, and the way there of what is drawn."""
+    factor, unit = TO[units].get(axis.unit, (1.0, axis.unit))
     shift = math.log10(factor)
 
     def way(value: Any) -> Any:
@@ -115,6 +117,9 @@ def _axis_in(axis: Axis, units: str) -> tuple[Axis, Way]:
     ticks = axis.ticks if factor == 1.0 else ()
     if axis.decades and bounds is not None:
         ticks = decade_ticks(math.ceil(bounds[0]), math.floor(bounds[1]))
-    label = WORDS.get(axis.label, axis.label)
-    known = unit if units == "SI" or axis.unit in ("", "%") else ""
+    if units == "engineering":
+        label = "shaft speed" if axis.unit == "rad/s" else axis.label
+    else:
+        label = WORDS.get(axis.label, axis.label)
+    known = "" if units == "dimensionless" and axis.unit not in ("", "%") else unit
     return Axis(label, known, bounds, ticks, axis.decades), way
