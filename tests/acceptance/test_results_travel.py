@@ -250,6 +250,19 @@ def test_every_figure_of_a_screen_is_in_an_engineers_units() -> None:
     assert [unit for unit, _ in over.traces[0].x_also] == ["Hz", "rad/s"]
 
 
+def test_what_is_shown_by_single_marks_is_seen() -> None:
+    """Of a share of few machines no drawing showed mark and interval; of a sweep, half the ends."""
+    (few,) = ff.figure(made("Tolerance")).panels
+    interval, share = few.traces
+    assert share.x.size == 1
+    assert interval.x.tolist() == [1.0, 1.0]
+    close("interval, %", interval.y, 100.0 * made("Tolerance").share_interval[0], rel=1e-12)
+    (speeds,) = ff.figure(made("Sweep")).panels
+    ends = [trace.x for trace in speeds.traces]
+    assert speeds.x.bounds[0] < min(map(np.min, ends))
+    assert speeds.x.bounds[1] > max(map(np.max, ends))
+
+
 def test_figures_of_a_journal_column(tmp_path) -> None:
     """84 mm wide, whatever the result, and below each other what stood side by side."""
     for name in MADE:

@@ -109,6 +109,14 @@ def test_marks_stand_along_a_line_and_none_where_it_has_no_point():
     assert paths(drawn(Panel(X, Y, (nothing, nothing))), fill="white") == []
 
 
+@pytest.mark.parametrize("length", [0.0, 0.1])
+def test_a_line_too_short_for_the_first_mark_has_one(length):
+    x = np.array([5.0, 5.0 + length])
+    line = Trace("a", x, x, colour="main", symbol="triangle")
+    (marks,) = paths(drawn(Panel(X, Y, (line,))), fill="white")
+    assert marks.count("M") == 1
+
+
 def test_cells_of_a_kind_are_one_path():
     cells = Cells(np.arange(4.0), np.arange(3.0), np.array([[0, 1, 1], [0, 0, 1]]),
                   ("case 0", "case 1"))  # fmt: skip

@@ -231,11 +231,11 @@ def _dashed(name: str, width: float) -> str:
 
 
 def _along(x: Real, y: Real, first: float, apart: float) -> tuple[Real, Real]:
-    """The points of a line that are next to every ``apart`` pixels of its length."""
+    """The points of a line that are next to every ``apart`` pixels of its length, one at least."""
     drawn = np.isfinite(x) & np.isfinite(y)
     x, y = x[drawn], y[drawn]
     length = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
-    places = np.arange(first, length[-1], apart)
+    places = np.arange(min(first, 0.5 * length[-1]), length[-1] + 1e-9 * apart, apart)
     chosen = np.unique(np.abs(length[:, None] - places).argmin(axis=0))
     return x[chosen], y[chosen]
 

@@ -16,6 +16,7 @@ from flipflow.plotting.response import coordinates, label, speed_axis, underlay
 from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.transient.sweep import Sweep
 
+BESIDE = 0.02  # share of the speeds shown beside the first and the last symbol
 SYMBOLS = ("circle-open", "square-open", "cross", "diamond", "triangle")
 NOT_SETTLED = {
     "periodic": "not settled, periodic",
@@ -55,8 +56,10 @@ def sweep_figure(
     drawn = np.concatenate([trace.y for trace in traces])
     top = drawn.max(initial=0.0, where=np.isfinite(drawn)) or 1.0
     omega = np.concatenate([sweep.omega for sweep in sweeps])
+    beyond = BESIDE * np.ptp(omega)
+    ends = float(omega.min() - beyond) * RPM, float(omega.max() + beyond) * RPM
     panel = Panel(
-        speed_axis(omega), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * float(top))),
+        speed_axis(omega, ends), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * float(top))),
         traces=tuple(traces),
     )  # fmt: skip
     caption = "Symbols: what the machine settles to, each speed reached from the one before."

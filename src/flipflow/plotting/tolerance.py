@@ -32,13 +32,16 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
     band = Trace("95 % confidence", factors, high, "case band", "case band", lower=low)
     met = limits_in_words(found.limits, found.checked)
     alone = factors.size == 1  # a list of machines, or too few of them to be weighted
+    if alone:
+        ends = np.concatenate([low, high])
+        band = Trace("95 % confidence", np.repeat(factors, 2), ends, colour="gap", bold=True)
     line = Trace(
         f"share that meets {met}", factors, share, colour="relative", bold=True,
         symbol="circle" if alone else None,
     )  # fmt: skip
     above = Panel(
         Axis("all tolerances times", ""), Axis("machines that pass", "%", (0.0, 102.0)),
-        (band, line), lines=(Line("x", 1.0, "as given", "mark"),),
+        (band, line), lines=() if alone else (Line("x", 1.0, "as given", "mark"),),
     )  # fmt: skip
     rows = [i for i in range(len(found.names)) if np.isfinite(found.halved[i, at])]
     order = sorted(rows, key=lambda i: -found.gain[i, at])
