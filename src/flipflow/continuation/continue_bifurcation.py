@@ -78,6 +78,7 @@ AT_LOWER_JUMP = (
     "The multipliers jump past their critical value where a stop that is touched already in the "
     "turn begins to be touched once more: no motion has it, and there is no curve to follow."
 )
+NO_CURVE = (AT_LOWER_CORNER, AT_LOWER_JUMP)
 
 
 def continue_bifurcation(
@@ -376,7 +377,7 @@ def _followed(
             if kept.start - 1 <= one.index < kept.stop
         ),
         status=_ended(solver, traced, kept, orbits, plane),
-        notes=(*notes, *unsettled),
+        notes=(*(one for one in notes if not (orbits and one in NO_CURVE)), *unsettled),
     )  # fmt: skip
 
 
