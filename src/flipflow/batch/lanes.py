@@ -55,6 +55,16 @@ class Capture:
             np.concatenate([self.owner, other.owner]),
         )
 
+    def apart_from(self, states: Real, share: float) -> Capture:
+        """The same with every ellipsoid so small that states (K, 2 N) lie 1 / share or more off.
+
+        Distances are sqrt((z - centre)^T form (z - centre)), 1 on the ellipsoid.
+        """
+        off = states - self.centre[:, None]
+        square = np.einsum("aki,aij,akj->ak", off, self.form, off).min(axis=1, initial=np.inf)
+        larger = np.maximum(1.0 / (share * share * square), 1.0)
+        return Capture(self.centre, self.form * larger[:, None, None], self.owner)
+
 
 @dataclass(frozen=True, eq=False)
 class Run:

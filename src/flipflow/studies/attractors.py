@@ -20,6 +20,7 @@ from flipflow.studies.periodic_orbits import MOST_PERIODS, attracting_orbits
 from flipflow.transient.settling import Settling, is_stable
 
 TRIED_STATES = 16  # unsettled lanes, or twice as many, from which a motion is solved for
+NEAREST = 0.5  # share of the way to another stable motion that a neighbourhood reaches
 FIRST_SHARE = 64  # lanes, or twice as many, that go first
 
 
@@ -66,7 +67,9 @@ class Attractors:
         capture = capture_of(self.lanes, point, phases, label, self._rng)
         if capture is None:
             return None
-        self.capture = self.capture.joined(capture)
+        for one in self.orbits:
+            capture = capture.apart_from(self._settling.phases(one.point), NEAREST)
+        self.capture = self.capture.apart_from(phases, NEAREST).joined(capture)
         self.orbits.append(Orbit(self.machine, point))
         return label
 
@@ -97,7 +100,7 @@ class Attractors:
         )  # fmt: skip
         first = np.arange(0, count, max(count // FIRST_SHARE, 1))
         rest = np.setdiff1d(np.arange(count), first)
-        done = 0
+        done, known = 0, self.capture
         for wave in (first, rest):
             base, share = done / count, wave.size / count
 
@@ -108,16 +111,25 @@ class Attractors:
             run = self.lanes.settle(states[wave], starts[wave], self.capture, most, say)
             _write(whole, wave, run)
             while not run.cancelled and self._found_further(run):
-                run = self._again(run, states[wave], starts[wave], most)
+                run = self._again(run, states[wave], starts[wave], most, _unsettled(run))
                 _write(whole, wave, run)
             if run.cancelled:
                 return Run(whole.states, whole.label, whole.turns, whole.code, cancelled=True)
             done += wave.size
-        return whole
+        return self._again(whole, states, starts, most, np.isin(whole.label, self._shrunk(known)))
 
-    def _again(self, run: Run, states: Real, starts: Real, most: int) -> Run:
-        """Lanes that nothing caught, run anew: a motion found since may catch them early."""
-        open_ = np.flatnonzero(_unsettled(run))
+    def _shrunk(self, known: Capture) -> NDArray[np.int64]:
+        """Owners of neighbourhoods that motions found since have made smaller."""
+        smaller = (self.capture.form[: known.owner.size] != known.form).any(axis=(1, 2))
+        return np.asarray(known.owner[smaller])
+
+    def _again(
+        self, run: Run, states: Real, starts: Real, most: int, which: NDArray[np.bool_]
+    ) -> Run:
+        """Some lanes run anew, with the motions that are known by now."""
+        open_ = np.flatnonzero(which)
+        if open_.size == 0:
+            return run
         more = self.lanes.settle(states[open_], starts[open_], self.capture, most)
         _write(run, open_, more)
         return run

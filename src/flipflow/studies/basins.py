@@ -158,8 +158,9 @@ def basins(
     """Which of the coexisting motions each state of a grid settles on.
 
     Every state is run by the exact flow, turn after turn, until it enters a neighbourhood of a
-    stable motion from which nothing leaves (see :doc:`/methods/basins`). States that settle on none
-    of the motions known beforehand are searched for further ones, of up to twelve forcing periods.
+    stable motion from which, as far as was tried, nothing leaves (see :doc:`/methods/basins`).
+    States that settle on none of the motions known beforehand are searched for further ones, of up
+    to twelve forcing periods.
 
     Parameters
     ----------
