@@ -13,6 +13,7 @@ from flipflow.errors import InputError
 from flipflow.model.parameters import with_values
 from flipflow.studies.sensitivity_samples import motion_values, question_of
 from flipflow.studies.worst_case import Search
+from judge import close
 
 pytestmark = pytest.mark.numerical
 
@@ -104,6 +105,16 @@ def test_no_corner_and_no_machine_within_exceeds_it(screen, branch):
     values = motion_values(question, columns, 1, lambda _: None)
     assert (np.nanmax(values, axis=0) <= found.greatest * (1.0 + 1e-9)).all()
     assert (np.nanmin(values, axis=0) >= found.least * (1.0 - 1e-9)).all()
+
+
+@pytest.mark.parametrize("branch", ["from-below", "upper", "lower"])
+def test_the_machine_itself_is_looked_at_on_the_motion_of_its_variants(screen, branch):
+    """Where motions lean it had no value, and elsewhere one of another motion than they have."""
+    leaning = screen.replace(clearance=2e-3)
+    around = {"clearance": (1.9999e-3, 2.0001e-3)}
+    case = ff.worst_case(leaning, around, "relative_amplitude", [57.7], branch=branch)
+    assert case.least < case.nominal < case.greatest
+    close("between", case.nominal, 0.5 * (case.least + case.greatest), rel=1e-6)
 
 
 def test_machines_that_nobody_chose():

@@ -212,9 +212,10 @@ def sensitivity(
         Called with a sentence and the share done, 0 to 1. What it raises ends the work.
     branch
         The motion that is meant where several exist: ``"from-below"`` is met when the speed is
-        raised slowly, ``"upper"`` and ``"lower"`` are the largest and the smallest relative
-        amplitude of those motions of the branch that are not unstable; of a machine that is no
-        screen, amplitude of the coordinate of its peak.
+        raised slowly, ``"upper"`` and ``"lower"`` are of this one and that met when it is lowered
+        the one of larger and of smaller relative amplitude; of a machine that is no screen,
+        amplitude of the coordinate of its peak. A motion between folds that neither way meets is
+        none of them.
 
     Returns
     -------
@@ -239,7 +240,7 @@ def sensitivity(
     groups = checked_count("n", n, N_MOST, least=LEAST_GROUPS)
     generator = checked_generator(rng)
     checked_monitor(monitor)
-    nominal = nominal_values(question)
+    nominal = nominal_values(question, tuple(one.name for one in varied))
     points = saltelli_sample(len(varied), groups, generator)
     u = points.reshape(-1, len(varied))
     columns = {one.name: one.distribution.quantile(u[:, i]) for i, one in enumerate(varied)}
@@ -271,7 +272,7 @@ def one_at_a_time(machine: Machine, vary: Vary, quantity: str, omega: float) -> 
     """
     question = question_of(machine, quantity, omega, "from-below")
     varied = variations(vary, machine)
-    nominal = nominal_values(question)
+    nominal = nominal_values(question, tuple(one.name for one in varied))
     rows = _ends(machine, varied)
     ends = np.concatenate(list(_values(question, rows, nominal, 1, None)), axis=1)[:, 0]
     return OneAtATime(

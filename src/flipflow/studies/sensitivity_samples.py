@@ -21,7 +21,7 @@ from flipflow.model.arguments import (
     checked_word,
 )
 from flipflow.model.fields import FIELD
-from flipflow.model.parameters import with_values
+from flipflow.model.parameters import value_of, with_values
 from flipflow.model.quantities import (
     BranchWord,
     Quantity,
@@ -101,8 +101,14 @@ def question_of(machine: Machine, name: str, omega: object, branch: BranchWord) 
     return Question(machine, quantity, frequencies, wide, branch)
 
 
-def nominal_values(question: Question) -> Real:
-    """The quantity of the machine itself, (1, K); a machine that cannot be solved at all raises."""
+def nominal_values(question: Question, names: Sequence[str]) -> Real:
+    """The quantity of the machine itself, (1, K), on the motion that is meant of its samples, too.
+
+    ``names`` are of what is varied. A machine that cannot be solved at all raises.
+    """
+    if of_one_motion(question.quantity) and not question.in_closed_form(names):
+        own = {names[0]: np.array([value_of(question.machine, names[0])])}
+        return motion_values(question, own, 1, lambda _: None)
     try:
         values = [list(values_of(question, question.machine))]
     except IncompleteError:

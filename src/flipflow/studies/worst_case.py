@@ -235,7 +235,7 @@ class Search:
         inside = (self.own >= self.low) & (self.own <= self.high)
         self.start = np.where(inside, self.own, 0.5 * (self.low + self.high))
         self.middle = ((self.start - self.low) / (self.high - self.low)).round(DIGITS)
-        self.nominal = nominal_values(question)
+        self.nominal = nominal_values(question, names)
         self.u = np.zeros((0, len(names)))
         self.values = np.zeros((0, question.omega.size))
         self.error = np.zeros(question.omega.size)
