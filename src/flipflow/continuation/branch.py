@@ -333,7 +333,11 @@ class Branch(Frozen, Result):
         return tuple(runs)
 
     def orbit_from_below(self, omega: float) -> Orbit | None:
-        """The motion met at ``omega`` when the speed is raised slowly from below."""
+        """The motion of this branch met at ``omega`` when the speed is raised slowly from below.
+
+        Where it is unstable the machine has left it for one that is not on this branch, such as a
+        leaning one behind a symmetry breaking: :func:`~flipflow.sweep` flies there.
+        """
         omega = checked_speed(omega)
         for k, run in enumerate(self.rising_path):
             low = self.omega[run.start] if k == 0 else self._end_of(self.rising_path[k - 1])

@@ -138,7 +138,8 @@ _ALL = (
     ),
     Quantity(
         "relative_offset", "offset of the relative motion", "|x2|mid", "m", "mm",
-        "How far the middle of the motion between the frames lies from where they hang at rest.",
+        "How far the middle of the motion between the frames lies from where they hang at rest, to "
+        "either side.",
     ),
     Quantity(
         "relative_phase", "relative phase", "phi2", "rad", "deg",
