@@ -7,8 +7,9 @@ flow; what repeats after up to twelve periods is looked for in ``periodic_orbits
 that is not listed is printed with the number of its machine.
 
 With ``--scipy`` each is run at one speed from two states by the event-located integration of
-``tests/reference``, until it comes ever closer to a stable motion of the list, or repeats itself
-elsewhere. What does neither is counted as undecided: it is chaotic, say, or decays slowly.
+``tests/reference``, until it is within 1e-3 of a stable motion of the list and nearer than a turn
+before, or repeats itself elsewhere. What does neither is counted as undecided: it is chaotic, say,
+or decays slowly.
 """
 
 import argparse
@@ -143,8 +144,8 @@ def main():
                 print(json.dumps(one), file=sys.stderr, flush=True)
     share = 1.0 - lost / max(seen, 1)
     seconds = time.perf_counter() - start
-    counts = f"{seen - lost} of {seen} motions listed ({share:.2%}), {open_} undecided"
-    print(f"{counts}, {seconds:.0f} s")
+    what = f"states end at motions listed, {open_} undecided" if options.scipy else "motions listed"
+    print(f"{seen - lost} of {seen} {what} ({share:.2%}), {seconds:.0f} s")
 
 
 if __name__ == "__main__":

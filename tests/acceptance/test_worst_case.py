@@ -109,7 +109,7 @@ def test_no_corner_and_no_machine_within_exceeds_it(screen, branch):
 
 @pytest.mark.parametrize("branch", ["from-below", "upper", "lower"])
 def test_the_machine_itself_is_looked_at_on_the_motion_of_its_variants(screen, branch):
-    """Where motions lean it had no value, and elsewhere one of another motion than they have."""
+    """Where motions lean it had no value."""
     leaning = screen.replace(clearance=2e-3)
     around = {"clearance": (1.9999e-3, 2.0001e-3)}
     case = ff.worst_case(leaning, around, "relative_amplitude", [57.7], branch=branch)

@@ -23,6 +23,7 @@ from flipflow.periodic.turn_by_turn import NOT_SETTLED, settle_lanes
 
 Int = NDArray[np.int64]
 CHUNK = 64  # lanes that one task of a thread runs
+ROUNDING = 1e-9  # of a square distance from a centre
 MOST_THREADS = 256  # that may be asked for
 
 
@@ -55,13 +56,23 @@ class Capture:
             np.concatenate([self.owner, other.owner]),
         )
 
+    def holds(self, states: Real, labels: Int) -> NDArray[np.bool_]:
+        """Whether an ellipsoid with its label holds each state, (K,), but for rounding."""
+        held = np.zeros(labels.size, bool)
+        for centre, form, owner in zip(self.centre, self.form, self.owner, strict=True):
+            own = labels == owner
+            off = states[own] - centre
+            held[own] |= np.einsum("ki,ij,kj->k", off, form, off) <= 1.0 + ROUNDING
+        return held
+
     def apart_from(self, states: Real, share: float) -> Capture:
         """The same with every ellipsoid so small that states (K, 2 N) lie 1 / share or more off.
 
         Distances are sqrt((z - centre)^T form (z - centre)), 1 on the ellipsoid.
         """
         off = states - self.centre[:, None]
-        square = np.einsum("aki,aij,akj->ak", off, self.form, off).min(axis=1, initial=np.inf)
+        square = np.einsum("aki,aij,akj->ak", off, self.form, off)
+        square = np.fmin.reduce(square, axis=1, initial=np.inf)  # NaN: too far off for a square
         larger = np.maximum(1.0 / (share * share * square), 1.0)
         return Capture(self.centre, self.form * larger[:, None, None], self.owner)
 

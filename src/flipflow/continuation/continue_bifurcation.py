@@ -52,7 +52,7 @@ TESTS = {
 }  # fmt: skip
 CREEPING = 1e-6  # share of the bounds below which a step leads hardly on
 CRITICAL = 1e-3  # distance of multipliers from critical ones beyond which a map has none
-SETTLED = 1e-6  # the same where a fold of the map was found to rounding
+SETTLED = 1e-6  # the same of a special point of the map that was found to rounding
 BESIDE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4)  # shares of the speed within which one is looked for
 FINE = 20.0  # steps in each of these intervals
 NEAR = 1e-6  # share of the bounds within which a motion with that multiplier is looked for
@@ -76,7 +76,7 @@ AT_JUMP = (
 
 AT_LOWER_JUMP = (
     "The multipliers jump past their critical value where a stop that is touched already in the "
-    "turn begins to be touched once more: no motion has it, and there is no curve to follow."
+    "turn begins to be touched once more: no motion has that value, and there is no curve."
 )
 NO_CURVE = (AT_LOWER_CORNER, AT_LOWER_JUMP)
 
@@ -321,7 +321,7 @@ def _plane(orbit: Orbit, names: tuple[str, str], bounds: object) -> Plane:
 def _jumps(point: SpecialPoint, plane: Plane) -> bool:
     """Whether multipliers jump past their critical value at a grazing: no motion has it itself."""
     test = TESTS[point.kind]
-    if test not in (FLIP, PAIR) or _is_critical(point.orbit.point, test):
+    if test not in (FLIP, PAIR) or _is_critical(point.orbit.point, test, within=SETTLED):
         return False
     if _grazed(*_exact_start(point)) is None:
         return False

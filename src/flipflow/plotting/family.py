@@ -22,7 +22,7 @@ from flipflow.plotting.response import (
     quantity_label,
     stability_key,
 )
-from flipflow.plotting.scales import MM
+from flipflow.plotting.scales import HZ, MM, RPM
 from flipflow.studies.response_family import Member, ResponseFamily
 
 HEIGHT = 180
@@ -91,8 +91,9 @@ def branch_traces(
         omega = np.array([fold.omega for fold in branch.folds])
         height = np.array([fold.amplitude(which) for fold in branch.folds]) * MM
         yield Trace(
-            "fold", omega, height, "point", case_colour(index), symbol="cross", legend=False
-        )
+            "fold", omega, height, "point", case_colour(index), symbol="cross", legend=False,
+            x_also=(("rpm", omega * RPM), ("Hz", omega * HZ)),
+        )  # fmt: skip
 
 
 def beneath_traces(

@@ -56,8 +56,8 @@ def sweep_figure(
     drawn = np.concatenate([trace.y for trace in traces])
     top = drawn.max(initial=0.0, where=np.isfinite(drawn)) or 1.0
     omega = np.concatenate([sweep.omega for sweep in sweeps])
-    beyond = BESIDE * np.ptp(omega)
-    ends = float(omega.min() - beyond) * RPM, float(omega.max() + beyond) * RPM
+    beyond = BESIDE * (np.ptp(omega) or omega.max())
+    ends = max(float(omega.min() - beyond), 0.0) * RPM, float(omega.max() + beyond) * RPM
     panel = Panel(
         speed_axis(omega, ends), Axis(f"{label(chosen)} amplitude", "mm", (0.0, 1.08 * float(top))),
         traces=tuple(traces),

@@ -78,8 +78,10 @@ def _rescaled(panel: Panel, units: str) -> Panel:
 
     def trace_in(trace: Trace) -> Trace:
         known: Trace = moved(trace, x=across, y=upwards, lower=upwards)
-        also = (*(one for one in trace.x_also if one[0] != x.unit), (panel.x.unit, trace.x))
-        return dataclasses.replace(known, x_also=also if units == "engineering" else ())
+        also = trace.x_also if units == "engineering" else ()
+        if also and x != panel.x:
+            also = (*(one for one in also if one[0] != x.unit), (panel.x.unit, trace.x))
+        return dataclasses.replace(known, x_also=also)
 
     def line_in(line: Line) -> Line:
         known: Line = moved(line, at=scale[line.axis])

@@ -8,11 +8,12 @@ gives a form V(z) = (z - c)^T P (z - c) that falls over every period close to th
 slow multiplier leaves V hardly any room to fall, M is that of up to sixteen periods: what is back
 in the ellipsoid after them goes to the motion, wherever it was in between. More periods are watched
 as well where V falls from no size on: a motion that rests at a gap has another map on each side,
-and only one of them is M. How far that holds is
-found by trying: the ellipsoid grows, or shrinks, until V falls along the exact flow from every one
-of a few hundred states on it and within it, and from those climbed to where it falls least: near an
-unstable motion within it, or in the small basin of another one, V does not fall, and few of many
-states lie there. Displacements are scaled by the motion's size, velocities by that times omega.
+and only one of them is M. How far that holds is found by trying: the ellipsoid grows, or shrinks,
+until V falls along the exact flow from every one of a few hundred states on it and within it, and
+from those climbed to where it falls least, there at the latest after sixteen times as many periods.
+Near an unstable motion within it, or in a small basin of another one, V does not fall, and few of
+many states lie there. Displacements are scaled by the motion's size, velocities by that times
+omega.
 """
 
 from __future__ import annotations

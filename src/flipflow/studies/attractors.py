@@ -53,6 +53,7 @@ class Attractors:
         self.lanes = Lanes(self.system, omega, threads)
         self.capture = Capture.nothing(2 * self.system.size)
         self.orbits: list[Orbit] = []
+        self._bare: list[Real] = []  # states of stable motions without a neighbourhood
         self._settling = Settling(self.system, MOST_PERIODS)
         for orbit in found:
             self.add(orbit.point)
@@ -64,12 +65,14 @@ class Attractors:
             return known
         label = len(self.orbits)
         phases = self._settling.phases(point)
+        self.capture = self.capture.apart_from(phases, NEAREST)
         capture = capture_of(self.lanes, point, phases, label, self._rng)
         if capture is None:
+            self._bare.append(phases)
             return None
-        for one in self.orbits:
-            capture = capture.apart_from(self._settling.phases(one.point), NEAREST)
-        self.capture = self.capture.apart_from(phases, NEAREST).joined(capture)
+        for others in (*(self._settling.phases(one.point) for one in self.orbits), *self._bare):
+            capture = capture.apart_from(others, NEAREST)
+        self.capture = self.capture.joined(capture)
         self.orbits.append(Orbit(self.machine, point))
         return label
 
@@ -100,7 +103,7 @@ class Attractors:
         )  # fmt: skip
         first = np.arange(0, count, max(count // FIRST_SHARE, 1))
         rest = np.setdiff1d(np.arange(count), first)
-        done, known = 0, self.capture
+        done = 0
         for wave in (first, rest):
             base, share = done / count, wave.size / count
 
@@ -111,25 +114,23 @@ class Attractors:
             run = self.lanes.settle(states[wave], starts[wave], self.capture, most, say)
             _write(whole, wave, run)
             while not run.cancelled and self._found_further(run):
-                run = self._again(run, states[wave], starts[wave], most, _unsettled(run))
+                run = self._again(run, states[wave], starts[wave], most)
                 _write(whole, wave, run)
             if run.cancelled:
                 return Run(whole.states, whole.label, whole.turns, whole.code, cancelled=True)
             done += wave.size
-        return self._again(whole, states, starts, most, np.isin(whole.label, self._shrunk(known)))
+        while self._let_go(whole).any():
+            whole = self._again(whole, states, starts, most)
+            self._found_further(whole)
+        return whole
 
-    def _shrunk(self, known: Capture) -> NDArray[np.int64]:
-        """Owners of neighbourhoods that motions found since have made smaller."""
-        smaller = (self.capture.form[: known.owner.size] != known.form).any(axis=(1, 2))
-        return np.asarray(known.owner[smaller])
+    def _let_go(self, run: Run) -> NDArray[np.bool_]:
+        """Lanes that a neighbourhood caught which is smaller by now, and no longer holds them."""
+        return np.asarray((run.label != NOT_SETTLED) & ~self.capture.holds(run.states, run.label))
 
-    def _again(
-        self, run: Run, states: Real, starts: Real, most: int, which: NDArray[np.bool_]
-    ) -> Run:
-        """Some lanes run anew, with the motions that are known by now."""
-        open_ = np.flatnonzero(which)
-        if open_.size == 0:
-            return run
+    def _again(self, run: Run, states: Real, starts: Real, most: int) -> Run:
+        """Lanes that nothing caught or holds, run anew: a motion found since may catch them."""
+        open_ = np.flatnonzero(_unsettled(run) | self._let_go(run))
         more = self.lanes.settle(states[open_], starts[open_], self.capture, most)
         _write(run, open_, more)
         return run

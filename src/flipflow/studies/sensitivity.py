@@ -215,7 +215,7 @@ def sensitivity(
         raised slowly, ``"upper"`` and ``"lower"`` are of this one and that met when it is lowered
         the one of larger and of smaller relative amplitude; of a machine that is no screen,
         amplitude of the coordinate of its peak. A motion between folds that neither way meets is
-        none of them.
+        none of them, but for ``jump_margin``, which looks at all of the branch that are stable.
 
     Returns
     -------

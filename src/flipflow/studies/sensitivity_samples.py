@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from flipflow.batch.side_by_side import processors, side_by_side
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
-from flipflow.continuation.frequency_response import first_unknowns, solver_for
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import (
     checked_count,
@@ -31,8 +30,6 @@ from flipflow.model.quantities import (
 )
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, system_of
-from flipflow.periodic.options import PiecewiseExact
-from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import UNSTABLE
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.landmarks import RESPONSE_VALUES, Response, analysed_range
@@ -102,12 +99,14 @@ def question_of(machine: Machine, name: str, omega: object, branch: BranchWord) 
 
 
 def nominal_values(question: Question, names: Sequence[str]) -> Real:
-    """The quantity of the machine itself, (1, K), on the motion that is meant of its samples, too.
+    """The quantity of the machine itself, (1, K), as it is found of samples that vary ``names``.
 
-    ``names`` are of what is varied. A machine that cannot be solved at all raises.
+    A machine without damping, and one whose response is asked for and cannot be followed, raise.
     """
-    if of_one_motion(question.quantity) and not question.in_closed_form(names):
-        own = {names[0]: np.array([value_of(question.machine, names[0])])}
+    own = {names[0]: np.array([value_of(question.machine, names[0])])}
+    if question.in_closed_form(names):
+        return closed_form_values(question, own, question.omega)
+    if of_one_motion(question.quantity):
         return motion_values(question, own, 1, lambda _: None)
     try:
         values = [list(values_of(question, question.machine))]
@@ -224,38 +223,13 @@ def workings(
     IncompleteError
         When a branch could not be followed.
     """
-    omega = question.omega.tolist()
-    below = question.branch == "from-below"
-    narrow = below and not question.quantity.of_folds
-    if response is None and narrow and len(set(omega)) == 1:
-        yield from [_if_kept(question, _reached(machine, omega[0]))] * len(omega)
-        return
-    if response is None:
-        response = Response(machine, (min(omega), max(omega)) if narrow else question.span)
+    response = response or Response(machine, question.span)
     branch = response.branch
-    for one in omega:
-        if below:
-            yield _if_kept(question, working_motion(machine, branch, one))
+    for omega in question.omega.tolist():
+        if question.branch == "from-below":
+            yield working_motion(machine, branch, omega)
         else:
-            yield _outermost(question, machine, branch, one)
-
-
-def _if_kept(question: Question, working: Working | None) -> Working | None:
-    """The motion where the machine keeps it: lanes, which settle, have no value of one it leaves.
-
-    How far a jump is away is asked of the branch, whatever the motion on it.
-    """
-    if working is None or question.quantity.of_folds:
-        return working
-    return None if working.orbit.stability == UNSTABLE else working
-
-
-def _reached(machine: Machine, omega: float) -> Working | None:
-    """The motion reached from below at one frequency, without a branch around it."""
-    solver = solver_for(system_of(machine), PiecewiseExact())
-    solver.system.require_damping()
-    point = solver.solve(first_unknowns(solver, omega), omega)
-    return None if point is None else Working(machine, Orbit(machine, point))
+            yield _outermost(question, machine, branch, omega)
 
 
 def _outermost(
