@@ -99,10 +99,7 @@ def question_of(machine: Machine, name: str, omega: object, branch: BranchWord) 
 
 
 def nominal_values(question: Question, names: Sequence[str]) -> Real:
-    """The quantity of the machine itself, (1, K), as it is found of samples that vary ``names``.
-
-    A machine without damping, and one whose response is asked for and cannot be followed, raise.
-    """
+    """The quantity of the machine itself, (1, K), as it is found of samples that vary ``names``."""
     own = {names[0]: np.array([value_of(question.machine, names[0])])}
     if question.in_closed_form(names):
         return closed_form_values(question, own, question.omega)
