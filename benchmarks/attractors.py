@@ -43,11 +43,9 @@ NEAR, REPEATS = 1e-3, 1e-6  # distances as shares of a state
 def settled_on(machine, omega, rng):
     """Points of the different motions that states of all sizes settle on."""
     settling = Settling(machine, PERIODS)
-    gaps = [abs(gap) for one in machine.springs for gap in one.gaps if np.isfinite(gap)]
     found = []
-    for _ in range(STATES):
-        size = 2.0 * max(gaps) * np.repeat([1.0, omega], machine.size)
-        end = settling.settle(rng.uniform(-1.0, 1.0, 2 * machine.size) * size, omega, TURNS)
+    for start in _starts(machine, omega, rng, STATES):
+        end = settling.settle(start, omega, TURNS)
         if not end.settled:
             continue
         phases = settling.phases(end.point)
@@ -66,15 +64,17 @@ def check_by_scipy(number, seed):
         settling.solver.section(one.state, omega, one.periods)
         for one in ff.periodic_orbits(machine, omega, PERIODS) if one.stable
     ]  # fmt: skip
-    ends = [_flown(machine, omega, start, listed) for start in _starts(machine, omega, rng)]
+    starts = _starts(machine, omega, rng, OF_SCIPY)
+    ends = [_flown(machine, omega, start, listed) for start in starts]
     missing = [(number, omega, end) for end in ends if end]
     return len(ends) - ends.count(None), missing, ends.count(None)
 
 
-def _starts(machine, omega, rng):
+def _starts(machine, omega, rng, count):
+    """States of all sizes up to twice the largest gap."""
     gaps = [abs(gap) for one in machine.springs for gap in one.gaps if np.isfinite(gap)]
     size = 2.0 * max(gaps) * np.repeat([1.0, omega], machine.size)
-    return rng.uniform(-1.0, 1.0, (OF_SCIPY, 2 * machine.size)) * size
+    return rng.uniform(-1.0, 1.0, (count, 2 * machine.size)) * size
 
 
 def _flown(machine, omega, z, listed):

@@ -456,10 +456,10 @@ def _where_it_holds(
     values = np.column_stack([traced.omega, traced.u[:, -1]])
     off = (values - plane.own) / np.ptp(plane.bounds, axis=1)
     creeps = np.abs(np.diff(off, axis=0)).max(axis=1, initial=0.0) < CREEPING
-    creeping = np.append(creeps, True) | np.insert(creeps, 0, True)
+    doubtful = np.append(creeps, True) | np.insert(creeps, 0, True)
     lost = np.array(
         [
-            not _holds(test, row) or bool(creeping[k] and not _is_critical(points[k], test))
+            not _holds(test, row) or bool(doubtful[k] and not _is_critical(points[k], test))
             for k, row in enumerate(solver.own_multipliers(traced))
         ]
     )

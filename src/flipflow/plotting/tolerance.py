@@ -26,9 +26,10 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
     known = np.isfinite(found.scaled[:, at])
     factors, share = found.factors[known], 100.0 * found.scaled[known, at]
     low, high = (100.0 * found.scaled_interval[known, at, k] for k in (0, 1))
-    own, interval = 100.0 * found.share[at], 100.0 * found.share_interval[at]
     if not known.any():
-        factors, share, low, high = np.ones(1), own[None], interval[:1], interval[1:]
+        interval = 100.0 * found.share_interval[at]
+        factors, share = np.ones(1), 100.0 * found.share[at : at + 1]
+        low, high = interval[:1], interval[1:]
     band = Trace("95 % confidence", factors, high, "case band", "case band", lower=low)
     met = limits_in_words(found.limits, found.checked)
     alone = factors.size == 1  # a list of machines, or too few of them to be weighted
@@ -47,20 +48,7 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
     order = sorted(rows, key=lambda i: -found.gain[i, at])
     panels: tuple[Panel, ...] = (above,)
     if order:
-        bars = tuple(_bar(found, i, at, float(len(order) - 1 - k)) for k, i in enumerate(order))
-        ticks = tuple(
-            (float(len(order) - 1 - k), symbol_of(found.names[i])) for k, i in enumerate(order)
-        )
-        reach = [bar.low for bar in bars] + [bar.high for bar in bars]
-        margin = max(0.25 * (max(reach) - min(reach)), 2.0)
-        panels += (
-            Panel(
-                Axis("machines that pass with one tolerance halved", "%",
-                     (max(min(reach) - margin, 0.0), max(reach) + margin)),
-                Axis("", "", (-0.6, len(order) - 0.4), ticks), bars=bars,
-                lines=(Line("x", own, "as given", "mark", "solid"),),
-            ),
-        )  # fmt: skip
+        panels += (_halved_panel(found, at, order),)
     caption = (
         f"{'Above: the' if order else 'The'} share of built machines that meet {met} in every "
         "load case, against a factor on all tolerances."
@@ -74,6 +62,22 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
         caption += " Other factors need machines drawn at random, and more of them."
     title = f"What tolerances cost{speed_in_words(found.omega[at])}"
     return Figure(title, caption, panels, height=300 + 60 + 30 * len(order))
+
+
+def _halved_panel(found: Tolerance, at: int, order: list[int]) -> Panel:
+    """The share with the tolerance of one field halved, a bar for each field."""
+    bars = tuple(_bar(found, i, at, float(len(order) - 1 - k)) for k, i in enumerate(order))
+    ticks = tuple(
+        (float(len(order) - 1 - k), symbol_of(found.names[i])) for k, i in enumerate(order)
+    )
+    reach = [bar.low for bar in bars] + [bar.high for bar in bars]
+    margin = max(0.25 * (max(reach) - min(reach)), 2.0)
+    return Panel(
+        Axis("machines that pass with one tolerance halved", "%",
+             (max(min(reach) - margin, 0.0), max(reach) + margin)),
+        Axis("", "", (-0.6, len(order) - 0.4), ticks), bars=bars,
+        lines=(Line("x", 100.0 * found.share[at], "as given", "mark", "solid"),),
+    )  # fmt: skip
 
 
 def _noise_words(found: Tolerance, at: int, order: list[int]) -> str:

@@ -212,10 +212,10 @@ def sensitivity(
         Called with a sentence and the share done, 0 to 1. What it raises ends the work.
     branch
         The motion that is meant where several exist: ``"from-below"`` is met when the speed is
-        raised slowly, ``"upper"`` and ``"lower"`` are of this one and that met when it is lowered
-        the one of larger and of smaller relative amplitude; of a machine that is no screen,
-        amplitude of the coordinate of its peak. A motion between folds that neither way meets is
-        none of them, but for ``jump_margin``, which looks at all of the branch that are stable.
+        raised slowly. Of this one and the one met when it is lowered, ``"upper"`` has the larger
+        relative amplitude and ``"lower"`` the smaller; of a machine that is no screen, amplitude of
+        the coordinate of its peak. A motion between folds that neither way meets is none of them;
+        ``jump_margin`` alone looks at all motions of the branch that are not unstable.
 
     Returns
     -------
