@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import flipflow as ff
 from flipflow.studies.lane_values import jump_distance
+from flipflow.transient import run_up
 from judge import close
 
 DOUBLING = 0.3934539  # where a motion of one period becomes one of two, rad/s
@@ -32,6 +34,19 @@ def test_a_start_swings_as_far_as_its_history(law: str) -> None:
     start = ff.start_up(screen, ff.SpeedProfile(times=(0, 1, 1.3), speeds=(0, 85.0, 85.0)))
     farthest = summits(start.history, "relative").max()
     close("peak", start.peaks["relative_amplitude"].value, farthest, rel=2e-3)
+
+
+@pytest.mark.parametrize("event", [2.05, 2.15, 2.4])
+def test_a_peak_beside_an_event_is_the_top_between_steps(event: float) -> None:
+    """A force with its top, 1 at 2.1, on either side of an event, where its slope changes."""
+    t = np.sort(np.concatenate([np.arange(0.25, 4.0, 0.5), [event, event]]))
+    after = np.arange(t.size) > int(np.flatnonzero(t == event)[0])
+    side = 1.0 if event < 2.1 else -1.0
+    smooth = 1.0 - (t - 2.1) ** 2
+    beyond = (after == (side < 0.0)) & (t != event)
+    force = np.where(beyond, smooth - 2.0 * np.abs(t - event), smooth)
+    found = run_up.top_between_steps(SimpleNamespace(t=t, omega=10.0 * t), force)
+    close("peak", [found.value, found.t, found.omega], [1.0, 2.1, 21.0], rel=1e-12)
 
 
 def test_a_glide_jumps_late_under_undamped_rebound_too() -> None:
@@ -207,3 +222,83 @@ def test_a_coordinate_may_have_a_unit_of_its_own(screen):
     plain, mixed = (branch.folds[0].sensitivity(names[:3]) for branch in branches)
     for name, got, expected in zip(names, mixed, plain, strict=False):
         close(f"slope of a fold, {name}", got, expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [1e-3, 1e-5, 1e-7, 0.0])
+def test_from_below_it_is_the_stable_motion_up_to_the_fold_itself(share: float) -> None:
+    """The motion on the other side of the fold is as near to the branch's points as this one."""
+    branch = ff.frequency_response(ff.load("ffs0827"), (150.0, 250.0))
+    fold = branch.folds[0]
+    motion = branch.orbit_from_below(fold.omega * (1.0 - share))
+    assert motion is not None
+    assert motion.stability == ("stable" if share else fold.orbit.stability)
+    # The amplitude rises above that of the fold by the root of the distance.
+    above = motion.amplitude("relative") - fold.amplitude("relative")
+    close("above the fold", above, 0.1205 * math.sqrt(share), rel=0.02)
+    largest = max(one.amplitude("relative") for one in branch.orbits_at(motion.omega))
+    close("of all", motion.amplitude("relative"), largest, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [1e-6, 3e-7, 1e-7])
+def test_motions_beside_a_fold_at_a_sharp_corner(share: float) -> None:
+    """Contact ends there. So near to it no solver finds the unstable motion, deep by 1e-9 m."""
+    screen = ff.FlipFlowScreen(
+        main_mass=220.63729131589594, floating_mass=23.666034101000168,
+        eccentric_moment=0.7402535932229624, isolation_stiffness=111174.94186199032,
+        isolation_damping=2013.1879506771068, shear_stiffness=471945.33918355516,
+        shear_damping=149.3413691881396, stop_stiffness=5056372.526790134,
+        stop_damping=3842.9063807647776, clearance=0.005754351282226189,
+        stop_law="undamped-rebound", normal_stiffness=125613.39803766452,
+        normal_damping=2699.829412557526, deck_angle=0.18775816119542021,
+        clearance_measured="drawn",
+    )  # fmt: skip
+    branch = ff.frequency_response(screen, (4.687830483745367, 587.4650336674362))
+    lower = min(branch.folds, key=lambda fold: fold.omega)
+    assert lower.position % 1.0 != 0.0
+    found = branch.orbits_at(lower.omega * (1.0 + share))
+    small, large = sorted(one.amplitude("relative") for one in found if one.stable)
+    close("without contact", small, lower.amplitude("relative"), rel=1e-5)
+    close("large", large, 8.530016e-3, rel=1e-5)
+
+
+def test_a_load_whose_effect_changes_its_sign_where_the_loaded_machine_jumps() -> None:
+    """At 207.3 rad/s, from 0.05 mm more to 11.6 mm less."""
+    screen = ff.FlipFlowScreen(
+        main_mass=4799.282216382459, floating_mass=2066.8533654571906,
+        eccentric_moment=18.67527525735126, isolation_stiffness=2461863.9181131846,
+        isolation_damping=43714.678362508166, shear_stiffness=33908528.963748366,
+        shear_damping=18439.23823803065, stop_stiffness=518308350.66615033,
+        stop_damping=487009.35461238853, clearance=0.008409863147571226,
+        clearance_minus=0.02081781131337687, stop_law="elasto-gap",
+        normal_stiffness=3385706.8216896914, normal_damping=32747.600687306836,
+        deck_angle=0.32276572987950175, clearance_measured="drawn",
+    )  # fmt: skip
+    load = ff.Load(
+        stiffness_factor=1.0130480837272404, damping_factor=1.0594368661872804,
+        stop_stiffness_factor=1.0095896414159848, main_mass=1123.8378362624583,
+        floating_mass=347.1767005358374,
+    )  # fmt: skip
+    stopped = ff.loading(screen, load).with_stop
+    assert stopped is not None
+    fold = next(one for one in stopped.loaded.folds if abs(one.omega - 207.278) < 1e-3)
+    before, after = (
+        stopped.loaded.orbit_from_below(fold.omega * (1.0 + side)).amplitude("relative")
+        for side in (-1e-9, 1e-9)
+    )
+    of_empty = stopped.unloaded.orbit_from_below(fold.omega).amplitude("relative")
+    close("before", before - of_empty, 0.05e-3, rel=0.1)
+    close("after", after - of_empty, -11.56e-3, rel=0.01)
+    assert abs(stopped.region.least.change) <= np.nanmin(np.abs(stopped.region.change))
+
+
+def test_a_region_that_the_speeds_analysed_may_cut_says_so() -> None:
+    """The peak is at 206.4 rad/s, and the jump as the speed falls at 198.6."""
+    screen, load = ff.load("ffs0827"), ff.Load(main_mass=100.0)
+    cut = ff.operating_region(screen, omega=(60.0, 200.0))
+    assert any("still grows at the highest speed analysed" in note for note in cut.notes)
+    loaded = ff.loading(screen, load, omega=(60.0, 200.0)).with_stop
+    assert loaded is not None
+    assert [note.partition(":")[0] for note in loaded.notes] == ["empty"], "100 kg lower the peak"
+    assert ff.loading(screen, load, omega=(60.0, 250.0)).with_stop.notes == ()
+    with pytest.raises(ff.InputError, match="the operating region without stop is 66"):
+        ff.loading(screen, load, omega=(95.0, 250.0))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flipflow as ff
+from judge import close
 
 pytestmark = pytest.mark.numerical
 
@@ -71,6 +72,20 @@ def test_spectrum_of_a_history_agrees_with_that_of_its_orbit(screen) -> None:
         assert lines.amplitudes[at] == pytest.approx(exact.amplitudes[k], rel=1e-4, abs=1e-9)
 
 
+@pytest.mark.parametrize("periods", [2, 3, 20])
+def test_a_mean_does_not_leak_into_the_lines_beside_it(screen, periods) -> None:
+    """Unequal gaps: the frames move about 2 mm beside where they rest."""
+    moved = screen.replace(clearance=3e-3, clearance_minus=9e-3)
+    orbit = ff.frequency_response(moved, (100.0, 140.0)).orbits_at(130.0)[0]
+    exact = ff.spectrum(orbit, "relative").amplitudes
+    history = ff.simulate(moved, 130.0, 40, initial=orbit)
+    lines = ff.spectrum(history, "relative", periods).amplitudes
+    close("mean and harmonics", lines[: 4 * periods : periods], exact[:4], rel=1e-4)
+    assert exact[0] > 1e-3
+    if periods > 2:
+        assert lines[1] < 1e-3 * exact[0], "half of a harmonic stands on either side of it alone"
+
+
 def test_bad_sections_and_spectra_are_refused(screen) -> None:
     with pytest.raises(ff.InputError, match="turns"):
         ff.poincare_section(screen, 120.0, 0)
@@ -79,6 +94,10 @@ def test_bad_sections_and_spectra_are_refused(screen) -> None:
         ff.spectrum(history, "relative")
     with pytest.raises(ff.InputError, match="periods"):
         ff.spectrum(ff.simulate(screen, 120.0, 10), "relative", periods=11)
+    with pytest.raises(ff.InputError, match="periods = 1: give a whole number from 2"):
+        ff.spectrum(ff.simulate(screen, 120.0, 10), "relative", periods=1)
+    with pytest.raises(ff.InputError, match="a history over 1': give a history of at least 2"):
+        ff.spectrum(ff.simulate(screen, 120.0, 1), "relative")
 
 
 def test_figures(tmp_path, screen) -> None:

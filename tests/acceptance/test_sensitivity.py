@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 
 import numpy as np
 import pytest
@@ -42,12 +41,10 @@ def linear():
 
 @pytest.fixture(scope="module")
 def figure_3(linear):
-    """The analysis behind Fig. 3 of the paper, and what it took: processor time in s."""
+    """The analysis behind Fig. 3 of the paper; benchmarks/sobol.py tells how long such take."""
     w01, w02 = ff.linear_response(linear, 1.0).natural_frequencies
     omega = np.linspace(w01, w02, 200)
-    begin = time.process_time()
-    result = ff.sensitivity(linear, about(linear, 0.05), "relative_amplitude", omega=omega)
-    return result, time.process_time() - begin
+    return ff.sensitivity(linear, about(linear, 0.05), "relative_amplitude", omega=omega)
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +53,9 @@ def with_stop(screen):
     return ff.sensitivity(screen, vary, "relative_amplitude", omega=120.0, n=64)
 
 
-def test_figure_3_within_ten_seconds(figure_3):
-    """7 fields at +-5 %, n = 4096, 200 frequencies: 36,864 machines at each.
-
-    Processor time, so that others at work on the machine do not count.
-    """
-    result, seconds = figure_3
-    assert seconds < 10.0
+def test_figure_3_is_of_all_its_machines(figure_3):
+    """7 fields at +-5 %, n = 4096, 200 frequencies: 36,864 machines at each."""
+    result = figure_3
     assert result.n == 4096
     assert result.total.shape == result.first_order.shape == (200, 7)
     assert result.total_confidence.shape == result.at_low.shape == (200, 7)
@@ -71,13 +64,23 @@ def test_figure_3_within_ten_seconds(figure_3):
     assert np.all(result.failed == 0.0)
 
 
+def test_intervals_of_few_samples_say_that_they_are_too_narrow(screen):
+    """Of 95 % those of n = 16 hold as little as four fifths: 60 seeds against n = 8192."""
+    vary = {"shear_stiffness": (2.5e6, 2.9e6)}
+    few, more = (
+        ff.sensitivity(screen, vary, "relative_amplitude", omega=120.0, n=n) for n in (16, 64)
+    )
+    assert any("too narrow: give n = 64 or more" in note for note in few.notes)
+    assert more.notes == ()
+
+
 def test_claims_s1_and_s2_hold_in_their_bands(figure_3):
     """k2 leads above about 35 rad/s, the floating mass is second above about 62 rad/s only.
 
     Both bands were found by an independent computation. The indices have a confidence of 0.024,
     and the curves cross at angles of 0.019 and 0.0074 per rad/s: 1.3 and 3.2 rad/s.
     """
-    result, _ = figure_3
+    result = figure_3
     order = np.argsort(-result.total, axis=1)
     below = result.omega < 105.0
     not_first = result.omega[below & (order[:, 0] != K2)]
@@ -87,7 +90,7 @@ def test_claims_s1_and_s2_hold_in_their_bands(figure_3):
 
 
 def test_claim_s3_both_are_largest_past_the_antiresonance(figure_3, linear):
-    result, _ = figure_3
+    result = figure_3
     omega_ar = ff.linear_response(linear, 1.0).omega_ar
     for i in (K2, M2):
         assert result.omega[result.total[:, i].argmax()] > omega_ar
@@ -372,7 +375,7 @@ def test_it_opens_as_it_was(tmp_path, with_stop, screen):
 
 
 def test_figures_and_blocks(tmp_path, figure_3, with_stop):
-    over, _ = figure_3
+    over = figure_3
     lines = ff.figure(over)
     assert {t.name for t in lines.panels[0].traces if t.legend} == {
         "m1", "m2", "m0r", "k1", "c1", "k2", "c2",

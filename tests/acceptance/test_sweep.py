@@ -186,6 +186,34 @@ def test_a_glide_that_ends_in_chaos_has_jumped():
     assert np.median(after) < 0.8 * before.min()
 
 
+@pytest.mark.parametrize("rate", [1.0, 4.0])
+def test_a_glide_jumps_where_its_motion_is_stable_no_more(rate):
+    """The period doubles at 205.7 rad/s; the fold at 168.7 is met with the large motion."""
+    screen = ff.FlipFlowScreen(
+        main_mass=14212.123808315207, floating_mass=3026.541132735635,
+        eccentric_moment=47.264710186366976, isolation_stiffness=1102300.4014089599,
+        isolation_damping=30337.559460684268, shear_stiffness=13435407.72120578,
+        shear_damping=12641.92385720453, stop_stiffness=252385147.01581198,
+        stop_damping=518071.01059662254, clearance=0.004126007171921958,
+        normal_stiffness=1191608.3811889258, normal_damping=14088.009063155085,
+        deck_angle=0.14654505410589155, clearance_measured="drawn",
+    )  # fmt: skip
+    glide = ff.ramp(screen, (212.0, 165.0), rate)
+    assert min(fold.omega for fold in glide.branch.folds) == pytest.approx(168.72, abs=0.01)
+    (jump,) = glide.jumps
+    assert jump.fold == pytest.approx(205.65, abs=0.01)
+    speed, size = glide.amplitude("relative")
+    first = speed[np.argmax(size > 6e-3)]
+    assert abs(jump.omega - first) < 0.5
+    assert 4.0 < jump.late < 15.0
+
+
+def test_a_glide_that_goes_over_into_two_turns_does_not_jump():
+    stop = ff.ClearanceSpring([1.0], 40.0, 0.06, 0.23, math.inf)
+    system = ff.MechanicalSystem([[1.0]], [[0.2357]], [[1.0]], [stop], ff.HarmonicForce([0.5]))
+    assert ff.ramp(system, (0.39, 0.397), 1e-5).jumps == ()
+
+
 def test_an_amplitude_that_no_turn_tells_is_not_a_number(tmp_path):
     """A mode that grows to infinity within a few turns."""
     machine = ff.MechanicalSystem([[1.0]], [[-0.2]], [[1.0]], (), ff.HarmonicForce([1.0]))

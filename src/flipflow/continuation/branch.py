@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import cast
 
 import numpy as np
+from numpy.linalg import norm
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
@@ -276,27 +277,51 @@ class Branch(Frozen, Result):
         solver, omega = self.formulation.solver(), float(omega)
         found: list[Orbit] = []
         for begin, end in self._passages(omega):
-            point = self._between_nodes(solver, begin, end, omega)
-            if point is None:
+            orbit = self._between_nodes(solver, begin, end, omega)
+            if orbit is None:
                 continue
-            same = any(np.allclose(point.u, one.unknowns, rtol=1e-7, atol=1e-12) for one in found)
-            if not same:
-                found.append(self._solved(point, rises=end[1] > begin[1]))
+            one = orbit.unknowns
+            if not any(np.allclose(one, each.unknowns, rtol=1e-7, atol=1e-12) for each in found):
+                found.append(orbit)
         return tuple(found)
 
     def _passages(self, omega: float) -> list[tuple[Node, Node]]:
         """Pairs of neighbours, points and folds, between which ``omega`` is passed."""
         inner = [fold for fold in self.folds if 0.0 < fold.position < self.omega.size - 1]
-        turns = [(fold.position, fold.omega) for fold in inner]
-        nodes = sorted([*enumerate(map(float, self.omega)), *turns])
+        turns = {fold.position: fold.omega for fold in inner}
+        nodes = sorted((dict(enumerate(self.omega.tolist())) | turns).items())
         return [
             pair
             for pair in pairwise(nodes)
             if pair[0][1] <= omega <= pair[1][1] or pair[1][1] <= omega <= pair[0][1]
         ]
 
-    def _between_nodes(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
+    def _between_nodes(self, solver: Solver, begin: Node, end: Node, omega: float) -> Orbit | None:
         """The motion at ``omega`` between two neighbours; None where it is not found."""
+        ends = (begin[0], end[0])
+        turns = [fold for fold in self.folds if fold.position in ends]
+        for fold in turns:
+            if fold.omega == omega:
+                return fold.orbit
+        point = None if turns else self._along_chord(solver, begin, end, omega)
+        point = point or self._along_branch(solver, begin, end, omega)
+        return None if point is None else self._solved(point, rises=end[1] > begin[1])
+
+    def _along_chord(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
+        """The motion at ``omega`` that Newton reaches from the chord of two points, if it is near.
+
+        At a fold the branch is as far from the chord as the motion on its other side.
+        """
+        p = int(begin[0])
+        chord = self.traced.u[p + 1] - self.traced.u[p]
+        span = end[1] - begin[1]
+        guess = self.traced.u[p] + ((omega - begin[1]) / span if span else 0.0) * chord
+        point = solver.solve(guess, omega)
+        near = point is not None and norm(point.u - guess) <= norm(chord)
+        return point if near else None
+
+    def _along_branch(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
+        """The motion at ``omega``, sought along the branch itself."""
         p = min(int(begin[0]), self.omega.size - 2)
         known = {node[0] - p: node[1] - omega for node in (begin, end)}
 
@@ -352,24 +377,27 @@ class Branch(Frozen, Result):
         return max([float(self.omega[last]), *folds])
 
     def solve_in(self, run: slice, omega: float) -> Orbit | None:
-        """The motion at exactly ``omega`` near a run of rising points."""
+        """The motion at exactly ``omega`` on the rising part of the branch that a run is of.
+
+        None where that part does not pass ``omega``.
+        """
         omega, n = checked_speed(omega), self.omega.size
         remedy = "give one of the branch's rising_path"
         checked_kind("run", run, slice, remedy)
         checked_index("run", run.start, n, remedy)
         checked_index("run", run.stop, n + 1, remedy)
-        if run.stop - run.start < 2:
+        # The part of the branch that rises into the run may begin at a fold before it.
+        falls = np.flatnonzero(np.diff(self.omega[: run.start + 1]) <= 0.0)
+        first = falls[-1] if falls.size else 0
+        rising = [
+            (begin, end)
+            for begin, end in self._passages(omega)
+            if begin[0] >= first and end[0] <= run.stop and end[1] > begin[1]
+        ]
+        if not rising:
             return None
-        at = np.clip(np.searchsorted(self.omega[run], omega) + run.start, 1, run.stop - 1)
-        before, after = int(at) - 1, int(at)
-        span = self.omega[after] - self.omega[before]
-        share = min((omega - self.omega[before]) / span, 1.0) if span else 0.0
-        guess = (1.0 - share) * self.traced.u[before] + share * self.traced.u[after]
         with self.formulation.lent() as solver:
-            point = solver.solve(guess, omega)
-        if point is None:
-            return None
-        return self._solved(point, rises=True)
+            return self._between_nodes(solver, *rising[-1], omega)
 
     def _solved(self, point: Point, *, rises: bool) -> Orbit:
         """A motion solved for on a part of the branch that rises or falls in omega.

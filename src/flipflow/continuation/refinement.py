@@ -170,7 +170,7 @@ def grazing_between(
             passed += 1
             near = near or (passed >= AGAIN and f <= GRAZED * abs(f_end))
         if code == status.OK and near:
-            share = min(abs(s) / chord, 1.0)
+            share = share_of_way(work, abs(s))
             return code, share if backwards else 1.0 - share
         if code != status.OK or f > 0.0:
             # Beyond the grazing a contact disturbs Newton's method.
@@ -178,6 +178,18 @@ def grazing_between(
             continue
         s_before, f_before, s = s, f, s - SHORT * f * (s - s_before) / (f - f_before)
     return status.NO_CONVERGENCE, 0.0
+
+
+@kernel
+def share_of_way(work: Corrector, gone: float) -> float:
+    """Share of the way round the point in work, from the last point to the one before it.
+
+    At a sharp corner both ways round it are longer than the chord.
+    """
+    square = 0.0
+    for k in range(work.w.shape[0]):
+        square += ((work.w[k] - work.behind[k]) / work.scale[k]) ** 2
+    return gone / (gone + math.sqrt(square)) if gone > 0.0 else 0.0
 
 
 @kernel

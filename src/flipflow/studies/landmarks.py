@@ -97,16 +97,27 @@ def landmarks(machine: Machine, branch: Branch) -> Landmarks:
     lb, ub = _main_folds(branch, peak)
     span = (float(branch.omega.min()), float(branch.omega.max()))
     upper = peak.omega if lb is None else lb
-    if cs is not None:
-        return Landmarks(ea, ar, cs, lb, ub, cs, upper)
     if touched:
-        note = "Contact begins below the speeds analysed: the region starts with them."
-        return Landmarks(ea, ar, cs, lb, ub, span[0], upper, (note,))
+        notes = tuple(_touched_notes(cs, peak, span))
+        return Landmarks(ea, ar, cs, lb, ub, span[0] if cs is None else cs, upper, notes)
     notes = tuple(_untouched_notes(branch)) if works else ()
     lower, upper = ea or span[0], ar or span[1]
     if lower >= upper:
         notes += ("Equal amplitudes come above the antiresonance: the region is empty.",)
     return Landmarks(ea, ar, cs, lb, ub, lower, upper, notes)
+
+
+def _touched_notes(
+    contact: float | None, peak: SpecialPoint, span: tuple[float, float]
+) -> Iterator[str]:
+    """What to say of a region that a stop opens where the speeds analysed may cut it."""
+    if contact is None:
+        yield "Contact begins below the speeds analysed: the region starts with them."
+    if peak.omega >= span[1]:
+        yield (
+            "The motion still grows at the highest speed analysed: the region may end before, "
+            "where the machine jumps as the speed falls from the peak beyond."
+        )
 
 
 def _untouched_notes(branch: Branch) -> Iterator[str]:

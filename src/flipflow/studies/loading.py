@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -147,8 +148,12 @@ class LoadedMachine:
     def notes(self) -> tuple[str, ...]:
         """What could not be settled."""
         sentences = []
-        for name, branch in (("empty", self.unloaded), ("loaded", self.loaded)):
-            texts = (*branch.notes, *(() if branch.complete else (branch.status.value,)))
+        for name, branch, marks in (
+            ("empty", self.unloaded, self.unloaded_marks),
+            ("loaded", self.loaded, self.loaded_marks),
+        ):
+            unfinished = () if branch.complete else (branch.status.value,)
+            texts = (*branch.notes, *marks.notes, *unfinished)
             sentences += [f"{name}: {text}" for text in texts]
         return tuple(sentences)
 
@@ -234,8 +239,10 @@ def _compared(
     unloaded, loaded = branches
     marks, heavy_marks = landmarks(screen, unloaded), landmarks(heavy, loaded)
     if omega is not None and not (omega[0] < marks.upper and marks.lower < omega[1]):
+        stop = "" if screen.has_stop else " without stop"
         ends = f"{marks.lower:.6g} to {marks.upper:.6g} rad/s"
-        raise InputError("omega", omega, f"the operating region is {ends}; give speeds around it")
+        remedy = f"the operating region{stop} is {ends}; give speeds around it"
+        raise InputError("omega", omega, remedy)
     late = None
     if heavy_marks.lower < marks.upper:
         late = _region(unloaded, loaded, (heavy_marks.lower, marks.upper), "loaded")
@@ -264,13 +271,24 @@ def _region(
     def at(w: float) -> Change:
         return Change(w, relative_from_below(unloaded, w), relative_from_below(loaded, w))
 
-    zeros = (
-        at(float(brentq(lambda w: at(float(w)).change, omega[k], omega[k + 1], xtol=1e-9)))
-        for k in np.flatnonzero(change[:-1] * change[1:] < 0.0)
-    )
+    zeros = _zeros(at, omega, change)
     least = min((_refined(at, omega, change, 1.0), *zeros), key=lambda one: abs(one.change))
     greatest = _refined(at, omega, change, -1.0)
     return RegionChange(start, omega, before, after, least, greatest)
+
+
+def _zeros(at: Callable[[float], Change], omega: Real, change: Real) -> Iterator[Change]:
+    """Where the change passes zero between two samples, with motions of both machines."""
+
+    def height(w: float) -> float:
+        found = at(w).change
+        if math.isnan(found):
+            raise IncompleteError(f"one of the machines has no motion at {w:.6g} rad/s")
+        return found
+
+    for k in np.flatnonzero(change[:-1] * change[1:] < 0.0):
+        with suppress(IncompleteError):
+            yield at(float(brentq(height, omega[k], omega[k + 1], xtol=1e-9)))
 
 
 def _refined(at: Callable[[float], Change], omega: Real, change: Real, sign: float) -> Change:

@@ -93,6 +93,7 @@ class Spectrum(Result):
 MOST_TURNS = 10_000_000  # forcing periods that may be asked for
 WAITED = 1024  # turns after the last point, in which the motion may still settle
 SAMPLES_A_TURN = 512  # times in each forcing period of an orbit whose spectrum is taken
+LEAST = 2  # forcing periods in a window: within one, a Hann window blurs each line into the next
 UNEVEN = 1e-9  # difference of two steps in time, over the whole time, that is rounding
 
 
@@ -158,21 +159,20 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
     which
         The coordinate.
     periods
-        Forcing periods of a history to look at; half of them when left out.
+        Forcing periods of a history to look at, two or more; half of them when left out.
 
     Raises
     ------
     InputError
-        For a history that is sampled unevenly, or shorter than the periods asked for.
+        For a history that is sampled unevenly, shorter than the periods asked for, or than two.
     """
     checked_kind("motion", motion, (Orbit, History), "give an orbit or a history")
     if periods is not None:
-        periods = checked_count("periods", periods, MOST_TURNS)
+        periods = checked_count("periods", periods, MOST_TURNS, least=LEAST)
     if isinstance(motion, Orbit):
         count = SAMPLES_A_TURN * motion.periods
         t = motion.period * np.arange(count) / count
-        amplitudes = 2.0 * np.abs(np.fft.rfft(motion.displacement(which, t))) / count
-        amplitudes[0] /= 2.0
+        amplitudes = _amplitudes(motion.displacement(which, t), np.ones(count))
         lines = np.arange(amplitudes.size) * motion.omega / motion.periods
         return Spectrum(motion.omega, lines, amplitudes, which, motion.system)
     step = np.diff(motion.t)
@@ -180,13 +180,25 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
         raise InputError("motion", "times", "give a history sampled at even times")
     omega = float(motion.omega[-1])
     turn = 2.0 * math.pi / omega / float(step.mean())
-    whole = int((motion.t.size - 1) / turn)
-    wanted = max(whole // 2, 1) if periods is None else periods
-    checked_count("periods", wanted, max(whole, 1))
+    whole = int((motion.t.size - 1) / turn * (1.0 + UNEVEN))
+    if whole < LEAST:
+        remedy = f"give a history of at least {LEAST} forcing periods"
+        raise InputError("motion", f"a history over {whole}", remedy)
+    wanted = max(whole // 2, LEAST) if periods is None else periods
+    checked_count("periods", wanted, whole, least=LEAST)
     count = round(wanted * turn)
-    x = motion.displacement(which)[-count - 1 : -1]
-    window = np.hanning(count + 1)[:-1]
-    amplitudes = 2.0 * np.abs(np.fft.rfft(window * x)) / window.sum()
-    amplitudes[0] /= 2.0
+    amplitudes = _amplitudes(
+        motion.displacement(which)[-count - 1 : -1], np.hanning(count + 1)[:-1]
+    )
     spaced = 2.0 * math.pi * np.fft.rfftfreq(count, float(step.mean()))
     return Spectrum(omega, np.asarray(spaced, float), amplitudes, which, motion.system)
+
+
+def _amplitudes(x: Real, window: Real) -> Real:
+    """Amplitudes at the lines of values under a window, which spreads a mean that is left in."""
+    mean = float(window @ x / window.sum())
+    amplitudes = 2.0 * np.abs(np.fft.rfft(window * (x - mean))) / window.sum()
+    amplitudes[0] = abs(mean)
+    if x.size % 2 == 0:
+        amplitudes[-1] /= 2.0  # what alternates from value to value has no mirror image
+    return np.asarray(amplitudes)

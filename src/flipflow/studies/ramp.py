@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch, SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.frequency_response import frequency_response
+from flipflow.continuation.special_points import FOLD, STABILITY_CHANGES
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, checked_positive, checked_speeds
@@ -38,7 +40,7 @@ class LateJump:
     Parameters
     ----------
     fold
-        Speed in rad/s at which the motion ceases to exist.
+        Speed in rad/s at which the motion ceases to exist, at a fold, or to be stable.
     omega
         Speed in rad/s at which the amplitude has gone half the way to that of the other motion; to
         the median of what follows where none of one turn is stable beyond the fold.
@@ -187,34 +189,39 @@ def _jumps(
     t, size = swings(history.t, history.displacement(which), history.velocity(which))
     speed = np.interp(t, history.t, history.omega)
     found = []
-    for fold in branch.folds:
-        past = speed > fold.omega if rising else speed < fold.omega
-        if not _loses(branch, fold, rising=rising) or not past.any() or past.all():
+    for point in branch.special_points:
+        past = speed > point.omega if rising else speed < point.omega
+        if not _loses(branch, point, rising=rising) or not past.any() or past.all():
             continue
-        before = fold.amplitude(which)
-        other = _beyond(branch, fold, rising=rising)
+        before = point.amplitude(which)
+        other = _beyond(branch, point, rising=rising)
+        if other is None and point.kind != FOLD:
+            continue  # it has gone over into motions of more turns, or that lean
         after = float(np.median(size[past])) if other is None else other.amplitude(which)
         lost = np.abs(size - before) > np.abs(size - after)
-        # What moves irregularly beyond is known by the glide alone, which was on the motion before.
-        if other is None and lost[~past][-1]:
-            continue
         rows = np.flatnonzero(past & lost)
-        if rows.size:
-            found.append(LateJump(fold.omega, float(speed[rows[0]])))
-    return tuple(found)
+        # A glide that has left the motion before does not jump here.
+        if rows.size and not lost[~past][-1]:
+            found.append((rows[0], LateJump(point.omega, float(speed[rows[0]]))))
+    return tuple(jump for _, jump in sorted(found, key=itemgetter(0)))
 
 
-def _loses(branch: Branch, fold: SpecialPoint, *, rising: bool) -> bool:
-    """Whether a gliding speed loses its motion at a fold, which else opens towards its way."""
+def _loses(branch: Branch, point: SpecialPoint, *, rising: bool) -> bool:
+    """Whether a gliding speed loses its motion at a special point."""
     sign = 1.0 if rising else -1.0
-    k = int(fold.position)
-    neighbours = branch.omega[max(k - 1, 0) : k + 3]
-    return bool(np.mean(sign * (neighbours - fold.omega)) <= 0.0)
+    k = int(point.position)
+    if point.kind == FOLD:  # it may open towards the way of the glide
+        neighbours = branch.omega[max(k - 1, 0) : k + 3]
+        return bool(np.mean(sign * (neighbours - point.omega)) <= 0.0)
+    if point.kind not in STABILITY_CHANGES or k + 1 >= branch.omega.size:
+        return False
+    near, far = (k, k + 1) if sign * (branch.omega[k + 1] - branch.omega[k]) > 0.0 else (k + 1, k)
+    return bool(branch.stable[near] and not branch.stable[far])
 
 
-def _beyond(branch: Branch, fold: SpecialPoint, *, rising: bool) -> Orbit | None:
-    """The stable motion of one turn just past a fold; None where none is known."""
-    past = (1.0 + (BEYOND if rising else -BEYOND)) * fold.omega
+def _beyond(branch: Branch, point: SpecialPoint, *, rising: bool) -> Orbit | None:
+    """The stable motion of one turn just past a point; None where none is known."""
+    past = (1.0 + (BEYOND if rising else -BEYOND)) * point.omega
     if not branch.omega.min() <= past <= branch.omega.max():
         return None
     return next((orbit for orbit in branch.orbits_at(past) if orbit.stable), None)

@@ -150,6 +150,7 @@ class OneAtATime:
         return tuple(distribution.ends for distribution in self.distributions)
 
 
+FEW_GROUPS = 64  # groups of samples from which on an interval of 95 % holds as often as that
 N_MOST = 2**20  # groups of samples that may be asked for
 # Values held at once: all samples at as many frequencies as fit.
 BLOCK_VALUES = 2_000_000
@@ -391,6 +392,11 @@ def _notes(n: int, found: SobolIndices, failed: Real) -> Iterator[str]:
         yield (
             f"Up to {100.0 * failed.max():.3g} % of the samples have no finite value; the whole "
             f"group around each is left out, and at least {least} of {n} groups remain."
+        )
+    if np.any(found.groups < FEW_GROUPS):
+        yield (
+            f"Confidence intervals from fewer than {FEW_GROUPS} groups are too narrow: "
+            f"give n = {FEW_GROUPS} or more."
         )
     if np.any(found.groups < LEAST_GROUPS):
         yield "Where fewer than two groups remain no index is given."

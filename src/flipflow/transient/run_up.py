@@ -305,14 +305,14 @@ def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
     if screen is not None:
         if history.normal is not None:
             reach = np.hypot(history.displacement("main"), history.normal[:, 0])
-            found["main_amplitude"] = _peak(history, reach)
+            found["main_amplitude"] = top_between_steps(history, reach)
         if screen.shear_height is not None:
             reach = np.abs(history.displacement("relative"))
-            found["shear_strain"] = _peak(history, reach / screen.shear_height)
-        found["foundation_force"] = _peak(history, foundation_force(screen, history))
+            found["shear_strain"] = top_between_steps(history, reach / screen.shear_height)
+        found["foundation_force"] = top_between_steps(history, foundation_force(screen, history))
     for j in range(history.force.shape[1]):
         name = "stop_force" if history.force.shape[1] == 1 else f"stop_force_{j}"
-        found[name] = _peak(history, np.abs(history.stop_force(j)))
+        found[name] = top_between_steps(history, np.abs(history.stop_force(j)))
     return found
 
 
@@ -323,17 +323,28 @@ def _greatest(history: History, times: Real, values: Real) -> Peak:
     return Peak(float(values[k]), float(np.interp(t, history.t, history.omega)), t)
 
 
-def _peak(history: History, values: Real) -> Peak:
+def top_between_steps(history: History, values: Real) -> Peak:
     """The greatest value; between steps, the top of the parabola through it and its neighbours."""
-    times, k = history.t, int(values.argmax())
-    t, value = float(times[k]), float(values[k])
-    if 0 < k < times.size - 1 and times[k - 1] < t < times[k + 1]:
-        rows = slice(k - 1, k + 2)
-        bend, slope, _ = np.polyfit(times[rows] - t, values[rows], 2)
-        if bend < 0.0:
-            away = float(np.clip(-0.5 * slope / bend, times[k - 1] - t, times[k + 1] - t))
-            t, value = t + away, max(value, value + away * float(slope + bend * away))
+    times = history.t
+    # At an event two rows have one time, of which either may lead to the top.
+    rows = np.flatnonzero(times == times[int(values.argmax())])
+    value, t = max(_top(times, values, int(k)) for k in rows)
     return Peak(value, float(np.interp(t, times, history.omega)), t)
+
+
+def _top(times: Real, values: Real, k: int) -> tuple[float, float]:
+    """Value and time of a top near row k, by three rows between which there is no event."""
+    value, t = float(values[k]), float(times[k])
+    for first in (k - 1, k, k - 2):
+        rows = slice(first, first + 3)
+        if first < 0 or times[rows].size < 3 or not (np.diff(times[rows]) > 0.0).all():
+            continue
+        bend, slope, _ = np.polyfit(times[rows] - t, values[rows], 2)
+        away = float(
+            np.clip(-0.5 * slope / bend if bend < 0.0 else 0.0, *(times[rows][[0, 2]] - t))
+        )
+        return max(value, value + away * float(slope + bend * away)), t + away
+    return value, t
 
 
 def foundation_force(screen: FlipFlowScreen, history: History) -> Real:
