@@ -82,6 +82,11 @@ def polished_once() -> Iterator[None]:
         yield
 
 
+def small_duty(**changes: object) -> ff.Duty:
+    """One load case and no scatter: what is looked at hangs on neither."""
+    return duty(load_cases=(ff.Load(name="empty"),), scatter={}, **changes)
+
+
 @cache
 def proposed() -> ff.Proposal:
     return ff.design(duty(), generations=10)
@@ -96,7 +101,7 @@ def few_built(monkeypatch) -> None:
 @pytest.fixture(scope="module")
 def after_three() -> ff.Proposal:
     """A search that was never stopped, on threads."""
-    return ff.design(duty(), generations=3)
+    return ff.design(small_duty(), generations=3)
 
 
 def exact_amplitudes(machine: ff.FlipFlowScreen, asked: ff.Duty) -> np.ndarray:
@@ -391,7 +396,7 @@ def test_stopped_when_it_is_done_it_is_whole(after_three):
         if sentence == "design, done":
             raise ff.Cancelled("stopped by the user")
 
-    found = ff.design(duty(), generations=3, monitor=stop)
+    found = ff.design(small_duty(), generations=3, monitor=stop)
     assert not found.cancelled
     same(found, after_three)
 
@@ -424,21 +429,21 @@ def test_a_search_that_was_stopped_goes_on_and_ends_as_one_that_was_not(tmp_path
         if len(told) == 2:
             raise ff.Cancelled("stopped by the user")
 
-    assert ff.design(duty(), generations=3, store=store, monitor=stop).cancelled
+    assert ff.design(small_duty(), generations=3, store=store, monitor=stop).cancelled
     file = store / "objective" / "c.1.0"
     file.write_bytes(file.read_bytes()[:-1])
-    same(ff.design(duty(), generations=3, store=store), after_three)
-    same(ff.design(duty(), generations=3, store=store), after_three)
+    same(ff.design(small_duty(), generations=3, store=store), after_three)
+    same(ff.design(small_duty(), generations=3, store=store), after_three)
     with pytest.raises(
         ff.StoreError, match=r"holds a search of other inputs: duty\.seed is 1 there"
     ):
-        ff.design(duty(seed=2), generations=3, store=store)
+        ff.design(small_duty(seed=2), generations=3, store=store)
 
 
 def test_the_same_seed_gives_the_same_machine_and_workers_find_what_threads_find(after_three):
     """Must show 2, too. A pool of processes here; a cluster of dask is an executor, too."""
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        same(ff.design(duty(), generations=3, executor=pool), after_three)
+        same(ff.design(small_duty(), generations=3, executor=pool), after_three)
     with pytest.raises(ff.InputError, match="executor"):
         ff.design(duty(), executor=2)
 

@@ -166,7 +166,7 @@ def value_beside(problem: Varied, u: Real) -> float:
     return problem.series.beside_low
 
 
-@kernel
+@kernel(shared=True)
 def varied_residual(
     problem: Varied, work: VariedWork, u: Real, value: float, r: Real, J: Real
 ) -> int:
@@ -292,7 +292,7 @@ def varied_mirrored(problem: Varied) -> Varied:
     )  # fmt: skip
 
 
-@kernel
+@kernel(shared=True)
 def varied_carried(problem: Varied, work: VariedWork, w: Real, tangent: Real, end: float) -> int:
     """Carry unknowns w and a tangent dw to another section."""
     size, n, shooting, flown = work.r.shape[0], w.shape[0] - 1, problem.shooting, work.shooting
