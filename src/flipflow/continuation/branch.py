@@ -304,7 +304,8 @@ class Branch(Frozen, Result):
             if fold.omega == omega:
                 return fold.orbit
         point = None if turns else self._along_chord(solver, begin, end, omega)
-        point = point or self._along_branch(solver, begin, end, omega)
+        if point is None:
+            point = self._along_branch(solver, begin, end, omega)
         return None if point is None else self._solved(point, rises=end[1] > begin[1])
 
     def _along_chord(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:

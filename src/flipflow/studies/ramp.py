@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from operator import itemgetter
 
 import numpy as np
 
@@ -188,7 +187,7 @@ def _jumps(
 ) -> tuple[LateJump, ...]:
     t, size = swings(history.t, history.displacement(which), history.velocity(which))
     speed = np.interp(t, history.t, history.omega)
-    found = []
+    found: list[tuple[SpecialPoint, LateJump]] = []
     for point in branch.special_points:
         past = speed > point.omega if rising else speed < point.omega
         if not _loses(branch, point, rising=rising) or not past.any() or past.all():
@@ -202,8 +201,15 @@ def _jumps(
         rows = np.flatnonzero(past & lost)
         # A glide that has left the motion before does not jump here.
         if rows.size and not lost[~past][-1]:
-            found.append((rows[0], LateJump(point.omega, float(speed[rows[0]]))))
-    return tuple(jump for _, jump in sorted(found, key=itemgetter(0)))
+            found.append((point, LateJump(point.omega, float(speed[rows[0]]))))
+    jumps = [jump for point, jump in found if point.kind == FOLD or not _again(jump, found)]
+    return tuple(sorted(jumps, key=lambda jump: jump.omega, reverse=not rising))
+
+
+def _again(jump: LateJump, found: list[tuple[SpecialPoint, LateJump]]) -> bool:
+    """Whether the motion was stable again, and lost anew, before the jump."""
+    way = sorted((jump.fold, jump.omega))
+    return any(way[0] < other.fold < way[1] for _, other in found)
 
 
 def _loses(branch: Branch, point: SpecialPoint, *, rising: bool) -> bool:
