@@ -96,8 +96,13 @@ def test_bad_sections_and_spectra_are_refused(screen) -> None:
         ff.spectrum(ff.simulate(screen, 120.0, 10), "relative", periods=11)
     with pytest.raises(ff.InputError, match="periods = 1: give a whole number from 2"):
         ff.spectrum(ff.simulate(screen, 120.0, 10), "relative", periods=1)
-    with pytest.raises(ff.InputError, match="a history over 1': give a history of at least 2"):
+    with pytest.raises(
+        ff.InputError, match=r"1 forcing periods, .* times in each': give 2 forcing periods or more"
+    ):
         ff.spectrum(ff.simulate(screen, 120.0, 1), "relative")
+    rare = ff.simulate(screen, 120.0, 10, t=np.arange(4) * 2.0 * np.pi / 120.0 / 0.4)
+    with pytest.raises(ff.InputError, match=r"0\.4 times in each"):
+        ff.spectrum(rare, "relative")
 
 
 def test_figures(tmp_path, screen) -> None:

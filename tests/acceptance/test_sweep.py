@@ -186,7 +186,7 @@ def test_a_glide_that_ends_in_chaos_has_jumped():
     assert np.median(after) < 0.8 * before.min()
 
 
-@pytest.mark.parametrize("rate", [1.0, 4.0])
+@pytest.mark.parametrize("rate", [1.0, 4.0, 60.0])
 def test_a_glide_jumps_where_its_motion_is_stable_no_more(rate):
     """The period doubles at 205.7 rad/s; the fold at 168.7 is met with the large motion."""
     screen = ff.FlipFlowScreen(
@@ -198,14 +198,28 @@ def test_a_glide_jumps_where_its_motion_is_stable_no_more(rate):
         normal_stiffness=1191608.3811889258, normal_damping=14088.009063155085,
         deck_angle=0.14654505410589155, clearance_measured="drawn",
     )  # fmt: skip
-    glide = ff.ramp(screen, (212.0, 165.0), rate)
+    glide = ff.ramp(screen, (212.0, 140.0), rate)
     assert min(fold.omega for fold in glide.branch.folds) == pytest.approx(168.72, abs=0.01)
     (jump,) = glide.jumps
     assert jump.fold == pytest.approx(205.65, abs=0.01)
     speed, size = glide.amplitude("relative")
     first = speed[np.argmax(size > 6e-3)]
-    assert abs(jump.omega - first) < 0.5
-    assert 4.0 < jump.late < 15.0
+    assert abs(jump.omega - first) < 0.5 + 0.05 * rate, "within a turn"
+
+
+def test_a_glide_from_right_before_a_fold_jumps(screen):
+    (jump,) = ff.ramp(screen, (206.3, 240.0), 20.0).jumps
+    assert jump.fold == pytest.approx(FOLD_UP, abs=1e-5)
+
+
+def test_small_swings_within_a_turn_are_no_jump(screen):
+    """Swings of 1.5, 0.6 and 0.6 mm in turn before the fold; beyond it the motion is chaotic."""
+    hard = screen.replace(
+        isolation_damping=2466.0, shear_damping=651.0, stop_damping=651.0, clearance=1e-3,
+        stop_stiffness=150e6,
+    )  # fmt: skip
+    for rate in (1.0, 2.0, 4.0):
+        assert all(jump.late > 0.1 for jump in ff.ramp(hard, (120.0, 160.0), rate).jumps)
 
 
 def test_a_glide_that_goes_over_into_two_turns_does_not_jump():

@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import math
 from fractions import Fraction
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -20,8 +21,10 @@ from flipflow.model.elements import ClearanceSpring
 from flipflow.model.excitation import HarmonicForce, Unbalance
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.transient.run_up import top_between_steps
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4
 from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper
+from judge import close
 
 pytestmark = pytest.mark.numerical
 OMEGA = 120.0
@@ -298,3 +301,22 @@ def test_public_names():
     assert ff.Motor is Motor
     assert ff.Drive is Drive
     assert ff.SpeedProfile is SpeedProfile
+
+
+@pytest.mark.parametrize("event", [2.05, 2.15, 2.4])
+def test_a_peak_beside_an_event_is_the_top_between_steps(event: float) -> None:
+    """A force with its top, 1 at 2.1, on either side of an event, where its slope changes."""
+    t = np.sort(np.concatenate([np.arange(0.25, 4.0, 0.5), [event, event]]))
+    after = np.arange(t.size) > int(np.flatnonzero(t == event)[0])
+    side = 1.0 if event < 2.1 else -1.0
+    smooth = 1.0 - (t - 2.1) ** 2
+    beyond = (after == (side < 0.0)) & (t != event)
+    force = np.where(beyond, smooth - 2.0 * np.abs(t - event), smooth)
+    found = top_between_steps(SimpleNamespace(t=t, omega=10.0 * t), force)
+    close("peak", [found.value, found.t, found.omega], [1.0, 2.1, 21.0], rel=1e-12)
+
+
+def test_a_peak_is_not_sought_between_rows_that_are_as_one() -> None:
+    t, force = np.array([1.0, 1.0 + 2.3e-16, 1.001]), np.array([1.0, 1.0 + 1e-9, 0.999])
+    found = top_between_steps(SimpleNamespace(t=t, omega=10.0 * t), force)
+    assert found.value == force[1]

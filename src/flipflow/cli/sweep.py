@@ -186,7 +186,7 @@ def _show_glide(glide: Ramp, out: Console, *, whole: bool) -> None:
         say(
             out,
             f"  jumps at {jump.omega * RPM:.5g} rpm, {jump.late * RPM:.3g} rpm beyond the speed "
-            f"at which the motion ends ({jump.fold * RPM:.5g} rpm)",
+            f"at which the motion ends or is stable no more ({jump.fold * RPM:.5g} rpm)",
         )
     if not glide.jumps:
         out.print("  no jump")

@@ -274,8 +274,10 @@ class Branch(Frozen, Result):
         remedy = f"give a number in rad/s, the branch runs from {min(ends):.6g} to {max(ends):.6g}"
         if not min(ends) <= checked_number("omega", omega, remedy) <= max(ends):
             raise InputError("omega", omega, remedy)
-        solver, omega = self.formulation.solver(), float(omega)
-        found: list[Orbit] = []
+        omega = float(omega)
+        if self.omega.size == 1:
+            return (self.orbit(0),)
+        solver, found = self.formulation.solver(), list[Orbit]()
         for begin, end in self._passages(omega):
             orbit = self._between_nodes(solver, begin, end, omega)
             if orbit is None:
@@ -298,28 +300,37 @@ class Branch(Frozen, Result):
 
     def _between_nodes(self, solver: Solver, begin: Node, end: Node, omega: float) -> Orbit | None:
         """The motion at ``omega`` between two neighbours; None where it is not found."""
-        ends = (begin[0], end[0])
-        turns = [fold for fold in self.folds if fold.position in ends]
-        for fold in turns:
-            if fold.omega == omega:
+        for fold in self.folds:
+            if fold.omega == omega and fold.position in (begin[0], end[0]):
                 return fold.orbit
-        point = None if turns else self._along_chord(solver, begin, end, omega)
+        point = self._along_chord(solver, begin, end, omega)
         if point is None:
             point = self._along_branch(solver, begin, end, omega)
         return None if point is None else self._solved(point, rises=end[1] > begin[1])
 
     def _along_chord(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
-        """The motion at ``omega`` that Newton reaches from the chord of two points, if it is near.
+        """The motion at ``omega`` that Newton reaches from the chord of two neighbours.
 
-        At a fold the branch is as far from the chord as the motion on its other side.
+        None where it does not lie between them: beside a fold Newton may end on its other side.
         """
-        p = int(begin[0])
-        chord = self.traced.u[p + 1] - self.traced.u[p]
+        size = np.abs(self.traced.u).max(axis=0)
+        size[size == 0.0] = 1.0
+        first, last = self._unknowns_at(begin[0]), self._unknowns_at(end[0])
+        chord = (last - first) / size
         span = end[1] - begin[1]
-        guess = self.traced.u[p] + ((omega - begin[1]) / span if span else 0.0) * chord
+        guess = first + ((omega - begin[1]) / span if span else 0.0) * (last - first)
         point = solver.solve(guess, omega)
-        near = point is not None and norm(point.u - guess) <= norm(chord)
-        return point if near else None
+        if point is None or norm((point.u - guess) / size) > norm(chord):
+            return None
+        along = float((point.u - first) / size @ chord)
+        return point if 0.0 <= along <= chord @ chord else None
+
+    def _unknowns_at(self, position: float) -> Real:
+        """Unknowns at a node: a fold, or a point of the branch."""
+        for fold in self.folds:
+            if fold.position == position:
+                return fold.orbit.unknowns
+        return self.traced.u[int(position)]
 
     def _along_branch(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
         """The motion at ``omega``, sought along the branch itself."""
@@ -373,32 +384,32 @@ class Branch(Frozen, Result):
 
     def _end_of(self, run: slice) -> float:
         """Highest omega of a run: the refined fold behind its last point, or that point."""
-        last = run.stop - 1
-        folds = [fold.omega for fold in self.folds if last - 1 <= fold.position <= last + 1]
-        return max([float(self.omega[last]), *folds])
+        fold = fold_at_end(self, run)
+        last = float(self.omega[run.stop - 1])
+        return last if fold is None else max(last, fold.omega)
 
     def solve_in(self, run: slice, omega: float) -> Orbit | None:
-        """The motion at exactly ``omega`` on the rising part of the branch that a run is of.
+        """The motion at exactly ``omega`` on the stretch of rising speed that contains a run.
 
-        None where that part does not pass ``omega``.
+        None where that stretch does not pass ``omega``, and where no motion is found.
         """
         omega, n = checked_speed(omega), self.omega.size
         remedy = "give one of the branch's rising_path"
         checked_kind("run", run, slice, remedy)
         checked_index("run", run.start, n, remedy)
         checked_index("run", run.stop, n + 1, remedy)
-        # The part of the branch that rises into the run may begin at a fold before it.
+        fold = fold_at_end(self, run)
+        end = run.stop - 1.0 if fold is None else fold.position
+        # The stretch may begin before the run, at a fold.
         falls = np.flatnonzero(np.diff(self.omega[: run.start + 1]) <= 0.0)
-        first = falls[-1] if falls.size else 0
-        rising = [
-            (begin, end)
-            for begin, end in self._passages(omega)
-            if begin[0] >= first and end[0] <= run.stop and end[1] > begin[1]
-        ]
-        if not rising:
-            return None
-        with self.formulation.lent() as solver:
-            return self._between_nodes(solver, *rising[-1], omega)
+        begin = float(falls[-1]) if falls.size else 0.0
+        turns = [one.position for one in self.folds if begin < one.position <= run.start]
+        begin = max([begin, *turns])
+        for low, high in self._passages(omega):
+            if low[1] < high[1] and low[0] >= begin and high[0] <= end:
+                with self.formulation.lent() as solver:
+                    return self._between_nodes(solver, low, high, omega)
+        return None
 
     def _solved(self, point: Point, *, rises: bool) -> Orbit:
         """A motion solved for on a part of the branch that rises or falls in omega.
@@ -486,6 +497,12 @@ class Branch(Frozen, Result):
     @cached_property
     def _seen(self) -> dict[tuple[float, ...], tuple[Real, Real, NDArray[np.complex128]]]:
         return {}
+
+
+def fold_at_end(branch: Branch, run: slice) -> SpecialPoint | None:
+    """The fold at which a run of rising points ends; None at the end of the branch."""
+    near = (fold for fold in branch.folds if run.stop - 2 <= fold.position <= run.stop)
+    return max(near, key=lambda fold: fold.omega, default=None)
 
 
 def _least(function: Callable[[float], float], low: float, high: float) -> float:

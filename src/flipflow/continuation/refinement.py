@@ -182,9 +182,9 @@ def grazing_between(
 
 @kernel
 def share_of_way(work: Corrector, gone: float) -> float:
-    """Share of the way round the point in work, from the last point to the one before it.
+    """Share that ``gone`` is of the way by the point in work, which then leads to work.behind.
 
-    At a sharp corner both ways round it are longer than the chord.
+    At a sharp corner each of its two legs may be longer than the chord.
     """
     square = 0.0
     for k in range(work.w.shape[0]):

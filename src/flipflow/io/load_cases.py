@@ -23,15 +23,15 @@ def read_load_cases(tables: list[Table], screen: FlipFlowScreen, notes: Notes) -
     if not tables:
         notes.assumed.append('one load case, "empty", because there are no [[load_cases]]')
         return (Load(name="empty"),)
-    cases: list[Load] = []
+    cases: dict[str, Load] = {}
     for number, table in enumerate(tables, start=1):
         case = _read_case(table, f"load case {number}", screen, notes)
-        if case.name in {other.name for other in cases}:
+        if case.name in cases:
             raise InputError(
                 f"load case {number}, name", case.name, "another case has it, give each its own"
             )
-        cases.append(case)
-    return tuple(cases)
+        cases[case.name] = case
+    return tuple(cases.values())
 
 
 def _read_case(table: Table, label: str, screen: FlipFlowScreen, notes: Notes) -> Load:

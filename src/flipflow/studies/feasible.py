@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from scipy.optimize import brentq
 
-from flipflow.continuation.branch import Branch, SpecialPoint
+from flipflow.continuation.branch import Branch, SpecialPoint, fold_at_end
 from flipflow.continuation.special_points import STABILITY_CHANGES
 from flipflow.errors import IncompleteError
 from flipflow.model.limits import Limits, limit_bounds
@@ -154,7 +154,7 @@ def _runs(branch: Branch, screen: FlipFlowScreen, span: Interval) -> list[_Run]:
     runs = []
     last = -math.inf
     for k, run in enumerate(branch.rising_path):
-        fold = _fold_at_end(branch, run)
+        fold = fold_at_end(branch, run)
         # Points behind the fold are motions of its other side.
         stop = run.stop if fold is None else min(run.stop, math.ceil(fold.position))
         end = float(branch.omega[stop - 1]) if fold is None else fold.omega
@@ -168,12 +168,6 @@ def _runs(branch: Branch, screen: FlipFlowScreen, span: Interval) -> list[_Run]:
         if nodes:
             runs.append(_Run(branch, screen, rising, jumps, nodes))
     return runs
-
-
-def _fold_at_end(branch: Branch, run: slice) -> SpecialPoint | None:
-    """The fold at which a rising run ends; None at the end of the branch."""
-    near = (fold for fold in branch.folds if run.stop - 2 <= fold.position <= run.stop)
-    return max(near, key=lambda fold: fold.omega, default=None)
 
 
 def _orbits(

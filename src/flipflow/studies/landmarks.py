@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -26,6 +26,13 @@ from flipflow.results.frozen import Frozen
 
 LOWEST_SHARE = 0.22  # lower end of the range over the first natural frequency
 HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all stops engaged
+
+
+BEGINS_TOUCHED = "Contact begins below the speeds analysed: the region starts with them."
+ENDS_TOUCHED = (
+    "The stop is still touched at the highest speed analysed: if the machine jumps beyond it, the "
+    "region ends at a lower speed, that of the jump as the speed falls."
+)
 
 
 def analysed_range(machine: Machine, speed: float | None = None) -> tuple[float, float]:
@@ -98,8 +105,8 @@ def landmarks(machine: Machine, branch: Branch) -> Landmarks:
     span = (float(branch.omega.min()), float(branch.omega.max()))
     upper = peak.omega if lb is None else lb
     if touched:
-        notes = tuple(_touched_notes(cs, peak, span))
-        return Landmarks(ea, ar, cs, lb, ub, span[0] if cs is None else cs, upper, notes)
+        lowest = span[0] if cs is None else cs
+        return Landmarks(ea, ar, cs, lb, ub, lowest, upper, (BEGINS_TOUCHED,) if cs is None else ())
     notes = tuple(_untouched_notes(branch)) if works else ()
     lower, upper = ea or span[0], ar or span[1]
     if lower >= upper:
@@ -107,17 +114,13 @@ def landmarks(machine: Machine, branch: Branch) -> Landmarks:
     return Landmarks(ea, ar, cs, lb, ub, lower, upper, notes)
 
 
-def _touched_notes(
-    contact: float | None, peak: SpecialPoint, span: tuple[float, float]
-) -> Iterator[str]:
-    """What to say of a region that a stop opens where the speeds analysed may cut it."""
-    if contact is None:
-        yield "Contact begins below the speeds analysed: the region starts with them."
-    if peak.omega >= span[1]:
-        yield (
-            "The motion still grows at the highest speed analysed: the region may end before, "
-            "where the machine jumps as the speed falls from the peak beyond."
-        )
+def within_speeds(machine: Machine, branch: Branch) -> Landmarks:
+    """Landmarks of a branch over speeds that somebody chose, which may cut the region."""
+    marks, last = landmarks(machine, branch), int(np.argmax(branch.omega))
+    early = float(branch.omega[last]) < analysed_range(machine)[1]
+    if not early or marks.omega_lb is not None or branch.traced.signature[last] == 0:
+        return marks
+    return replace(marks, notes=(*marks.notes, ENDS_TOUCHED))
 
 
 def _untouched_notes(branch: Branch) -> Iterator[str]:

@@ -20,7 +20,7 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Coordinate
 from flipflow.periodic.options import Method, checked_method
 from flipflow.results.result import Result
-from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
+from flipflow.studies.landmarks import Landmarks, analysed_range, within_speeds
 
 Start = Literal["unloaded", "loaded"]
 SAMPLES = 121  # speeds over the operating region at which amplitudes are compared
@@ -41,8 +41,8 @@ class Change:
 
     @property
     def share(self) -> float:
-        """Change as a share of the unloaded amplitude."""
-        return self.change / self.unloaded
+        """Change as a share of the unloaded amplitude; NaN where that is zero."""
+        return self.change / self.unloaded if self.unloaded else math.nan
 
 
 @dataclass(frozen=True)
@@ -237,7 +237,7 @@ def _compared(
     wide = (min(low for low, _ in spans), max(high for _, high in spans))
     branches = [frequency_response(one, omega or wide, method) for one in (screen, heavy)]
     unloaded, loaded = branches
-    marks, heavy_marks = landmarks(screen, unloaded), landmarks(heavy, loaded)
+    marks, heavy_marks = within_speeds(screen, unloaded), within_speeds(heavy, loaded)
     if omega is not None and not (omega[0] < marks.upper and marks.lower < omega[1]):
         stop = "" if screen.has_stop else " without stop"
         ends = f"{marks.lower:.6g} to {marks.upper:.6g} rad/s"
@@ -278,7 +278,10 @@ def _region(
 
 
 def _zeros(at: Callable[[float], Change], omega: Real, change: Real) -> Iterator[Change]:
-    """Where the change passes zero between two samples, with motions of both machines."""
+    """Where the change passes zero between two samples, or changes its sign by a jump.
+
+    Not where one of the machines has no motion on the way.
+    """
 
     def height(w: float) -> float:
         found = at(w).change

@@ -17,7 +17,7 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.results.result import Result
 from flipflow.studies.feasible import Bound, CaseWindow, Intervals, case_window, common_window
-from flipflow.studies.landmarks import analysed_range, contact_speeds, landmarks
+from flipflow.studies.landmarks import analysed_range, contact_speeds, within_speeds
 
 CONTACT_WORDS, EQUAL_WORDS = "contact begins (w_cs)", "equal amplitudes (w_ea)"
 JUMP_WORDS = "jump when the speed falls (w_lb)"
@@ -155,7 +155,7 @@ def operating_region(
         own = branch if loaded == screen else frequency_response(loaded, span, method)
         branches.append(own)
         cases.append(case_window(loaded, load, own, wanted, within))
-    marks = landmarks(screen, branch)
+    marks = within_speeds(screen, branch)
     feasible, binding = common_window((marks.lower, marks.upper), tuple(cases))
     notes = [*_unchecked_notes(cases)]
     if within[0] >= within[1]:

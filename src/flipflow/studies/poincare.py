@@ -181,9 +181,9 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
     omega = float(motion.omega[-1])
     turn = 2.0 * math.pi / omega / float(step.mean())
     whole = int((motion.t.size - 1) / turn * (1.0 + UNEVEN))
-    if whole < LEAST:
-        remedy = f"give a history of at least {LEAST} forcing periods"
-        raise InputError("motion", f"a history over {whole}", remedy)
+    if whole < LEAST or turn < LEAST:
+        remedy = f"give {LEAST} forcing periods or more, and as many times in each"
+        raise InputError("motion", f"{whole} forcing periods, {turn:.3g} times in each", remedy)
     wanted = max(whole // 2, LEAST) if periods is None else periods
     checked_count("periods", wanted, whole, least=LEAST)
     count = round(wanted * turn)
@@ -195,10 +195,10 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
 
 
 def _amplitudes(x: Real, window: Real) -> Real:
-    """Amplitudes at the lines of values under a window, which spreads a mean that is left in."""
+    """Amplitudes at the lines of values under a window; it would spread the mean beside line 0."""
     mean = float(window @ x / window.sum())
     amplitudes = 2.0 * np.abs(np.fft.rfft(window * (x - mean))) / window.sum()
     amplitudes[0] = abs(mean)
     if x.size % 2 == 0:
-        amplitudes[-1] /= 2.0  # what alternates from value to value has no mirror image
+        amplitudes[-1] /= 2.0  # at half the sampling rate a line and its conjugate are one
     return np.asarray(amplitudes)

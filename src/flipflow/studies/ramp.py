@@ -26,7 +26,7 @@ from flipflow.transient.history import History
 from flipflow.transient.speed_run import Start, normal_direction, run_history, swings
 from flipflow.transient.startup import MOST_SECONDS
 
-BEYOND = 1e-4  # relative distance past a fold at which the motion after the jump is looked for
+BEYOND = 1e-4  # relative distance past the end of a motion at which the next one is looked for
 WIDER = 0.15  # share by which the branch reaches beyond the speeds of the ramp
 SHORTEST = 1e-6  # s, shortest ramp, far less than any machine's turn
 LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)  # starts of the branch over the lowest speed, in turn
@@ -39,10 +39,12 @@ class LateJump:
     Parameters
     ----------
     fold
-        Speed in rad/s at which the motion ceases to exist, at a fold, or to be stable.
+        Speed in rad/s at which the motion ceases to exist, at a fold, or to be stable beside
+        another stable one of one turn.
     omega
         Speed in rad/s at which the amplitude has gone half the way to that of the other motion; to
-        the median of what follows where none of one turn is stable beyond the fold.
+        the median of what follows where none of one turn is stable beyond a fold. Amplitudes are
+        the greatest swings of each turn.
     """
 
     fold: float
@@ -50,7 +52,7 @@ class LateJump:
 
     @property
     def late(self) -> float:
-        """How far beyond the fold the jump comes, in rad/s."""
+        """How far beyond that speed the jump comes, in rad/s."""
         return abs(self.omega - self.fold)
 
 
@@ -147,7 +149,7 @@ def ramp(
         fastest=high, monitor=say,
     )  # fmt: skip
     which = orbit.system.named[-1]
-    jumps = _jumps(branch, history, which, rising=last > first)
+    jumps = _jumps(branch, history, orbit, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
 
 
@@ -183,11 +185,12 @@ def _with_normal(machine: Machine, omega: float, state: Real) -> Real:
 
 
 def _jumps(
-    branch: Branch, history: History, which: Coordinate, *, rising: bool
+    branch: Branch, history: History, begun: Orbit, which: Coordinate, *, rising: bool
 ) -> tuple[LateJump, ...]:
-    t, size = swings(history.t, history.displacement(which), history.velocity(which))
-    speed = np.interp(t, history.t, history.omega)
-    found: list[tuple[SpecialPoint, LateJump]] = []
+    """Jumps in the order of the glide, which began with a periodic motion."""
+    speed, size = _greatest_swings(history, which)
+    speed, size = np.append(history.omega[0], speed), np.append(begun.amplitude(which), size)
+    found: list[LateJump] = []
     for point in branch.special_points:
         past = speed > point.omega if rising else speed < point.omega
         if not _loses(branch, point, rising=rising) or not past.any() or past.all():
@@ -195,30 +198,42 @@ def _jumps(
         before = point.amplitude(which)
         other = _beyond(branch, point, rising=rising)
         if other is None and point.kind != FOLD:
-            continue  # it has gone over into motions of more turns, or that lean
+            continue  # as where the period doubles: what follows has no amplitude of its own
         after = float(np.median(size[past])) if other is None else other.amplitude(which)
         lost = np.abs(size - before) > np.abs(size - after)
         rows = np.flatnonzero(past & lost)
         # A glide that has left the motion before does not jump here.
         if rows.size and not lost[~past][-1]:
-            found.append((point, LateJump(point.omega, float(speed[rows[0]]))))
-    jumps = [jump for point, jump in found if point.kind == FOLD or not _again(jump, found)]
+            found.append(LateJump(point.omega, float(speed[rows[0]])))
+    jumps = [one for one in found if not _again(one, found)]
     return tuple(sorted(jumps, key=lambda jump: jump.omega, reverse=not rising))
 
 
-def _again(jump: LateJump, found: list[tuple[SpecialPoint, LateJump]]) -> bool:
+def _greatest_swings(history: History, which: Coordinate) -> tuple[Real, Real]:
+    """Speed and greatest swing of the turn that ends there, at each turning point."""
+    t, swing = swings(history.t, history.displacement(which), history.velocity(which))
+    speed = np.interp(t, history.t, history.omega)
+    size, back = swing.copy(), 1
+    while (within := t[back:] - t[:-back] < 2.0 * math.pi / speed[back:]).any():
+        size[back:] = np.where(within, np.maximum(size[back:], swing[:-back]), size[back:])
+        back += 1
+    return speed, size
+
+
+def _again(jump: LateJump, found: list[LateJump]) -> bool:
     """Whether the motion was stable again, and lost anew, before the jump."""
     way = sorted((jump.fold, jump.omega))
-    return any(way[0] < other.fold < way[1] for _, other in found)
+    return any(way[0] < other.fold < way[1] for other in found)
 
 
 def _loses(branch: Branch, point: SpecialPoint, *, rising: bool) -> bool:
-    """Whether a gliding speed loses its motion at a special point."""
+    """Whether a gliding speed loses a stable motion at a special point."""
     sign = 1.0 if rising else -1.0
     k = int(point.position)
     if point.kind == FOLD:  # it may open towards the way of the glide
         neighbours = branch.omega[max(k - 1, 0) : k + 3]
-        return bool(np.mean(sign * (neighbours - point.omega)) <= 0.0)
+        ends = bool(np.mean(sign * (neighbours - point.omega)) <= 0.0)
+        return ends and bool(branch.stable[max(k - 1, 0) : k + 3].any())
     if point.kind not in STABILITY_CHANGES or k + 1 >= branch.omega.size:
         return False
     near, far = (k, k + 1) if sign * (branch.omega[k + 1] - branch.omega[k]) > 0.0 else (k + 1, k)

@@ -150,7 +150,7 @@ class OneAtATime:
         return tuple(distribution.ends for distribution in self.distributions)
 
 
-FEW_GROUPS = 64  # groups of samples from which on an interval of 95 % holds as often as that
+FEW_GROUPS = 64  # groups of samples from which on an interval of 95 % holds in 95 % of cases
 N_MOST = 2**20  # groups of samples that may be asked for
 # Values held at once: all samples at as many frequencies as fit.
 BLOCK_VALUES = 2_000_000
@@ -395,8 +395,8 @@ def _notes(n: int, found: SobolIndices, failed: Real) -> Iterator[str]:
         )
     if np.any(found.groups < FEW_GROUPS):
         yield (
-            f"Confidence intervals from fewer than {FEW_GROUPS} groups are too narrow: "
-            f"give n = {FEW_GROUPS} or more."
+            f"Fewer than {FEW_GROUPS} groups tell: confidence intervals are too narrow; give a "
+            "greater n."
         )
     if np.any(found.groups < LEAST_GROUPS):
         yield "Where fewer than two groups remain no index is given."
