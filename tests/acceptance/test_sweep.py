@@ -212,14 +212,15 @@ def test_a_glide_from_right_before_a_fold_jumps(screen):
     assert jump.fold == pytest.approx(FOLD_UP, abs=1e-5)
 
 
-def test_small_swings_within_a_turn_are_no_jump(screen):
-    """Swings of 1.5, 0.6 and 0.6 mm in turn before the fold; beyond it the motion is chaotic."""
+@pytest.mark.parametrize("rate", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("end", [160.0, 250.0])
+def test_chaos_of_the_same_amplitude_is_no_jump(screen, rate, end):
+    """Swings of 1.5, 0.6 and 0.6 mm in turn up to the fold at 137.2 rad/s, and irregular ones."""
     hard = screen.replace(
         isolation_damping=2466.0, shear_damping=651.0, stop_damping=651.0, clearance=1e-3,
         stop_stiffness=150e6,
     )  # fmt: skip
-    for rate in (1.0, 2.0, 4.0):
-        assert all(jump.late > 0.1 for jump in ff.ramp(hard, (120.0, 160.0), rate).jumps)
+    assert ff.ramp(hard, (120.0, end), rate).jumps == ()
 
 
 def test_a_glide_that_goes_over_into_two_turns_does_not_jump():

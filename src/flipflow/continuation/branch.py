@@ -277,9 +277,9 @@ class Branch(Frozen, Result):
         omega = float(omega)
         if self.omega.size == 1:
             return (self.orbit(0),)
-        solver, found = self.formulation.solver(), list[Orbit]()
+        found: list[Orbit] = []
         for begin, end in self._passages(omega):
-            orbit = self._between_nodes(solver, begin, end, omega)
+            orbit = self._between_nodes(begin, end, omega)
             if orbit is None:
                 continue
             one = orbit.unknowns
@@ -287,25 +287,30 @@ class Branch(Frozen, Result):
                 found.append(orbit)
         return tuple(found)
 
-    def _passages(self, omega: float) -> list[tuple[Node, Node]]:
-        """Pairs of neighbours, points and folds, between which ``omega`` is passed."""
+    @cached_property
+    def _nodes(self) -> list[Node]:
+        """Points and the folds between them, in the branch's order."""
         inner = [fold for fold in self.folds if 0.0 < fold.position < self.omega.size - 1]
         turns = {fold.position: fold.omega for fold in inner}
-        nodes = sorted((dict(enumerate(self.omega.tolist())) | turns).items())
+        return sorted((dict(enumerate(self.omega.tolist())) | turns).items())
+
+    def _passages(self, omega: float) -> list[tuple[Node, Node]]:
+        """Pairs of neighbours, points and folds, between which ``omega`` is passed."""
         return [
             pair
-            for pair in pairwise(nodes)
+            for pair in pairwise(self._nodes)
             if pair[0][1] <= omega <= pair[1][1] or pair[1][1] <= omega <= pair[0][1]
         ]
 
-    def _between_nodes(self, solver: Solver, begin: Node, end: Node, omega: float) -> Orbit | None:
+    def _between_nodes(self, begin: Node, end: Node, omega: float) -> Orbit | None:
         """The motion at ``omega`` between two neighbours; None where it is not found."""
         for fold in self.folds:
             if fold.omega == omega and fold.position in (begin[0], end[0]):
                 return fold.orbit
-        point = self._along_chord(solver, begin, end, omega)
-        if point is None:
-            point = self._along_branch(solver, begin, end, omega)
+        with self.formulation.lent() as solver:
+            point = self._along_chord(solver, begin, end, omega)
+            if point is None:
+                point = self._along_branch(solver, begin, end, omega)
         return None if point is None else self._solved(point, rises=end[1] > begin[1])
 
     def _along_chord(self, solver: Solver, begin: Node, end: Node, omega: float) -> Point | None:
@@ -407,8 +412,7 @@ class Branch(Frozen, Result):
         begin = max([begin, *turns])
         for low, high in self._passages(omega):
             if low[1] < high[1] and low[0] >= begin and high[0] <= end:
-                with self.formulation.lent() as solver:
-                    return self._between_nodes(solver, low, high, omega)
+                return self._between_nodes(low, high, omega)
         return None
 
     def _solved(self, point: Point, *, rises: bool) -> Orbit:

@@ -27,6 +27,8 @@ from flipflow.transient.speed_run import Start, normal_direction, run_history, s
 from flipflow.transient.startup import MOST_SECONDS
 
 BEYOND = 1e-4  # relative distance past the end of a motion at which the next one is looked for
+SOON = 0.05  # share of a fold's speed over which irregular motion beyond is looked at
+SMALL = 0.05  # share by which its amplitude differs at most where there is no jump
 WIDER = 0.15  # share by which the branch reaches beyond the speeds of the ramp
 SHORTEST = 1e-6  # s, shortest ramp, far less than any machine's turn
 LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)  # starts of the branch over the lowest speed, in turn
@@ -42,9 +44,10 @@ class LateJump:
         Speed in rad/s at which the motion ceases to exist, at a fold, or to be stable beside
         another stable one of one turn.
     omega
-        Speed in rad/s at which the amplitude has gone half the way to that of the other motion; to
-        the median of what follows where none of one turn is stable beyond a fold. Amplitudes are
-        the greatest swings of each turn.
+        Speed in rad/s at which the amplitude, the greatest swing of each turn, has gone half the
+        way to that of the other motion. Where none of one turn is stable beyond a fold, it is that
+        to the median of what follows within 5 % of the speed; one that differs by less than 5 % is
+        no jump.
     """
 
     fold: float
@@ -197,9 +200,10 @@ def _jumps(
             continue
         before = point.amplitude(which)
         other = _beyond(branch, point, rising=rising)
-        if other is None and point.kind != FOLD:
-            continue  # as where the period doubles: what follows has no amplitude of its own
-        after = float(np.median(size[past])) if other is None else other.amplitude(which)
+        soon = size[past & (np.abs(speed - point.omega) < SOON * point.omega)]
+        after = _irregular(point, before, soon) if other is None else other.amplitude(which)
+        if after is None:
+            continue
         lost = np.abs(size - before) > np.abs(size - after)
         rows = np.flatnonzero(past & lost)
         # A glide that has left the motion before does not jump here.
@@ -207,6 +211,14 @@ def _jumps(
             found.append(LateJump(point.omega, float(speed[rows[0]])))
     jumps = [one for one in found if not _again(one, found)]
     return tuple(sorted(jumps, key=lambda jump: jump.omega, reverse=not rising))
+
+
+def _irregular(point: SpecialPoint, before: float, swings_beyond: Real) -> float | None:
+    """Amplitude beyond a fold without a stable motion of one turn; None if it tells no jump."""
+    if point.kind != FOLD or swings_beyond.size == 0:
+        return None  # where the period doubles, the motion goes over into another
+    after = float(np.median(swings_beyond))
+    return after if abs(after - before) >= SMALL * before else None
 
 
 def _greatest_swings(history: History, which: Coordinate) -> tuple[Real, Real]:

@@ -150,7 +150,7 @@ class OneAtATime:
         return tuple(distribution.ends for distribution in self.distributions)
 
 
-FEW_GROUPS = 64  # groups of samples from which on an interval of 95 % holds in 95 % of cases
+FEW_GROUPS = 64  # groups below which intervals of 95 % hold less often: benchmarks/sobol.py
 N_MOST = 2**20  # groups of samples that may be asked for
 # Values held at once: all samples at as many frequencies as fit.
 BLOCK_VALUES = 2_000_000
