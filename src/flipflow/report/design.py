@@ -35,10 +35,10 @@ CERTAIN = 0.99  # share of machines as built from which a proposal passes
 NOT_COVERED = (
     "The search judges scatter at its corners and on the drawing. The material moves with the "
     "frames that carry it. Jumps that blows cause are judged for the machine as drawn, not at the "
-    "corners; so is the margin to the jump. Starts and other motions are judged as drawn and with "
-    "every part at one end of its scatter. Fatigue of rubber, its wear and its creep are not "
-    "computed: bounds on gap and shear stiffness keep the search away from "
-    "machines that hang on them."
+    "corners. The margin to the jump, starts and other motions are judged as drawn and with every "
+    "part at one end of its scatter; where no machine keeps the margin there, that of the drawing "
+    "has to do. Fatigue of rubber, its wear and its creep are not computed: bounds on gap and "
+    "shear stiffness keep the search away from machines that hang on them."
 )
 
 

@@ -133,10 +133,14 @@ class Space:
         What is asked.
     near
         A machine near those looked at, whose motions are first guesses; None: that of the duty.
+    margin_as_built
+        Whether machines with all parts at one end of their scatter have to keep the margin to the
+        jump, too, not the drawing alone.
     """
 
     duty: Duty
     near: FlipFlowScreen | None = None
+    margin_as_built: bool = True
 
     @property
     def screen(self) -> FlipFlowScreen:
@@ -271,8 +275,8 @@ class Space:
         """What candidates (C, D) are like.
 
         Whether all parts at one end of their scatter leave another stable motion at speed, and how
-        far the jump is from the drawing, is looked at under the loads ``margins`` and of those that
-        fit else: it takes motions at many speeds. Without loads both count as met.
+        far the jump is then and from the drawing, is looked at under the loads ``margins`` and of
+        those that fit else: it takes motions at many speeds. Without loads both count as met.
         """
         springs = [self.spring_of(one) for one in u]
         return self._judged(self.columns(u), springs, self.duty.corners, margins)
@@ -310,7 +314,7 @@ class Space:
             kept = {name: one[fit] for name, one in columns.items()}
             excess[fit, self.constraints.index(ALONE)] = self._not_alone(kept, corners, margins)
             if self._of_jumps:
-                excess[fit, -1] = self._nearness(kept, margins)
+                excess[fit, -1] = self._nearness(kept, corners, margins)
         return Judged(found.amplitude, found.worst, excess)
 
     @cached_property
@@ -339,14 +343,20 @@ class Space:
         alone = np.concatenate([one.reshape(count, -1) for one in told], axis=1)
         return np.asarray(1.0 - alone.mean(axis=1))
 
-    def _nearness(self, columns: Columns, loads: Sequence[Load]) -> Real:
-        """By how much drawings come too near to the jump under some loads, as a share, (C,)."""
+    def _nearness(
+        self, columns: Columns, corners: Sequence[Mapping[str, float]], loads: Sequence[Load]
+    ) -> Real:
+        """By how much machines come too near to the jump under some loads, as a share, (C,)."""
         least = float(self.duty.bounds.jump_margin or 1.0)
+        count = len(next(iter(columns.values())))
+        ends = self.duty.ends if self.margin_as_built and len(corners) > 1 else ()
+        rows = self._scattered(columns, count, (*corners[:1], *ends))
         told = [
-            jump_distance_loaded(self.screen, columns, load, self.duty.speeds, least, processors())
+            jump_distance_loaded(self.screen, rows, load, self.duty.speeds, least, processors())
             for load in loads
         ]
-        return np.asarray(1.0 - _least(np.concatenate(told, axis=1)) / least)
+        table = np.concatenate([one.reshape(count, -1) for one in told], axis=1)
+        return np.asarray(1.0 - _least(table) / least)
 
     def judge_columns(
         self, columns: Columns, count: int, corners: Sequence[Mapping[str, float]]

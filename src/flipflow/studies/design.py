@@ -285,9 +285,8 @@ def design(
     checked_monitor(monitor)
     rounds = GENERATIONS if generations is None else checked_count("generations", generations, 9999)
     _refuse_speed(duty)
-    space = Space(duty)
-
-    front = _searched(space, rounds, store, executor, monitor)
+    front = _searched(Space(duty), rounds, store, executor, monitor)
+    space = front.space
     outcome = _proved(space, front, monitor)
     found = outcome.found
     built = _yield(space, outcome)
@@ -358,7 +357,7 @@ class _Outcome:
 
 def _proved(space: Space, front: Front, monitor: Monitor | None) -> _Outcome:
     """Polish and prove machines of the set as they are preferred, until one passes."""
-    order = by_preference(space, front)[:TRIED]
+    order = by_preference(front)[:TRIED]
     found = Polished(front.u[order[0]], space.judge(front.u[order[:1]]), {})
     if front.cancelled:
         return _Outcome(found, cancelled=True)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -49,8 +49,12 @@ SCALE = 1e6  # objectives are in N, W, m/s^2 and m
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """What a search found: candidates (P, D), what they are like, and whether it was stopped."""
+    """What a search found: candidates (P, D), what they are like, and whether it was stopped.
 
+    They are judged in ``space``: without machines as built where none of these keeps its margin.
+    """
+
+    space: Space
     u: Real
     judged: Judged
     cancelled: bool
@@ -102,8 +106,11 @@ def search(
         cancelled = True
     u = np.unique(np.array(algorithm.pop.get("X"), float), axis=0)
     judged = space.judge(u, margins=space.duty.loads)
+    if not judged.fits.any():
+        space = replace(space, margin_as_built=False)
+        judged = space.judge(u, margins=space.duty.loads)
     best = _front(space, judged)
-    return Front(u[best], _rows(judged, best), cancelled, algorithm.evaluator.n_eval)
+    return Front(space, u[best], _rows(judged, best), cancelled, algorithm.evaluator.n_eval)
 
 
 class _Judging:
@@ -171,7 +178,7 @@ def _front(space: Space, judged: Judged) -> NDArray[np.int64]:
     return np.asarray(fit[~np.array(beaten)])
 
 
-def by_preference(space: Space, front: Front) -> list[int]:
+def by_preference(front: Front) -> list[int]:
     """Candidates of a Pareto set as they are preferred.
 
     Near the best in what comes first, the best in what comes next, and so on.
@@ -179,7 +186,7 @@ def by_preference(space: Space, front: Front) -> list[int]:
     left, order = list(range(front.u.shape[0])), []
     while left:
         near = np.array(left)
-        for one in space.objectives:
+        for one in front.space.objectives:
             value = front.judged.objective(one)[near]
             near = near[value <= value.min() * (1.0 + CLOSE)]
         order.append(int(near[0]))

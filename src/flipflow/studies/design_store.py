@@ -19,7 +19,7 @@ from flipflow.studies.candidates import Space
 from flipflow.studies.documents import CODEC
 from flipflow.studies.study_plan import refuse_other
 
-SCHEMA = "flipflow/design-search/1"
+SCHEMA = "flipflow/design-search/2"
 SHARES = "share"
 
 
