@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import flipflow as ff
-from flipflow.errors import IncompleteError, InputError
+from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.io.derived import derive
+from flipflow.io.vary import read_vary
 from flipflow.studies.assessment import assess_case, energy_balance, input_hash, verdict
+from flipflow.studies.drive_check import power_that_passes
 from flipflow.studies.quantity_values import Working
+from judge import close
 
 pytestmark = pytest.mark.numerical
 
@@ -250,6 +253,143 @@ def test_a_stop_without_gap_counts_where_both_frames_swing_alike(screen):
 def test_the_digest_of_the_input_holds_the_drive():
     """The drive decides how the machine starts, which the assessment tells."""
     project = ff.load_project("ffs0827")
-    driven = dataclasses.replace(project, drive=ff.Drive(inertia=1.0))
-    stiffer = dataclasses.replace(project, drive=ff.Drive(inertia=2.0))
+    driven = replace(project, drive=ff.Drive(inertia=1.0))
+    stiffer = replace(project, drive=ff.Drive(inertia=2.0))
     assert len({input_hash(one) for one in (project, driven, stiffer)}) == 3
+
+
+@pytest.mark.parametrize("times", [3e3, 1e4, 3e4])
+def test_means_hold_behind_a_stop_whose_motion_decays_at_once(screen, times):
+    """A decay of a thousandth of the turn lies between the nodes of an even rule."""
+    machine = screen.replace(stop_damping=times * screen.stop_damping)
+    orbit = ff.frequency_response(machine, (40.0, 200.0)).orbits_at(150.0)[0]
+    assert orbit.touches
+    dampers = machine.isolation_damping * orbit.mean_square_velocity("main")
+    dampers += machine.shear_damping * orbit.mean_square_velocity("relative")
+    close("what comes in", orbit.input_power(), dampers + orbit.stop_power(), rel=1e-11)
+
+
+def raising_once(at):
+    """A monitor that raises Cancelled once, at a call, and says no more."""
+    calls = []
+
+    def monitor(_sentence, _share):
+        calls.append(None)
+        if len(calls) == at:
+            raise Cancelled("stopped")
+
+    return monitor
+
+
+@pytest.mark.parametrize("at", [5, 40, 300])
+def test_a_cancelled_jump_risk_is_no_answer(screen, at):
+    with pytest.raises(Cancelled):
+        ff.jump_risk(screen, 203.0, monitor=raising_once(at))
+
+
+def test_a_diagram_that_is_cancelled_at_its_turn_is_not_complete(screen):
+    found = ff.bifurcation_diagram(screen, "omega", [90.0, 100.0], monitor=raising_once(2))
+    assert found.up.values.size == 2
+    assert found.down.values.size == 0
+    assert not found.complete
+
+
+def test_a_search_over_independent_parts_tells_how_far_it_is_and_can_be_cancelled():
+    springs = [ff.ClearanceSpring(d, 5.0, 0.1, 1.0) for d in ([1.0, 0.0], [0.0, 1.0])]
+    machine = ff.MechanicalSystem(
+        np.eye(2), 0.2 * np.eye(2), np.eye(2), springs, ff.HarmonicForce([0.5, 0.5])
+    )
+    told = []
+    ff.periodic_orbits(machine, omega=0.8, monitor=lambda _, share: told.append(share))
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    with pytest.raises(Cancelled):
+        ff.periodic_orbits(machine, omega=0.8, monitor=raising_once(2))
+
+
+def test_a_solver_that_was_interrupted_is_not_used_again(exact):
+    formulation = exact.orbit(0).point.formulation
+    with pytest.raises(KeyboardInterrupt), formulation.lent() as interrupted:
+        raise KeyboardInterrupt
+    with formulation.lent() as other:
+        assert other is not interrupted
+    with formulation.lent() as again:
+        assert again is other
+
+
+def test_a_list_in_which_one_field_never_changes_is_opened_again(screen, tmp_path):
+    vary = {"clearance": [6e-3] * 3, "shear_stiffness": [2.8e6, 2.6e6, 2.7e6]}
+    asked = (screen, vary, "relative_amplitude", 120.0)
+    found = ff.study(*asked, sampling="list", store=tmp_path / "store")
+    again = ff.open_study(tmp_path / "store")
+    np.testing.assert_array_equal(
+        again.values["relative_amplitude"], found.values["relative_amplitude"]
+    )
+    assert again.distributions == found.distributions
+
+
+def test_a_grid_with_a_value_given_twice_is_drawn(screen):
+    vary = {"clearance": [6e-3, 6e-3, 7e-3], "shear_stiffness": [2.6e6, 2.7e6]}
+    found = ff.study(screen, vary, "relative_amplitude", 120.0)
+    assert found.grid_shape == (3, 2)
+    figure = ff.figure(found)
+    once = ff.study(screen, {**vary, "clearance": [6e-3, 7e-3]}, "relative_amplitude", 120.0)
+    for panel, same in zip(figure.panels, ff.figure(once).panels, strict=True):
+        for trace, other in zip(panel.traces, same.traces, strict=True):
+            np.testing.assert_array_equal(trace.x, other.x)
+            np.testing.assert_array_equal(trace.y, other.y)
+
+
+def test_carried_weight_hangs_on_the_normal_springs(screen):
+    machine = screen.replace(normal_stiffness=1.2e6, normal_damping=2e4, deck_angle=0.26)
+    step = ff.LoadStep(1.0, ff.Load(main_mass=300.0))
+    history = ff.simulate(machine, 120.0, 100, disturbances=[step])
+    turn = np.flatnonzero(history.t >= history.t[-1] - 2.0 * math.pi / 120.0 * (1.0 + 1e-9))[1:]
+    sunk = -300.0 * 9.80665 * math.cos(0.26) / 1.2e6
+    close("normal", history.normal_displacement[turn].mean(), sunk, rel=1e-6)
+
+
+@pytest.mark.parametrize(("dip", "passes"), [(0.06, True), (0.045, False), (0.03, False)])
+def test_no_motor_passes_where_its_torque_dips_below_its_own_friction(screen, dip, passes):
+    """Friction assumed as a share of the rated torque grows with the motor."""
+    rows = ((0.0, 1.5), (20.0, 1.5), (24.0, dip), (28.0, 1.5), (140.0, 2.2), (157.08, 0.0))
+    motor = ff.Motor(rated_power=15e3, synchronous_speed=157.08, torque_table=rows)
+    drive = ff.Drive(
+        inertia=1.0, motor=motor, ratio=1.0, friction=0.05 * motor.rated_torque,
+        assumed_fields=("friction",),
+    )  # fmt: skip
+    assert (power_that_passes(drive, screen, 24.0) is not None) == passes
+
+
+@pytest.mark.parametrize("length", [1.0, 1e-8])
+def test_the_largest_motion_comes_first_in_any_unit_of_length(screen, length):
+    """FFS0827 at 203 rad/s, its lengths in another unit."""
+    system = screen.system()
+    (spring,) = system.springs
+    gaps = {n: length * getattr(spring, n) for n in ("clearance", "clearance_minus")}
+    spring = replace(spring, **gaps)
+    unbalance = ff.Unbalance([length * screen.eccentric_moment, 0.0])
+    machine = ff.MechanicalSystem(system.M, system.C, system.K, [spring], unbalance)
+    gap = np.array([[1.0, -1.0]])
+    ways = [
+        np.ptp(orbit.motion.extremes(gap)[:2]) / length
+        for orbit in ff.periodic_orbits(machine, omega=203.0)
+    ]
+    assert len(ways) == 3
+    assert ways == sorted(ways, reverse=True)
+
+
+def test_a_glide_has_no_spectrum(screen):
+    history = ff.ramp(screen, (100.0, 140.0), 50.0).history
+    with pytest.raises(InputError, match="constant speed"):
+        ff.spectrum(history, "relative")
+
+
+def test_a_tolerance_in_degrees_may_have_their_sign(screen):
+    tilted = screen.replace(deck_angle=0.26)
+    close(
+        "°",
+        read_vary(("deck_angle=+-1 °",), tilted)["deck_angle"],
+        read_vary(("deck_angle=+-1 deg",), tilted)["deck_angle"],
+        rel=1e-15,
+    )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +21,8 @@ from flipflow.model.system import MechanicalSystem
 TIMES = "give finite times in s"
 ROUNDING = 1e-10  # share of the amplitude up to which a first harmonic is none
 MOST_SAMPLES = 10_000_000  # times in a grid over one period
+GAUSS_POINTS = 24  # nodes on each part of a piece
+RADIANS = 4.0  # of its fastest term, at most, in a part of a piece
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,28 @@ class Motion:
             owner.append(np.full(count, e))
         return np.concatenate(times), np.concatenate(owner)
 
+    @property
+    def quadrature(self) -> tuple[Real, NDArray[np.intp], Real]:
+        """Times, pieces and weights (K,) of a mean over the period, by Gauss' rule on parts.
+
+        What decays at once, as behind a heavily damped contact, lies at the very start of a piece:
+        its first part is halved towards it.
+        """
+        nodes, weights = _gauss_rule()
+        fastest = np.abs(self.rate.imag).max(
+            axis=1, initial=self.omega * self.order.max(initial=1.0)
+        )
+        steepest = np.abs(self.rate.real).max(axis=1, initial=0.0)
+        limits = [
+            _parts(*piece)
+            for piece in zip(self.length.tolist(), fastest.tolist(), steepest.tolist(), strict=True)
+        ]
+        piece = np.repeat(np.arange(self.start.size), [len(one) for one in limits])
+        begin, end = np.array([part for one in limits for part in one]).T
+        times = (self.start[piece] + begin)[:, None] + (end - begin)[:, None] * nodes
+        share = (end - begin)[:, None] * (weights / self.period)
+        return times.ravel(), np.repeat(piece, nodes.size), share.ravel()
+
     def extremes(self, coordinates: Real) -> tuple[Real, Real, Complex]:
         """Least and greatest value and first harmonic, (G,) each, of coordinates (G, N)."""
         remedy = f"give vectors of {self.system.size} finite numbers, one a row"
@@ -146,6 +172,22 @@ class Motion:
             side = engaged_side(spring.law, self.regime[:, j])
             found += _joined(j, side, self.start, ends, self.period)
         return tuple(sorted(found, key=lambda interval: interval.start))
+
+
+def _parts(length: float, fastest: float, steepest: float) -> list[tuple[float, float]]:
+    """Begin and end of the parts of a piece, each counted from its start."""
+    count = 1 + int(fastest * length / RADIANS)
+    limits = [length * k / count for k in range(1, count + 1)]
+    while limits[0] * steepest > 1.0:
+        limits.insert(0, 0.5 * limits[0])
+    return list(pairwise([0.0, *limits]))
+
+
+@functools.cache
+def _gauss_rule() -> tuple[Real, Real]:
+    """Nodes and weights on (0, 1)."""
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    return (nodes + 1.0) / 2.0, weights / 2.0
 
 
 def states_on(motion: Motion, t: Real, piece: NDArray[np.intp]) -> Real:

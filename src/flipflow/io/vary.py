@@ -121,7 +121,7 @@ def _about(
     value = getattr(screen, field.name)
     if value is None or value in (0.0, float("inf")):
         raise InputError(OPTION, word, "the machine has no value to vary about, give low..high")
-    if field.unit and any(letter.isalpha() for letter in text.lower().replace("e", "")):
+    if field.unit and any(one.isalpha() or one == "°" for one in text.lower().replace("e", "")):
         wide = count * _number(field, text)
         if not wide > 0.0:
             raise InputError(OPTION, word, "give a tolerance above 0")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,7 +30,6 @@ from flipflow.results.frozen import Frozen
 from flipflow.results.result import Result, above
 
 Pieces = NDArray[np.intp]
-GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 POINTS_PER_TURN = 720  # default times in each forcing period
 ZOOMS, ZOOMED = 2, 17  # how often a summit is looked at more closely, and at how many times
 MOST_TOPS = 8  # summits that are looked at more closely
@@ -319,16 +317,8 @@ class Orbit(Frozen, Result):
         return cast("NDArray[Any]", found)
 
     def _mean(self, function: Callable[[Real, Pieces], Real]) -> float:
-        nodes, weights = _gauss_rule()
-        start, length = self.motion.start, self.motion.length
-        # A free piece may last the whole turn and hold many harmonics: cut it up.
-        parts = 1 + (16.0 * length / self.period).astype(np.intp)
-        piece = np.repeat(np.arange(start.size), parts)
-        part = np.concatenate([np.arange(count) for count in parts])
-        share = (part[:, None] + (nodes + 1.0) / 2.0) / parts[piece, None]
-        t = start[piece, None] + length[piece, None] * share
-        values = function(t.ravel(), np.repeat(piece, nodes.size)).reshape(t.shape)
-        return float((values @ weights) @ (length / (2.0 * parts))[piece] / self.period)
+        t, piece, weight = self.motion.quadrature
+        return float(weight @ function(t, piece))
 
     def _times(self, t: ArrayLike | None) -> Real:
         return self.t if t is None else checked_numbers("t", t, "give finite times in s")
@@ -419,13 +409,6 @@ def initial_state(system: MechanicalSystem, initial: str | Orbit | ArrayLike) ->
     if state.shape != (2 * size,):
         raise InputError("initial", initial, remedy)
     return state
-
-
-@functools.cache
-def _gauss_rule() -> tuple[Real, Real]:
-    """Nodes and weights on (-1, 1)."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    return nodes, weights
 
 
 def _summit(values: Real) -> float:

@@ -147,15 +147,16 @@ class Formulation(Frozen):
 
     @contextmanager
     def lent(self) -> Iterator[Solver]:
-        """A solver for a moment, new where all others are in use: making one takes longer."""
+        """A solver for a moment, new where all others are in use: making one takes longer.
+
+        One that was interrupted may still be at work, and is left alone.
+        """
         try:
             solver = self._idle.pop()
         except IndexError:
             solver = self.solver()
-        try:
-            yield solver
-        finally:
-            self._idle.append(solver)
+        yield solver
+        self._idle.append(solver)
 
     @cached_property
     def _idle(self) -> list[Solver]:

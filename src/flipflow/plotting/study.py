@@ -261,7 +261,8 @@ class _Grid:
         self._keep = _others_nearest(study, (across, up))
         first, second = (np.asarray(study.columns[n], float)[self._keep] for n in (across, up))
         x, y = np.unique(first), np.unique(second)
-        self._order = np.lexsort((first, second))
+        # A value that was given twice makes the same machine twice.
+        self._order = np.unique(np.stack([second, first]), axis=1, return_index=True)[1]
         self._shape = y.size, x.size
         self.x, self.y = x * _field_scale(study, across), y * _field_scale(study, up)
 

@@ -557,7 +557,7 @@ def _against(row: LimitRow) -> str:
 
 
 def input_hash(project: Project) -> str:
-    """Digest of all values that decide the result."""
+    """Digest of all values of the project that decide a result, and of the version."""
     inputs = {
         "screen": dataclasses.asdict(project.screen),
         "limits": dataclasses.asdict(project.limits),

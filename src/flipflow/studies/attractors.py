@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,15 +113,14 @@ class Attractors:
                     tick(base + share * part)
 
             run = self.lanes.settle(states[wave], starts[wave], self.capture, most, say)
-            _write(whole, wave, run)
             while not run.cancelled and self._found_further(run):
-                run = self._again(run, states[wave], starts[wave], most)
-                _write(whole, wave, run)
+                run = self._again(run, states[wave], starts[wave], most, say)
+            _write(whole, wave, run)
             if run.cancelled:
-                return Run(whole.states, whole.label, whole.turns, whole.code, cancelled=True)
+                return replace(whole, cancelled=True)
             done += wave.size
-        while self._let_go(whole).any():
-            whole = self._again(whole, states, starts, most)
+        while not whole.cancelled and self._let_go(whole).any():
+            whole = self._again(whole, states, starts, most, say)
             self._found_further(whole)
         return whole
 
@@ -128,12 +128,16 @@ class Attractors:
         """Lanes that a neighbourhood caught which is smaller by now, and no longer holds them."""
         return np.asarray((run.label != NOT_SETTLED) & ~self.capture.holds(run.states, run.label))
 
-    def _again(self, run: Run, states: Real, starts: Real, most: int) -> Run:
+    def _again(
+        self, run: Run, states: Real, starts: Real, most: int, say: Callable[[float], None]
+    ) -> Run:
         """Lanes that nothing caught or holds, run anew: a motion found since may catch them."""
         open_ = np.flatnonzero(_unsettled(run) | self._let_go(run))
-        more = self.lanes.settle(states[open_], starts[open_], self.capture, most)
+        more = self.lanes.settle(
+            states[open_], starts[open_], self.capture, most, lambda _: say(1.0)
+        )
         _write(run, open_, more)
-        return run
+        return replace(run, cancelled=more.cancelled)
 
     def _found_further(self, run: Run) -> bool:
         """Solve for motions from the ends of lanes that did not settle; whether one is new."""

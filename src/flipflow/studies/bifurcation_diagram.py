@@ -254,10 +254,12 @@ def bifurcation_diagram(
     def tell(before: int, done: int) -> None:
         say(f"{before + done} of {2 * count} values", (before + done) / (2 * count))
 
-    rows, jumps = step_by_step(passing.steps(range(count)), z, most_turns, partial(tell, 0))
+    rows, jumps, stopped = step_by_step(
+        passing.steps(range(count)), z, most_turns, partial(tell, 0)
+    )
     up = passing.passed(range(len(rows)), rows, jumps, points)
-    back = range(count - 1, -1, -1) if len(rows) == count else range(0)
-    rows, jumps = step_by_step(
+    back = range(0) if stopped else range(count - 1, -1, -1)
+    rows, jumps, _ = step_by_step(
         passing.steps(back), rows[-1].state, most_turns, partial(tell, count)
     )
     down = passing.passed(back[: len(rows)], rows, jumps, points)

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Int, Real
+from flipflow.errors import Cancelled
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
+Tick = Callable[[float], None]
 Kind = Literal["+", "-", "lump"]
 KINDS: tuple[Kind, ...] = ("+", "-", "lump")
 LINEAR_STEP = 1.0 / 60.0  # of the largest blow, between two rungs from a tenth of it on
@@ -32,6 +34,7 @@ FINE_LADDER = np.geomspace(0.6, 1.05, 24)  # shares of a blow known to throw, tr
 BISECTIONS = 12  # halvings between the last rung that does not throw and the first that does
 NEARBY = 9  # phases tried around the best one, each time it is narrowed down
 NARROWINGS = 2  # times that this is done
+SCANNED = 0.8  # share of the work on least blows that is done when all rungs are tried
 MOMENTUM_TIMES = 4.0  # largest blow over what the frame, at its fastest, holds of momentum
 MOST_TURNS = 2000  # forcing periods waited for a motion to settle after a blow
 SPEED_POINTS = 720  # times in a period at which the fastest velocity of a frame is looked for
@@ -111,16 +114,22 @@ class Blows:
         heavy = lump * self.rows[row].mobility
         return heavy / (1.0 + heavy)
 
-    def labels(
-        self, row: Int, share: Real, phase: Real, tick: Callable[[float], None] | None = None
-    ) -> Int:
-        """The motion on which the machine settles after each blow, (K,)."""
+    def labels(self, row: Int, share: Real, phase: Real, tick: Tick) -> Int:
+        """The motion on which the machine settles after each blow, (K,).
+
+        Raises
+        ------
+        Cancelled
+            When ``tick``, which is called with the share done, raised it.
+        """
         t = phase / self.omega
         x, v = self.motion.derivative(t, 0), self.motion.derivative(t, 1).copy()
         index = np.array([one.index for one in self.rows])[row]
         v += self.mobility[:, index].T * self._pushes(row, share, v)[:, None]
         begin = np.mod(t, 2.0 * np.pi / self.omega)
         run = self.attractors.run(np.concatenate([x, v], axis=1), MOST_TURNS, begin, tick)
+        if run.cancelled:
+            raise Cancelled("stopped among the blows")
         self.tried += run.label.size
         self.undecided += int(np.sum(run.label == NOT_SETTLED))
         return run.label
@@ -129,13 +138,7 @@ class Blows:
         """Whether the machine has settled on another motion."""
         return np.asarray((labels != self.home) & (labels != NOT_SETTLED))
 
-    def least(
-        self,
-        row: Int,
-        phase: Real,
-        tick: Callable[[float], None] | None = None,
-        around: Real | None = None,
-    ) -> Real:
+    def least(self, row: Int, phase: Real, tick: Tick, around: Real | None = None) -> Real:
         """The least share that throws, for rows and moments (K,); infinite where none does.
 
         Steps of the ladder up to 1 are a fifth, at most a sixtieth of the whole; the ladder is a
@@ -145,7 +148,7 @@ class Blows:
         base = np.ones(row.size) if around is None else around
         shares = np.outer(base, ladder)
         every = np.repeat(np.arange(row.size), ladder.size)
-        labels = self.labels(row[every], shares.ravel(), phase[every], tick)
+        labels = self.labels(row[every], shares.ravel(), phase[every], within(tick, 0.0, SCANNED))
         hit = self.thrown(labels).reshape(shares.shape)
         first = np.where(hit.any(axis=1), hit.argmax(axis=1), -1)
         found = np.flatnonzero(first >= 0)
@@ -154,27 +157,34 @@ class Blows:
             return least
         high = shares[found, first[found]]
         low = np.where(first[found] > 0, shares[found, first[found] - 1], 0.0)
-        for _ in range(BISECTIONS):
+        for k in range(BISECTIONS):
             middle = 0.5 * (low + high)
-            thrown = self.thrown(self.labels(row[found], middle, phase[found]))
+            part = within(within(tick, SCANNED, 1.0), k / BISECTIONS, (k + 1) / BISECTIONS)
+            thrown = self.thrown(self.labels(row[found], middle, phase[found], part))
             high, low = np.where(thrown, middle, high), np.where(thrown, low, middle)
         least[found] = high
         return least
 
-    def worst_moment(self, row: int, phases: Real, least: Real) -> tuple[float, float]:
+    def worst_moment(self, row: int, phases: Real, least: Real, tick: Tick) -> tuple[float, float]:
         """Share and phase of a row's least blow, the moment refined between those scanned."""
         best = int(least.argmin())
         share, phase = float(least[best]), float(phases[best])
         step = float(phases[1] - phases[0])
-        for _ in range(NARROWINGS):
+        for narrowing in range(NARROWINGS):
+            part = within(tick, narrowing / NARROWINGS, (narrowing + 1) / NARROWINGS)
             near = phase + step * np.linspace(-1.0, 1.0, NEARBY)
             rows, around = np.full(near.size, row), np.full(near.size, share)
-            shares = self.least(rows, np.mod(near, 2.0 * np.pi * self.turns), None, around)
+            shares = self.least(rows, np.mod(near, 2.0 * np.pi * self.turns), part, around)
             k = int(shares.argmin())
             if shares[k] < share:
                 share, phase = float(shares[k]), float(near[k])
             step *= 2.0 / (NEARBY - 1)
         return share, float(np.mod(phase, 2.0 * np.pi * self.turns))
+
+
+def within(tick: Tick, low: float, high: float) -> Tick:
+    """What tells the share of a part of some work, from ``low`` to ``high`` of the whole."""
+    return lambda share: tick(low + (high - low) * share)
 
 
 def frames_of(system: MechanicalSystem) -> list[tuple[Coordinate, int]]:

@@ -122,13 +122,13 @@ def power_that_passes(drive: Drive, screen: FlipFlowScreen, omega: float) -> flo
         return None
     speeds = omega * np.linspace(*AROUND, SPEEDS)
     asked = free_power(screen, speeds) / speeds
-    given = drive.torque(speeds)
+    given, rubbed = drive.torque(speeds), drive.friction_torque(speeds)
+    # Friction that was assumed as a share of the rated torque grows with the motor.
+    if "friction" in drive.assumed_fields:
+        given, rubbed = given - rubbed, np.zeros(speeds.size)
     if (given <= 0.0).any():
         return None
-    # Friction that was assumed as a share of the rated torque grows with the motor.
-    rubbed = drive.friction_torque(speeds)
-    grows = "friction" in drive.assumed_fields
-    share = asked / (given - rubbed) if grows else (asked + rubbed) / given
+    share = (asked + rubbed) / given
     most = float(share.max())
     return motor.power * most if math.isfinite(most) and most > 0.0 else None
 

@@ -37,7 +37,6 @@ DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 ORDERS = 3  # highest order of the shaft's speed of which amplitude and phase are told
 EXCITED = math.sqrt(0.5)  # share of the greatest force that bounds the half-power band
 WITHIN = 8  # times looked at within each step of a run
-GAUSS_POINTS = 24  # nodes on each part of a piece, of at most a sixteenth of a period
 EQUAL = "assumed equal: the machine file holds no positions of the supports"
 SHARED = (
     "shared at rest by a rigid frame on equal springs, evenly spaced up the slope, two abreast, "
@@ -462,17 +461,10 @@ def _orders(orbit: Orbit, screen: FlipFlowScreen) -> list[OrderLoad]:
 
 
 def harmonic(orbit: Orbit, which: str, order: float) -> complex:
-    """X of Re(X exp(i order omega t)) of a coordinate, by Gauss quadrature on every piece."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-    vector, total = orbit.system.coordinate(which), 0.0j
-    for e, (start, length) in enumerate(zip(orbit.motion.start, orbit.motion.length, strict=True)):
-        parts = 1 + int(16.0 * length / orbit.period)
-        steps = (np.arange(parts)[:, None] + (nodes + 1.0) / 2.0).ravel() / parts
-        t = start + length * steps
-        x = orbit.motion.piece_derivative(t, np.full(t.size, e), 0) @ vector
-        turned = x * np.exp(-1j * order * orbit.omega * t)
-        total += complex(np.tile(weights, parts) @ turned) * length / (2.0 * parts)
-    return 2.0 * total / orbit.period
+    """X of Re(X exp(i order omega t)) of a coordinate."""
+    t, piece, weight = orbit.motion.quadrature
+    x = orbit.motion.piece_derivative(t, piece, 0) @ orbit.system.coordinate(which)
+    return complex(2.0 * weight @ (x * np.exp(-1j * order * orbit.omega * t)))
 
 
 def _run_loads(name: str, run: RunUp) -> RunLoads:

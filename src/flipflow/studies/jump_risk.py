@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,11 +20,15 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point
 from flipflow.results.result import Result
 from flipflow.studies.attractors import Attractors
-from flipflow.studies.blows import Blows
+from flipflow.studies.blows import Blows, Tick, within
 from flipflow.transient.settling import is_stable
 
 PHASES = 60  # in each forcing period at which blows fall
 LONE_STRIDE = 6  # every so many phases serve where no other motion is known
+LONE, REFINED = (
+    0.1,
+    0.9,
+)  # shares of the work when another motion is looked for, when all are scanned
 MOST_IMPULSE = 1e9  # kg m/s, largest impulse that may be asked for
 NO_OTHER = "No other motion found: it cannot jump."
 
@@ -203,8 +206,14 @@ def jump_risk(
     blows = Blows(attractors, point, home, largest_impulse)
     turns = point.formulation.turns
     phases = 2.0 * np.pi * np.arange(PHASES * turns) / PHASES
-    least = _scanned(blows, phases, lambda share: say("blows", 0.9 * share))
-    throws = [_throw(blows, row, phases, least[row]) for row in range(len(blows.rows))]
+
+    def tell(share: float) -> None:
+        say("blows", share)
+
+    least = _scanned(blows, phases, within(tell, 0.0, REFINED))
+    rows = len(blows.rows)
+    parts = [within(within(tell, REFINED, 1.0), k / rows, (k + 1) / rows) for k in range(rows)]
+    throws = [_throw(blows, k, phases, least[k], part) for k, part in enumerate(parts)]
     found = [throw for throw in throws if throw is not None]
     others = tuple(o for k, o in enumerate(attractors.orbits) if k != home)
     say("done", 1.0)
@@ -221,7 +230,7 @@ def jump_risk(
     )
 
 
-def _scanned(blows: Blows, phases: Real, tick: Callable[[float], None]) -> Real:
+def _scanned(blows: Blows, phases: Real, tick: Tick) -> Real:
     """The least share of each row that throws at each phase, (rows, P).
 
     Where no other motion is known, few blows are to find one first.
@@ -229,11 +238,11 @@ def _scanned(blows: Blows, phases: Real, tick: Callable[[float], None]) -> Real:
     every = np.arange(len(blows.rows))
     few = phases[::LONE_STRIDE]
     if len(blows.attractors.orbits) == 1:
-        blows.least(np.repeat(every, few.size), np.tile(few, every.size))
+        blows.least(np.repeat(every, few.size), np.tile(few, every.size), within(tick, 0.0, LONE))
     if len(blows.attractors.orbits) == 1:
         return np.full((every.size, phases.size), np.inf)
     rows, moments = np.repeat(every, phases.size), np.tile(phases, every.size)
-    return blows.least(rows, moments, tick).reshape(every.size, phases.size)
+    return blows.least(rows, moments, within(tick, LONE, 1.0)).reshape(every.size, phases.size)
 
 
 def _checked_impulse(largest: object) -> float | None:
@@ -267,17 +276,17 @@ def _working_point(system: MechanicalSystem, motion: float | Orbit) -> Point:
     return point
 
 
-def _throw(blows: Blows, row: int, phases: Real, least: Real) -> Throw | None:
+def _throw(blows: Blows, row: int, phases: Real, least: Real, tick: Tick) -> Throw | None:
     """The least blow of a row, None where none throws the motion."""
     if not np.isfinite(least).any():
         return None
-    share, phase = blows.worst_moment(row, phases, least)
+    share, phase = blows.worst_moment(row, phases, least, within(tick, 0.0, REFINED))
     one = blows.rows[row]
     lump = blows.lump(row, share) if one.kind == "lump" else None
     shares = share * np.array([1.0, 0.99, 1.01])
     if lump is not None:
         shares[1:] = [blows.lump_share(row, lump * factor) for factor in (0.99, 1.01)]
-    labels = blows.labels(np.full(3, row), shares, np.full(3, phase))
+    labels = blows.labels(np.full(3, row), shares, np.full(3, phase), within(tick, REFINED, 1.0))
     thrown = blows.thrown(labels)
     sharp = bool(not thrown[1] and thrown[2])
     lands = blows.attractors.orbits[int(labels[0])]

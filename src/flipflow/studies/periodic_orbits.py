@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import correction
@@ -37,6 +36,7 @@ SWEEP_STEPS = 12  # speeds on the way
 BRANCH_RATIOS = (1.15, 2.5)  # ends of the branch from below over the speed asked for, and under it
 FAMILY_RATIOS = (1.1, 1.0 / 1.1)  # speeds over the one asked for with families that may reach it
 FAMILY_REACH = 1.15  # how far a family of several periods is followed to either side, as a factor
+SAME_WAY = 1e-9  # share of the largest way by which ways of mirrors differ, by rounding
 BRANCH_STEPS = 60  # longest step on it: the interval divided by this
 
 logger = logging.getLogger("flipflow")
@@ -98,9 +98,14 @@ def periodic_orbits(
     search = _Search(machine, checked_speed(omega), max_periods)
     parts = independent_parts(search.settling.solver.system)
     if len(parts) > 1:
-        search.combine(
-            [periodic_orbits(part.system, omega, max_periods, random) for part in parts], parts
-        )
+        motions = []
+        for k, part in enumerate(parts):
+
+            def tell(words: str, share: float, k: int = k) -> None:
+                say(f"part {k + 1} of {len(parts)}: {words}", (k + share) / len(parts))
+
+            motions.append(periodic_orbits(part.system, omega, max_periods, random, monitor=tell))
+        search.combine(motions, parts)
         return search.orbits()
     search.add_one_state_motions()
     starts = search.starts(random)
@@ -207,9 +212,7 @@ class _Search:
             )
         if self.lost:
             logger.warning("at %.6g rad/s: %s", self.omega, self.progress())
-        which = _first_gap(self.settling.solver.system)
-        found = [Orbit(self.machine, point) for point in self.found]
-        return tuple(sorted(found, key=lambda o: (-_reach(o, which), -o.state @ which)))
+        return _largest_first([Orbit(self.machine, point) for point in self.found])
 
     def _flown(self, z: Real, omega: float) -> Real | None:
         """Where a state is after some turns; None where a flow does not end, which is counted."""
@@ -334,14 +337,16 @@ def _phases(part: MechanicalSystem, orbit: Orbit) -> Real:
     return Settling(part, orbit.periods).phases(orbit.point)
 
 
-def _first_gap(system: MechanicalSystem) -> NDArray[np.float64]:
-    n = system.size
-    direction = system.springs[0].direction if system.springs else np.eye(n)[0]
-    return np.concatenate([direction, np.zeros(n)])
-
-
-def _reach(orbit: Orbit, which: Real) -> float:
-    """Half peak-to-peak at the first gap, in m, in steps that hide rounding between mirrors."""
-    vector = which[: orbit.system.size]
-    low, high, _ = orbit.motion.extremes(vector[None])
-    return round(float(high[0] - low[0]) / 2.0, 9)
+def _largest_first(orbits: list[Orbit]) -> tuple[Orbit, ...]:
+    """By their way at the first gap; mirrors, which rounding tells apart, by where they begin."""
+    if not orbits:
+        return ()
+    system = orbits[0].system
+    gap = system.springs[0].direction if system.springs else np.eye(system.size)[0]
+    ends = np.array([orbit.motion.extremes(gap[None])[:2] for orbit in orbits])[..., 0]
+    way = ends[:, 1] - ends[:, 0]
+    order = np.argsort(-way, kind="stable")
+    rank = np.empty(way.size, np.int64)
+    rank[order] = np.append(0, np.cumsum(-np.diff(way[order]) > SAME_WAY * way.max()))
+    begin = [orbit.state[: system.size] @ gap for orbit in orbits]
+    return tuple(orbits[k] for k in np.lexsort((-np.array(begin), rank)))

@@ -164,7 +164,8 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
     Raises
     ------
     InputError
-        For a history that is sampled unevenly, shorter than the periods asked for, or than two.
+        For a history that is sampled unevenly, whose speed changes, or that is shorter than the
+        periods asked for, or than two.
     """
     checked_kind("motion", motion, (Orbit, History), "give an orbit or a history")
     if periods is not None:
@@ -175,6 +176,9 @@ def spectrum(motion: Orbit | History, which: Coordinate, periods: int | None = N
         amplitudes = _amplitudes(motion.displacement(which, t), np.ones(count))
         lines = np.arange(amplitudes.size) * motion.omega / motion.periods
         return Spectrum(motion.omega, lines, amplitudes, which, motion.system)
+    if np.ptp(motion.omega) > UNEVEN * float(motion.omega[-1]):
+        told = f"speeds from {motion.omega.min():.6g} to {motion.omega.max():.6g} rad/s"
+        raise InputError("motion", told, "give a history at constant speed")
     step = np.diff(motion.t)
     if motion.t.size < 3 or np.ptp(step) > UNEVEN * float(motion.t[-1]):
         raise InputError("motion", "times", "give a history sampled at even times")

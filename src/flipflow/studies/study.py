@@ -33,7 +33,7 @@ from flipflow.model.quantities import BranchWord
 from flipflow.model.sampling import Sample
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.system import Machine
-from flipflow.model.vary import Distribution, Vary
+from flipflow.model.vary import Choice, Distribution, Vary
 from flipflow.results.result import Result
 from flipflow.studies.lane_values import slope_key
 from flipflow.studies.rubber_temperature import air_notes
@@ -161,7 +161,7 @@ class Study(Result):
         """Number of values of each field of a grid; of others (S,)."""
         if self.sampling != "grid":
             return (self.size,)
-        return tuple(np.unique(column).size for column in self.columns.values())
+        return tuple(len(one.values) for one in self.distributions if isinstance(one, Choice))
 
 
 def study(

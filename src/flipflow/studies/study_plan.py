@@ -285,7 +285,7 @@ def plan_from(store: ChunkStore) -> Plan:
         raise StoreError(f"{store.folder} is damaged: its machines are not those it began with.")
     read = CODEC.form(Distribution).read
     varied = tuple(
-        Variation(name, Choice(tuple(np.unique(columns[name]).tolist())))
+        Variation(name, Choice(tuple(np.sort(columns[name]).tolist())))
         if written == "values"
         else Variation(name, read(written))
         for name, written in known["vary"].items()

@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,14 +29,13 @@ from flipflow.model.elements import ClearanceSpring
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate
 from flipflow.periodic.derivatives import MotionDerivatives
-from flipflow.periodic.orbit import GAUSS_POINTS, Orbit
+from flipflow.periodic.orbit import Orbit
 from flipflow.studies.quantity_values import Frame, number_or_nan
 
 Pieces = NDArray[np.intp]
 TILT = 1e-60  # size of an imaginary part, as a share of the derivative it stands for
 LOWER = 0.01  # share by which a sample of the grid may lie below the highest and lead to it
 MOST_PEAKS = 64  # that are compared
-PER_RADIAN = 2.5  # parts of a piece in which means are taken, per radian of its fastest term
 
 
 @dataclass(frozen=True, eq=False)
@@ -404,22 +402,8 @@ class TiltedMotion:
     @cached_property
     def _nodes(self) -> tuple[Path, Real]:
         """The motion at Gauss nodes on all pieces, and their weights as shares of the period."""
-        nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
-        times, pieces, shares_of = [], [], []
-        rates = self.motion.rate
-        for e, (start, length) in enumerate(
-            zip(self.motion.start, self.motion.length, strict=True)
-        ):
-            fastest = max(np.abs(rates[e].imag).max(initial=0.0), self.orbit.omega)
-            parts = 1 + int(PER_RADIAN * fastest * length)
-            limits = graded(length / parts, np.abs(rates[e].real).max(initial=0.0))
-            limits = np.append(limits, length * np.arange(2, parts + 1) / parts)
-            for begin, end in pairwise(limits):
-                times.append(start + begin + (end - begin) * (nodes + 1.0) / 2.0)
-                pieces.append(np.full(nodes.size, e))
-                shares_of.append(weights * (end - begin) / (2.0 * self.period))
-        path = self._path(np.concatenate(times), np.concatenate(pieces))
-        return path, np.concatenate(shares_of)
+        t, piece, weight = self.motion.quadrature
+        return self._path(t, piece), weight
 
     def _average(self, formula: Formula) -> Complex:
         """Mean over the period of what does not jump at a change of contact."""
@@ -491,12 +475,6 @@ class TiltedMotion:
             return self._climbed(formula, values, other) if level else np.asarray(values[k])
         at = float(brentq(rate, a, b, xtol=1e-15 * self.period, rtol=1e-14))
         return np.asarray(formula(self._path(np.array([at]), piece[k : k + 1]))[0])
-
-
-def graded(length: float, decay: float) -> Real:
-    """Limits of parts of a piece of the motion, halved towards its start as long as it decays."""
-    halves = max(int(np.ceil(np.log2(max(decay * length, 1.0)))), 0)
-    return np.append(0.0, length * 0.5 ** np.arange(halves, -1, -1))
 
 
 def beside_zero(mean: Complex, high: Complex, low: Complex) -> NDArray[np.bool_]:

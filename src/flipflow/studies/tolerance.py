@@ -246,7 +246,7 @@ def limits_known(study: Study, limits: Limits) -> tuple[str, ...]:
 
 
 def jumped_motions(study: Study) -> Flags:
-    """Motions that lie beyond the jump speed, (S, C, F); none where folds were not asked for."""
+    """Motions that lie beyond the jump speed, (S, C, F), of a study that asked for folds."""
     end = study.values[FOLDS[0] if study.branch == "lower" else FOLDS[1]]
     return np.asarray(study.omega > end[:, :, np.newaxis])
 

@@ -272,11 +272,13 @@ class _Run:
         """Carry a load from now on: what it adds hangs on the springs as they are under it."""
         screen = cast("FlipFlowScreen", self.machine)
         self.machine = screen.loaded(load).replace(measured_shift=screen.gap_shift)
+        if screen.deck_angle is None:
+            return
         system = self.build(self.machine)
-        if system.size > 1:
-            fall = GRAVITY * math.sin(screen.deck_angle or 0.0)
-            weight = -fall * np.array([load.main_mass, load.floating_mass])
-            self.sunk = self.sunk + np.linalg.solve(system.K, weight)
+        weight = GRAVITY * np.array([load.main_mass, load.floating_mass])
+        along = weight * math.sin(screen.deck_angle)
+        across = weight.sum(keepdims=True) * math.cos(screen.deck_angle)
+        self.sunk = self.sunk - np.linalg.solve(system.K, along if system.size > 1 else across)
 
     def _tell(self, t: float) -> None:
         if self.monitor is None:

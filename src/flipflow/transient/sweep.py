@@ -226,7 +226,7 @@ def sweep(
     def tell(done: int) -> None:
         say(f"settled at {speeds[done - 1]:.4g} rad/s", done / speeds.size)
 
-    rows, jumped = step_by_step(steps, z, most_turns, tell)
+    rows, jumped, _ = step_by_step(steps, z, most_turns, tell)
     jumps = tuple(Jump(k, float(speeds[k - 1]), float(speeds[k])) for k in jumped)
     done = len(rows)
     return Sweep(
@@ -264,11 +264,11 @@ def step_at(settling: Settling, omega: float) -> Step:
 
 def step_by_step(
     steps: Iterable[Step], z: Real, most_turns: int, tell: Callable[[int], None]
-) -> tuple[list[Settled], list[int]]:
+) -> tuple[list[Settled], list[int], bool]:
     """Settle at one step after the other, each from where the one before ended.
 
-    Returns the rows, and the indices of those in which another motion is met. ``tell`` is called
-    with the number of rows that are finished; when it raises Cancelled, these are returned.
+    Returns the rows, the indices of those in which another motion is met, and whether ``tell``,
+    which is called with the number of rows that are finished, raised Cancelled.
     """
     rows: list[Settled] = []
     jumps: list[int] = []
@@ -283,8 +283,8 @@ def step_by_step(
         try:
             tell(len(rows))
         except Cancelled:
-            break
-    return rows, jumps
+            return rows, jumps, True
+    return rows, jumps, False
 
 
 def _kept(row: Settled) -> Settled:
