@@ -16,6 +16,7 @@ from flipflow.continuation.refinement import TRACE_ALL, follow
 from flipflow.continuation.varied import varied_carried, varied_residual
 from flipflow.dynamics.contact_search import extremes, next_change, prepare_search
 from flipflow.dynamics.flow import contact_number, saltation
+from flipflow.dynamics.law import force, regime_at, stored_energy
 from flipflow.dynamics.machine_series import set_machine
 from flipflow.periodic.shooting import shooting_step
 from flipflow.periodic.two_event import force_excess, two_event_state
@@ -50,6 +51,15 @@ def range_of(motion, duration):
     """``extremes`` of the first gap."""
     prepare_search(motion, motion.rate.shape[0])
     return extremes(motion, motion.rate.shape[0], 0, duration)
+
+
+@kernel(entry=True)
+def law_of_spring(stops, regime, y, v, found):
+    """``force``, ``stored_energy`` and ``regime_at`` of the first spring at K states, (K, 3)."""
+    for k in range(y.shape[0]):
+        found[k, 0] = force(stops, 0, regime[k], y[k], v[k])
+        found[k, 1] = stored_energy(stops, 0, regime[k], y[k])
+        found[k, 2] = regime_at(stops, 0, y[k], v[k])
 
 
 def shoot(problem, work, z, omega, r, J):

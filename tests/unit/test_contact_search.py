@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from flipflow.dynamics.contact_search import GapMotion, new_gap_motion
 from flipflow.dynamics.law import Stops
-from flipflow.model.contact_law import FORCE, NUMBER
+from flipflow.model.contact_law import FORCE, LAWS, NUMBER, force_in, regime_at, stored_energy
 from judge import close
-from kernel_calls import change_after, range_of
+from kernel_calls import change_after, law_of_spring, range_of
 
 pytestmark = pytest.mark.numerical
 OPEN, PLUS, MINUS, RELEASED_PLUS = 0, 1, -1, 2
@@ -286,3 +286,33 @@ def test_extremes_of_a_ripple_that_grows() -> None:
         low, high, _, _ = range_of(m, 2.0)
         close("least", low, y.min(), abs=1e-6)
         close("most", high, y.max(), abs=1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.7])
+@pytest.mark.parametrize("law", LAWS)
+def test_arrays_and_kernels_have_one_law(law, damping):
+    """Force and energy in every regime, and the regime of a state, at the gaps themselves, too."""
+    rng = np.random.default_rng(NUMBER[law])
+    k, gaps = 3.0, (0.2, 0.5)
+    stops = contact(*gaps, stiffness=k, damping=damping, law=law)
+    y, v = rng.uniform(-2.0, 2.0, 400), rng.uniform(-4.0, 4.0, 400)
+    y[:100:2], y[1:100:2] = gaps[0], -gaps[1]
+    pieces = len(LAWS[law])
+    anything = rng.integers(-pieces, pieces + 1, 400)
+    found = np.empty((400, 3))
+    law_of_spring(stops, anything, y, v, found)
+    close("force", found[:, 0], force_in(law, k, damping, gaps, anything, y, v), abs=1e-14)
+    close("energy", found[:, 1], stored_energy(law, k, gaps, anything, y), abs=1e-14)
+    regime = regime_at(law, k, damping, gaps, y, v)
+    np.testing.assert_array_equal(found[:, 2], regime)
+    depth = np.maximum(y - gaps[0], 0.0) - np.maximum(-y - gaps[1], 0.0)
+    inwards = np.where(regime != 0, v * np.sign(regime), 0.0)
+    spring, damper = k * np.abs(depth), damping * inwards
+    size = {
+        "paper": spring + damper,
+        "compression-only": np.maximum(spring + damper, 0.0),
+        "undamped-rebound": spring + np.maximum(damper, 0.0),
+        "elasto-gap": spring + np.clip(damper, -spring, spring),
+    }[law]
+    found = force_in(law, k, damping, gaps, regime, y, v)
+    close("law", found, np.sign(regime) * size, abs=1e-14)

@@ -168,9 +168,11 @@ def stored_energy(
 def regime_at(
     law: ContactLaw, k: float, c: float, gaps: tuple[float, float], y: ArrayLike, v: ArrayLike
 ) -> Int:
-    """Regime of a stop at positions y and rates v; exactly at the gap it is open."""
+    """Regime of a stop at positions y and rates v; exactly at the gap the rate decides."""
     y, v = np.broadcast_arrays(np.asarray(y, float), np.asarray(v, float))
-    side = np.where(y > gaps[0], 1, np.where(y < -gaps[1], -1, 0))
+    plus = (y > gaps[0]) | ((y == gaps[0]) & (v > 0.0))
+    minus = (y < -gaps[1]) | ((y == -gaps[1]) & (v < 0.0))
+    side = np.where(plus, 1, np.where(minus, -1, 0))
     depth = np.where(side != 0, side * (y - np.where(side != 0, signed_gap(side, gaps), 0.0)), 0.0)
     piece = np.abs(side) * WHOLE
     for _ in range(MOST_PIECES if c > 0.0 else 0):
