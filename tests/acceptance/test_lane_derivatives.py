@@ -7,6 +7,7 @@ import pytest
 
 import flipflow as ff
 from flipflow.batch.lane_columns import lane_columns
+from flipflow.batch.lane_path import CONVERGED
 from flipflow.batch.reasons import FOUND
 from flipflow.batch.slope_readings import SlopesAsked
 from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes, solve_slopes
@@ -174,7 +175,8 @@ def test_machines_that_nobody_chose(seed, compared):
         for one in asked:
             wanted = told(orbit, one.name, names)
             slope = found[slope_key(one.name)][row, 0]
-            same(slope * factor, wanted, rtol=1e-6, floor=1e-12)
+            # A lane is read off at its last iterate, a Newton step of up to CONVERGED away.
+            same(slope * factor, wanted, rtol=1e-6, floor=CONVERGED)
             compared[seed] += np.isfinite(wanted).sum() * bool(orbit.touches)
 
 

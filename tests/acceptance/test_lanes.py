@@ -297,6 +297,37 @@ def test_a_jump_on_the_way_leads_where_it_leads_however_far_the_speed_ahead():
         close(f"at {phase}", found.values["amplitude[0]"][0, 0, 1], expected.amplitude(0), rel=1e-6)
 
 
+@pytest.mark.parametrize(("law", "damping"), [("paper", 0.0), ("undamped-rebound", 332.2)])
+def test_a_variant_is_on_its_own_motion_from_below_whatever_the_nominal_machine_does(law, damping):
+    """With a smaller gap it is carried on beyond the resonance; the nominal machine has jumped."""
+    nominal = ff.FlipFlowScreen(
+        main_mass=98.5, floating_mass=19.82, eccentric_moment=0.18564, isolation_stiffness=19506.0,
+        isolation_damping=617.8, shear_stiffness=22023.0, shear_damping=129.3,
+        stop_stiffness=83062.0, stop_damping=damping, clearance=8.626e-3, stop_law=law,
+    )  # fmt: skip
+    gaps = np.array([5.5e-3, 6e-3, 6.5e-3, 7.5e-3, 8.626e-3])
+    found = ff.study(nominal, {"clearance": gaps}, "relative_amplitude", 49.8652)
+    alone = [
+        ff.frequency_response(nominal.replace(clearance=gap), (5.0, 80.0)).orbit_from_below(49.8652)
+        for gap in gaps.tolist()
+    ]
+    wanted = [orbit.amplitude("relative") for orbit in alone]
+    assert max(wanted) > 2.0 * min(wanted)
+    close("from below", found.values["relative_amplitude"][:, 0, 0], wanted, rel=1e-8)
+
+
+def test_where_no_motion_of_one_turn_is_stable_a_lane_goes_on_slowly():
+    """Let go at 1.14582 from the last motion it settles on .0354, to which nothing leads there."""
+    stop = ff.ClearanceSpring([1.0], 13.92327692720007, 0.0, 0.07221739090366394, law="elasto-gap")
+    base = ff.MovingBase(0.18844248372657238, [1.44227879], [0.07211394])
+    machine = ff.MechanicalSystem([[6.95462496]], [[0.17959443]], [[1.44227879]], (stop,), base)
+    expected = ff.frequency_response(machine, (0.1, 1.716)).orbit_from_below(1.14582)
+    close("branch", expected.amplitude(0), 0.249514, rel=1e-5)
+    for speeds in ([1.14582], [0.4125, 1.14582]):
+        found = ff.study(machine, {"forcing": [1.0, 1.001]}, "amplitude[0]", speeds)
+        close(f"{speeds}", found.values["amplitude[0]"][0, 0, -1], 0.249514, rel=1e-5)
+
+
 def test_a_machine_that_always_touches_comes_from_below_to_a_single_speed():
     """From rest it settled into a motion of 0.0595 m beside that of 0.0234."""
     stops = (

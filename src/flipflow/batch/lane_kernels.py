@@ -13,6 +13,7 @@ from flipflow.batch.lane_path import (
     MARGIN,
     PUSH,
     SAME,
+    TURNS_BETWEEN,
     LaneWork,
     begin_lane,
     contact_free_state,
@@ -33,10 +34,11 @@ from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_free_range import contact_free_up_to, is_contact_free_below
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.periodic.shooting import Shooting
-from flipflow.periodic.two_event import has_two_events, two_event_state
+from flipflow.periodic.two_event import has_two_events, is_only_motion, two_event_state
 
 BEHIND = 1e-3  # share of a frequency at which a motion ends, behind which the next one is sought
 LEAPS = 8  # from motion to motion on the way to one frequency
+DRIFT = 0.02  # share by which a frequency goes on while the motion repeats after no single turn
 OCTAVES_BELOW = 4  # below a frequency at which a machine that rests on a stop is let settle first
 OCTAVES = 3  # away from a frequency at which a machine is let settle where it does not there
 
@@ -109,22 +111,13 @@ def run_lane(
         begun = not math.isnan(work.omega[0])
         rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
-            half = even and nearby.even[f] != 0
-            problem, modes = problem_of(machine, half, length), work.shooting.flow.modes
-            # A motion nearby may be one that a machine does not come to which meets no stop.
-            free = rising and is_contact_free_below(machine, modes, omega[f])
-            if not free:
-                begun = start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f])
-            if not begun:
-                half = even
-                problem = problem_of(machine, half, length)
-                begun = start_without_contact(problem, work, omega[f], rising and not free)
-            if not begun and rising and f == 0:
-                begun, half = start_far_below(machine, work, omega[f], length, even)
+            begun, half = set_off(machine, work, f, omega, length, nearby, even, rising)
         reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
         if begun and not lost and not reached:
             jumps += 1
             reached, half = leapt(machine, work, omega[f], length, even, half)
+        if lost:
+            reached, half = resumed(machine, work, omega[f - 1], omega[f], length, even)
         if not reached:
             reached, half = settled(machine, work, omega[f], length, even)
             if f == 0 and not reached:
@@ -140,6 +133,30 @@ def run_lane(
             read_lane(machine, flow, reading, asked, omega[f], turn, half, readings, lane, f)
         else:
             found.reason[lane, f] = NO_MOTION
+
+
+@kernel
+def set_off(
+    machine: MachineArrays, work: LaneWork, f: int, omega: Real, length: float, nearby: Nearby,
+    even: bool, rising: bool,
+) -> tuple[bool, bool]:  # fmt: skip
+    """Begin the path of a lane for frequency f: whether it is begun, and whether even.
+
+    A motion nearby may be one to which this machine does not come from below: one that meets no
+    stop on its way up begins without contact, and so does one that may have other motions there.
+    """
+    half, flow = even and nearby.even[f] != 0, work.shooting.flow
+    free = rising and is_contact_free_below(machine, flow.modes, omega[f])
+    if not free and (not rising or is_only_motion(machine, flow, work.touch, omega[f])):
+        problem = problem_of(machine, half, length)
+        if start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f]):
+            return True, half
+    problem = problem_of(machine, even, length)
+    if start_without_contact(problem, work, omega[f], rising and not free):
+        return True, even
+    if rising and f == 0:
+        return start_far_below(machine, work, omega[f], length, even)
+    return False, even
 
 
 @kernel
@@ -241,11 +258,42 @@ def leapt(
         beyond = end * (1.0 + math.copysign(BEHIND, omega - end))
         reached, half_there = settled(machine, work, beyond, length, even)
         if not reached:
+            reached, half_there = drifted(machine, work, beyond, omega, length), False
+        if not reached:
             break
         half = half_there
         if follow(problem_of(machine, half, length), work, omega):
             return True, half
     return False, half
+
+
+@kernel
+def drifted(
+    machine: MachineArrays, work: LaneWork, begin: float, omega: float, length: float
+) -> bool:
+    """Let the speed go on slowly from where the flow of work.z repeats after no single turn.
+
+    False where it settles on no motion of one turn before omega.
+    """
+    problem, at = problem_of(machine, False, length), begin
+    while at != omega:
+        ahead = at * (1.0 + math.copysign(DRIFT, omega - at))
+        at = ahead if (omega - ahead) * (omega - at) > 0.0 else omega
+        if settle(problem, work, at, TURNS_BETWEEN):
+            return True
+    return False
+
+
+@kernel
+def resumed(
+    machine: MachineArrays, work: LaneWork, begin: float, omega: float, length: float, even: bool
+) -> tuple[bool, bool]:
+    """Go on to omega from a flow that repeated after no single turn at ``begin``."""
+    if not drifted(machine, work, begin, omega, length):
+        return False, False
+    if follow(problem_of(machine, False, length), work, omega):
+        return True, False
+    return leapt(machine, work, omega, length, even, False)
 
 
 @kernel

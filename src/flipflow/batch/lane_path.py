@@ -43,6 +43,8 @@ CONVERGED = 1e-9  # last Newton step, as a share of the motion; the error left i
 HELD = 1e-13  # the same where a constant force holds the machine far from where it moves about
 DIVERGED = 1e3  # Newton step, as a share of the motion, from which none follows
 FAR = 0.1  # first Newton step along a path, as a share of the motion: farther lies another motion
+ASTRAY = 0.2  # share of the way of a step by which it may differ from what its tangents tell
+UNSEEN = 1e-3  # the same as a share of the motion
 FAR_FROM_GUESS = 0.3  # the same from the motion of another machine
 LONGEST = 0.05  # step in frequency, as a share of it
 SHORTEST = 2e-5  # step in frequency, as a share of it, below which the motion has ended
@@ -338,6 +340,20 @@ def add_cubic(work: LaneWork, omega: float) -> None:
 
 
 @kernel
+def keeps_course(work: LaneWork, omega: float, length: float) -> bool:
+    """Whether a step goes as its tangents do; over a fold and back it leads to another motion."""
+    size = work.z.shape[0]
+    step, change, off, large = 0.5 * (omega - work.omega[0]), 0.0, 0.0, length
+    for k in range(size):
+        weight = 1.0 if 2 * k < size else 1.0 / omega
+        gone = work.z[k] - work.r[k] - work.path[0, k]
+        change = max(change, weight * abs(gone))
+        off = max(off, weight * abs(gone - step * (work.slope_here[k] + work.slope[k])))
+        large = max(large, weight * abs(work.z[k]))
+    return off <= max(ASTRAY * change, UNSEEN * large)
+
+
+@kernel
 def follow(problem: Shooting, work: LaneWork, target: float) -> bool:
     """Follow the motion of the path to a frequency; False where it ends before, or turns back."""
     while work.omega[0] != target:
@@ -349,7 +365,8 @@ def follow(problem: Shooting, work: LaneWork, target: float) -> bool:
         predict(work, end)
         code = newton(problem, work, end, FAR)
         # The determinant of J is the product of all mu - 1: negative with an odd number beyond +1.
-        if code == status.OK and lu_sign(work.A, work.pivot) > 0.0:
+        known = code == status.OK and lu_sign(work.A, work.pivot) > 0.0
+        if known and keeps_course(work, end, problem.length):
             accept(work, end)
             work.stride[0] = min(LONGEST, 2.0 * work.stride[0])
             continue
@@ -362,15 +379,16 @@ def follow(problem: Shooting, work: LaneWork, target: float) -> bool:
 
 
 @kernel
-def settle(problem: Shooting, work: LaneWork, omega: float) -> bool:
+def settle(problem: Shooting, work: LaneWork, omega: float, most: int = TURNS_MOST) -> bool:
     """Fly from work.z at omega until Newton finds the motion settled on, which restarts the path.
 
-    False where the flow settles on none that repeats after a turn of the problem.
+    False where the flow settles on none that repeats after a turn of the problem, or not in
+    ``most`` turns; work.z is where it has come to.
     """
     size = work.z.shape[0]
     flow = work.shooting.flow
     flown = 0
-    while flown < TURNS_MOST:
+    while flown < most:
         for k in range(size):
             flow.z[k] = work.z[k]
         for _ in range(TURNS_BETWEEN):

@@ -23,7 +23,7 @@ from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.compiled.dense import lu_factor, lu_solve
-from flipflow.dynamics.contact_search import exponential
+from flipflow.dynamics.contact_search import exponential, modulus
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, new_flow, prepare_drive
 from flipflow.dynamics.modes import Modes, prepare
@@ -36,6 +36,8 @@ PAPER = NUMBER["paper"]
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
+FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
+NEARLY_ZERO = 0.5  # share of its least sample down to which a parabola may fall to have no zero
 MOST_SECANTS = 9  # values of f from a share close by; six are usual
 ON_ZERO = 1e-10  # |f| from which the state is that of the motion
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
@@ -237,6 +239,36 @@ def two_event_states(
             found += 1
         before, f_before = s, f
     return found
+
+
+@kernel
+def is_only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float) -> bool:
+    """Whether there is one motion alone at omega: one zero of f, or the motion without contact.
+
+    That one is the limit s = 0, where f is what the gap is more than its amplitude, as a share.
+    Where f comes so near to zero between samples that two zeros may be missed, there may be more.
+    """
+    if not has_two_events(machine):
+        return False
+    if math.isnan(force_excess(machine, flow, work, omega, 1.0 / FEW_SAMPLES)):
+        return False
+    open_motion = 0j
+    for k in range(machine.direction.shape[1]):
+        open_motion += machine.direction[0, k] * flow.drive[OPEN_SLOT, 0, k]
+    last = machine.stops.gap[0, 0] / modulus(open_motion) - 1.0
+    before, motions = last, 1 if last > 0.0 else 0
+    for i in range(FEW_SAMPLES):
+        f = force_excess(machine, flow, work, omega, (i + 0.5) / FEW_SAMPLES)
+        if not f * last > 0.0:
+            motions += 1
+        elif last * before > 0.0 and abs(last) < min(abs(before), abs(f)):
+            dip = last - (f - before) ** 2 / (8.0 * (f - 2.0 * last + before))
+            if dip < NEARLY_ZERO * last if last > 0.0 else dip > NEARLY_ZERO * last:
+                return False
+        if motions > 1:
+            return False
+        before, last = last, f
+    return motions == 1
 
 
 @kernel
