@@ -277,7 +277,7 @@ def test_figures_of_a_journal_column(tmp_path) -> None:
 
 def test_multipliers_are_tracked() -> None:
     """Each column is one multiplier: it never jumps to where another stood."""
-    from flipflow.plotting.multipliers import tracked_multipliers  # noqa: PLC0415
+    from flipflow.plotting.branches import tracked_multipliers  # noqa: PLC0415
 
     drawn = ff.figure(branch(), multipliers=True)
     assert drawn.panels[1].traces[0].name == "unit circle"

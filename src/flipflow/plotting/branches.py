@@ -1,4 +1,4 @@
-"""Several branches over speed in one panel, and a branch over a field of the machine."""
+"""Branches over speed and over a field of the machine, their multipliers, and curves of points."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Complex, Real
+from flipflow.continuation.bifurcation_curve import BifurcationCurve
 from flipflow.continuation.branch import Branch
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.errors import InputError
 from flipflow.model.fields import FIELD
 from flipflow.model.system import Coordinate
-from flipflow.plotting.curves import Curve
+from flipflow.plotting.curves import Curve, stable_beside
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
-from flipflow.plotting.panels import Axis, Panel, Trace
+from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import (
+    KIND_SYMBOLS,
+    KIND_WORDS,
     READING,
+    UNSTABLE_FOLD,
     coordinates,
     curve_traces,
     label,
@@ -31,6 +36,13 @@ from flipflow.plotting.response import (
 from flipflow.plotting.scales import MM, RPM
 from flipflow.plotting.units import speed_of
 
+MOST_SHOWN = 6  # multipliers that are drawn
+WIDEST = 1.6  # of the plane around the unit circle
+CIRCLE = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))
+DASHES = {"grazing": "dot", "period doubling": "dash", "symmetry breaking": "dash",
+          "Neimark-Sacker": "dashdot"}  # fmt: skip
+OMEGA = "omega"
+WORDS = {"fold": "jump speed (fold)", "grazing": "contact begins (grazing)"}
 Read = Callable[[FieldBranch], tuple[Real, Real]]
 
 
@@ -238,3 +250,103 @@ def _with_margin(x: Real) -> tuple[float, float]:
     """Ends of an axis a little beyond the values."""
     margin = 0.02 * float(np.ptp(x))
     return float(x.min()) - margin, float(x.max()) + margin
+
+
+def multipliers_figure(branch: Branch | FieldBranch) -> Figure:
+    """|mu| of each multiplier over the parameter, and mu beside the unit circle."""
+    if isinstance(branch, Branch):
+        x, axis = branch.omega * RPM, speed_axis(branch.omega)
+    else:
+        axis, scale = field_axis(branch.field, branch.values)
+        x = branch.values * scale
+    tracked = tracked_multipliers(branch.multipliers)
+    largest = np.nanmax(np.abs(tracked), axis=0, initial=0.0)
+    tracked = tracked[:, np.sort(np.argsort(-largest, kind="stable")[:MOST_SHOWN])]
+    sizes, ways = [], [Trace("unit circle", CIRCLE.real, CIRCLE.imag, colour="gap")]
+    for k, mu in enumerate(tracked.T):
+        name, colour = f"multiplier {k + 1}", case_colour(k)
+        sizes.append(Trace(name, x, np.abs(mu), colour=colour, symbol=case_symbol(k)))
+        ways.append(Trace(name, mu.real, mu.imag, colour=colour, legend=False))
+    ends = 1.05 * max(1.0, float(np.abs(tracked).max(initial=1.0)))
+    left = Panel(axis, Axis("|multiplier|", "", (0.0, ends)), tuple(sizes), lines=(Line("y", 1.0),))
+    wide = min(ends, WIDEST)
+    right = Panel(
+        Axis("real part", "", (-wide, wide)), Axis("imaginary part", "", (-wide, wide)),
+        tuple(ways), equal=True,
+    )  # fmt: skip
+    caption = (
+        "Factors by which small disturbances grow over a period; each line is one multiplier, "
+        "followed along the branch. Below 1 the motion returns."
+        + (f" The {MOST_SHOWN} that grow largest." if largest.size > MOST_SHOWN else "")
+        + (f" The plane ends at {WIDEST}." if ends > WIDEST else "")
+    )
+    return Figure("Multipliers", caption, (left, right), 2, 320, (0.6, 0.4))
+
+
+def tracked_multipliers(multipliers: Complex) -> Complex:
+    """Rows (n, 2 N) reordered so that each column is one multiplier along the branch."""
+    tracked = np.array(multipliers)
+    for p in range(1, tracked.shape[0]):
+        away = np.abs(tracked[p - 1][:, None] - multipliers[p][None, :])
+        if np.isfinite(away).all():
+            tracked[p] = multipliers[p][linear_sum_assignment(away)[1]]
+    return tracked
+
+
+def curves_figure(*curves: BifurcationCurve) -> Figure:
+    """Curves of special points, and what stands on them, over two parameters of one machine.
+
+    Raises
+    ------
+    InputError
+        For a curve without points, and for curves over other parameters than the first's.
+    """
+    names = curves[0].parameters
+    for curve in curves:
+        if curve.parameters != names:
+            over = " and ".join(names)
+            raise InputError("result", curve.parameters, f"give curves over {over} alone")
+        if not curve.orbits:
+            raise InputError("result", "a curve without points", curve.status.value)
+    every = np.concatenate([curve.values for curve in curves])
+    (x_axis, x_scale), (y_axis, y_scale) = (
+        _parameter_axis(name, every[:, k]) for k, name in enumerate(names)
+    )
+    traces, named = [], set[str]()
+    for k, curve in enumerate(curves):
+        name = _curve_name(curve)
+        traces.append(
+            Trace(
+                name, curve.values[:, 0] * x_scale, curve.values[:, 1] * y_scale, "stable",
+                case_colour(k), bold=curve.kind == "fold", legend=name not in named,
+                dash=DASHES.get(curve.kind, ""),
+            )
+        )  # fmt: skip
+        named.add(name)
+    points = [point for curve in curves for point in curve.special_points]
+    for kind in dict.fromkeys(point.kind for point in points):
+        at = np.array([point.values for point in points if point.kind == kind])
+        traces.append(
+            Trace(KIND_WORDS.get(kind, kind), at[:, 0] * x_scale, at[:, 1] * y_scale, "point",
+                  "jump", symbol=KIND_SYMBOLS.get(kind, "square-open"))
+        )  # fmt: skip
+    caption = (
+        "Each line is where the motion changes its character in the plane of both parameters; "
+        "marks are where two such changes meet, or where a line turns back."
+    )
+    title = " against ".join(name.replace("_", " ") for name in names)
+    return Figure(title, caption, (Panel(x_axis, y_axis, traces=tuple(traces)),), height=430)
+
+
+def _curve_name(curve: BifurcationCurve) -> str:
+    """What the legend calls a curve; folds between unstable motions alone are no jumps."""
+    if curve.kind == "fold" and all(stable_beside(orbit) is False for orbit in curve.orbits):
+        return UNSTABLE_FOLD
+    return WORDS.get(curve.kind, curve.kind)
+
+
+def _parameter_axis(name: str, values: Real) -> tuple[Axis, float]:
+    """Axis of a parameter over all of its values, and the factor from SI to its unit."""
+    if name == OMEGA:
+        return Axis("shaft speed", "rpm"), RPM
+    return field_axis(name, values)

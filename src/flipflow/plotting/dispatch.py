@@ -16,28 +16,34 @@ from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.bars import region_figure
 from flipflow.plotting.basins import basins_figure
-from flipflow.plotting.bifurcation import bifurcation_figure
-from flipflow.plotting.bifurcation_curves import curves_figure
-from flipflow.plotting.branches import branches_figure, field_branch_figure, field_branches_figure
+from flipflow.plotting.branches import (
+    branches_figure,
+    curves_figure,
+    field_branch_figure,
+    field_branches_figure,
+    multipliers_figure,
+)
 from flipflow.plotting.compare import comparison_figure
 from flipflow.plotting.design import proposal_figure
 from flipflow.plotting.design_map import design_map_figure
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.foundation_bars import foundation_figure
+from flipflow.plotting.foundation import foundation_figure
 from flipflow.plotting.history import history_figure
 from flipflow.plotting.jump_risk import jump_risk_figure
 from flipflow.plotting.layout import PIXELS_A_MM, least_width
 from flipflow.plotting.loading import loading_figure
-from flipflow.plotting.lyapunov import lyapunov_figure
 from flipflow.plotting.motion import orbit_figure, orbits_in_time_figure
-from flipflow.plotting.multipliers import multipliers_figure
-from flipflow.plotting.ramp import ramp_figure
+from flipflow.plotting.nonperiodic import (
+    bifurcation_figure,
+    lyapunov_figure,
+    section_figure,
+    spectrum_figure,
+)
 from flipflow.plotting.response import branch_figure, cases_figure, linear_figure
-from flipflow.plotting.section import section_figure, spectrum_figure
 from flipflow.plotting.sensitivity import sensitivity_figure
 from flipflow.plotting.study import study_figure
-from flipflow.plotting.sweep import sweep_figure
+from flipflow.plotting.sweep import ramp_figure, sweep_figure
 from flipflow.plotting.tolerance import tolerance_figure
 from flipflow.plotting.transient import run_up_figure
 from flipflow.plotting.units import in_units, units_for
