@@ -9,7 +9,7 @@ import re
 import pytest
 
 import flipflow as ff
-from flipflow.model.load_case import case_words
+from flipflow.model.numerals import case_words
 from flipflow.report.html import html
 from flipflow.report.registry import blocks_of
 from flipflow.studies.allowed_range import allowed_range

@@ -14,8 +14,7 @@ import typer
 from flipflow.cli.progress import progress
 from flipflow.errors import InputError
 from flipflow.model import constants
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import case_words, rpm
 
 if TYPE_CHECKING:
     from flipflow.model.project import Project

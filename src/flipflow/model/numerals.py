@@ -1,15 +1,24 @@
-"""Numbers in sentences: significant digits, and never an exponent for what is large."""
+"""Words and numbers in sentences: significant digits, and no exponent for what is large."""
 
 from __future__ import annotations
 
 import math
+import re
 
 from flipflow.model.constants import RPM
+
+OWN_WORD = re.compile(r"(load )?case\b", re.IGNORECASE)
 
 
 def capitalized(words: str) -> str:
     """Words as a sentence begins: the first letter large, all others as they are."""
     return words[:1].upper() + words[1:]
+
+
+def case_words(name: str, *, capital: bool = False) -> str:
+    """Write "case hot" for "hot"; a name such as "case 29" has the word already."""
+    words = name if OWN_WORD.match(name) else f"case {name}"
+    return capitalized(words) if capital else words
 
 
 def digits(value: float, count: int = 3) -> str:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from flipflow.model.elements import ClearanceSpring
-from flipflow.model.load_case import case_words
+from flipflow.model.numerals import case_words
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.plotting.figure import Figure

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from flipflow.io.units import in_unit, shown
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized, case_words, rpm
 from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.compare import comparison_figure
 from flipflow.report.blocks import (

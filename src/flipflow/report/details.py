@@ -9,8 +9,7 @@ from flipflow.io.check import Case, Check, Value, check_project
 from flipflow.io.layout import SECTIONS
 from flipflow.io.units import shown
 from flipflow.model.fields import FIELD, MOTION_FIELDS
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized, case_words, rpm
 from flipflow.model.quantities import quantities_of
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.plotting.bars import energy_figure, region_figure

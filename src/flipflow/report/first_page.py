@@ -8,8 +8,7 @@ import textwrap
 from collections.abc import Iterator
 
 from flipflow.model.limits import PASSAGES
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized, case_words, rpm
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.periodic.stability import RETURNS
 from flipflow.plotting.layout import legend_lines

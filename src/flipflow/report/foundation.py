@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from flipflow.io.units import in_unit
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import case_words, rpm
 from flipflow.plotting.foundation import foundation_drawing
 from flipflow.report.blocks import (
     Block,

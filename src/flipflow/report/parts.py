@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from flipflow.model.fields import FIELD
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import capitalized
+from flipflow.model.numerals import capitalized, case_words
 from flipflow.model.quantities import QUANTITIES, missing_words
 from flipflow.model.screen import WarmedLoad, of_air
 from flipflow.report.blocks import Block, Cell, Column, Note, Table

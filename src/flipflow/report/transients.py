@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized, case_words, rpm
 from flipflow.plotting.transient import run_ups_figure
 from flipflow.report.blocks import (
     Block,

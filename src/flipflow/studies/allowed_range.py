@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import span
+from flipflow.model.numerals import case_words, span
 from flipflow.model.quantities import QUANTITIES
 from flipflow.studies.feasible import REGION, STABILITY, Bound
 from flipflow.studies.operating_region import OperatingRegion

@@ -24,9 +24,8 @@ from flipflow.model.limits import (
     Passage,
     limit_bounds,
 )
-from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
-from flipflow.model.numerals import digits, rpm
+from flipflow.model.numerals import case_words, digits, rpm
 from flipflow.model.project import Project
 from flipflow.model.quantities import QUANTITIES, missing_words, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load

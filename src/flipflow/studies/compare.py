@@ -17,8 +17,8 @@ from flipflow.model.arguments import checked_monitor, members_of
 from flipflow.model.drive import DRIVE_FIELDS, Drive
 from flipflow.model.fields import FIELDS, Field
 from flipflow.model.limits import LIMIT_FIELDS, PASSAGES, PASSING_FIELDS, Limits, limit_bounds
-from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
+from flipflow.model.numerals import case_words
 from flipflow.model.project import Document, Project
 from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load

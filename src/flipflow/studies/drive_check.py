@@ -14,8 +14,7 @@ from flipflow.compiled.arrays import Real
 from flipflow.dynamics.linear_response import linear_response
 from flipflow.dynamics.normal import normal_amplitude
 from flipflow.model.drive import Drive
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import case_words, rpm
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import Converter
 from flipflow.transient.run_up import AT_SPEED

@@ -25,8 +25,7 @@ from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind, checked_mapping, checked_text, checked_word
 from flipflow.model.constants import GRAVITY, RPM
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import digits
+from flipflow.model.numerals import case_words, digits
 from flipflow.model.screen import FlipFlowScreen, Rotation
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.result import Result

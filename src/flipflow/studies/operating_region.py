@@ -10,8 +10,8 @@ from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_all, checked_interval, checked_monitor
 from flipflow.model.limits import Limits
-from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
+from flipflow.model.numerals import case_words
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method

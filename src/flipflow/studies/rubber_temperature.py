@@ -20,7 +20,7 @@ import numpy as np
 from flipflow.compiled.arrays import Int, Real
 from flipflow.continuation.frequency_response import frequency_response
 from flipflow.errors import IncompleteError, InputError
-from flipflow.model.load_case import case_words
+from flipflow.model.numerals import case_words
 from flipflow.model.quantities import QUANTITIES
 from flipflow.model.screen import FlipFlowScreen, Load, WarmedLoad, as_cool_as_air, of_air
 from flipflow.periodic.options import Method

@@ -10,9 +10,8 @@ from flipflow.batch.run_chunks import executor_or_threads, run_chunks
 from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.model.drive import Drive
 from flipflow.model.limits import Passage
-from flipflow.model.load_case import case_words
 from flipflow.model.monitor import Monitor
-from flipflow.model.numerals import rpm
+from flipflow.model.numerals import case_words, rpm
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.studies.drive_check import (

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flipflow.model.constants import RPM
-from flipflow.model.load_case import case_words
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized, case_words, rpm
 from flipflow.studies.drive_check import Finding
 from flipflow.studies.start_and_blows import CaseRuns, Transients
 from flipflow.transient.run_up import RunUp

@@ -23,7 +23,7 @@ from flipflow.model.arguments import (
     members_of,
 )
 from flipflow.model.fields import FIELD
-from flipflow.model.load_case import case_words
+from flipflow.model.numerals import case_words
 from flipflow.model.parameters import differentiable, value_of
 from flipflow.model.quantities import BranchWord, Quantity, missing_words, quantity_named
 from flipflow.model.sampling import Columns, Design, Sample, design_of, digest_of
