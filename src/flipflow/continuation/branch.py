@@ -34,8 +34,7 @@ from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
 from flipflow.periodic.stability import STABLE, stability_words
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result, above
+from flipflow.results.result import Frozen, Result, above
 
 AT_TURN = 1e-7  # share of a step within which a peak is found
 Node = tuple[float, float]  # position along the branch, and omega there

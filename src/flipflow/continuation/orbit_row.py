@@ -13,8 +13,7 @@ from flipflow.model.arguments import checked_index
 from flipflow.model.system import Coordinate
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import STABLE
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 
 
 class OrbitRow(Frozen, Result):

@@ -14,8 +14,7 @@ from flipflow.dynamics.contact_free import complex_amplitudes, span
 from flipflow.model.arguments import checked_speeds, refuse_pair
 from flipflow.model.screen import FlipFlowScreen, unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 
 SCAN_POINTS = 4000  # frequencies up to twice the highest natural one, to find peaks between
 

@@ -26,8 +26,7 @@ from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.solver import Point
 from flipflow.periodic.stability import STABLE, full_turn, stability_words
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result, above
+from flipflow.results.result import Frozen, Result, above
 
 Pieces = NDArray[np.intp]
 POINTS_PER_TURN = 720  # default times in each forcing period

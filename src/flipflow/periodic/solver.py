@@ -27,7 +27,7 @@ from flipflow.model.static_rest import rounding
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.readings import corrected
 from flipflow.periodic.shooting import Shooting, ShootingWork, new_shooting, new_shooting_work
-from flipflow.results.frozen import Frozen
+from flipflow.results.result import Frozen
 
 STEP_SHARE = 0.1  # longest step in the unknowns, as a share of their size
 POINTS_MOST = 20_000  # that one branch can record; a few hundred are usual

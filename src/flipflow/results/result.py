@@ -6,6 +6,7 @@ used, so that a result loads neither.
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import os
 from typing import TYPE_CHECKING, Any, cast
@@ -21,6 +22,19 @@ if TYPE_CHECKING:
 def above(module: str, name: str) -> Any:
     """A function of a room above, loaded when it is called for."""
     return getattr(importlib.import_module(f"flipflow.{module}"), name)
+
+
+class Frozen:
+    """A frozen dataclass whose copies hold its fields alone.
+
+    What was worked out when it was asked for stays behind where a result is copied or sent to
+    another process: another thread may be adding to it.
+    """
+
+    def __getstate__(self) -> dict[str, object]:
+        """The fields."""
+        own: Any = self
+        return {field.name: getattr(own, field.name) for field in dataclasses.fields(own)}
 
 
 class Result:

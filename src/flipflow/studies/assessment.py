@@ -32,8 +32,7 @@ from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.periodic.options import Method, checked_method
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.stability import RETURNS, UNDETERMINED, UNSTABLE
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 from flipflow.studies.drive_check import Demand
 from flipflow.studies.feasible import working_motion
 from flipflow.studies.foundation_loads import FoundationLoads, foundation_loads

@@ -22,8 +22,7 @@ from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 from flipflow.studies.attractors import Attractors
 
 NORMAL_95 = 1.959963984540054  # standard deviations of a normal distribution to each side: 95 %

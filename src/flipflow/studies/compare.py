@@ -23,8 +23,7 @@ from flipflow.model.project import Document, Project
 from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.model.screen import FlipFlowScreen, Load
 from flipflow.model.starter import STARTS
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 from flipflow.studies.assessment import Assessment, CaseAssessment, assess, relative_margin
 from flipflow.studies.start_and_blows import CaseRuns
 

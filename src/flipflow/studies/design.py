@@ -24,8 +24,7 @@ from flipflow.model.numerals import rpm
 from flipflow.model.project import Project
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Choice
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result, above
+from flipflow.results.result import Frozen, Result, above
 from flipflow.studies.assessment import FAIL, Assessment, assess
 from flipflow.studies.candidates import JUMP, MET, Space, label_of
 from flipflow.studies.design_search import (

@@ -23,8 +23,7 @@ from flipflow.model.arguments import (
 )
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen, Load, as_cool_as_air, of_air
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 from flipflow.studies.landmarks import Landmarks, Response, analysed_range, landmarks
 from flipflow.studies.loading import amplitude_from_below
 from flipflow.studies.rubber_temperature import air_notes, warmed_load, warming_known

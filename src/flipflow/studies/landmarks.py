@@ -22,7 +22,7 @@ from flipflow.dynamics.linear_response import (
 from flipflow.errors import IncompleteError
 from flipflow.model.quantities import leading_coordinate
 from flipflow.model.system import Machine
-from flipflow.results.frozen import Frozen
+from flipflow.results.result import Frozen
 
 LOWEST_SHARE = 0.22  # lower end of the range over the first natural frequency
 HIGHEST_SHARE = 1.155  # upper end over the highest natural frequency with all stops engaged

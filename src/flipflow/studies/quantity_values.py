@@ -26,7 +26,7 @@ from flipflow.model.quantities import QUANTITIES, Quantity
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.periodic.orbit import Orbit
-from flipflow.results.frozen import Frozen
+from flipflow.results.result import Frozen
 
 Values = float | Real
 Harmonics = complex | NDArray[Any]

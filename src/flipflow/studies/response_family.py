@@ -21,8 +21,7 @@ from flipflow.model.quantities import leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, Machine, system_of
 from flipflow.periodic.options import Method
-from flipflow.results.frozen import Frozen
-from flipflow.results.result import Result
+from flipflow.results.result import Frozen, Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, landmarks
 from flipflow.studies.loading import amplitude_from_below, amplitudes_from_below
 
