@@ -30,11 +30,10 @@ from flipflow.report.blocks import Cell, Column, Table, cells
 from flipflow.report.numbers import number
 from flipflow.studies.loading import (
     Change,
-    LoadedMachine,
     Loading,
     RegionChange,
+    change_at,
     loading,
-    relative_from_below,
 )
 from flipflow.studies.response_family import ResponseFamily, response_family
 
@@ -184,7 +183,10 @@ def without_stop(data: Loads) -> Evaluation:
     machine = data.loading.without_stop
     region = machine.region
     # The paper names its region in whole rad/s, 66 to 93.
-    start, end = (_at(machine, float(math.floor(w))) for w in (region.lower, region.upper))
+    start, end = (
+        change_at(machine.unloaded, machine.loaded, float(math.floor(w)))
+        for w in (region.lower, region.upper)
+    )
     numbers = _reduced("least", region.least) | _reduced("greatest", region.greatest)
     numbers |= _reduced("lower end in whole rad/s", start) | _reduced("upper end", end)
     return decide(list(_within("", region, (1.0, 33.0), (6.0, 49.0))), numbers)
@@ -291,13 +293,6 @@ def heat(data: Loads) -> Evaluation:
             Part(f"{name}: no jump down in the region", fold is None or fold > stopped.upper),
         ]
     return decide(parts, numbers)
-
-
-def _at(machine: LoadedMachine, omega: float) -> Change:
-    """Both amplitudes at one speed as it rises; NaN where a branch does not reach."""
-    return Change(
-        omega, *(relative_from_below(b, omega) for b in (machine.unloaded, machine.loaded))
-    )
 
 
 def _rises(values: list[float], labels: list[str]) -> Iterator[Part]:

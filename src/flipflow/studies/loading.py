@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -267,10 +268,7 @@ def _region(
             "No motion of both the empty and the loaded machine is known in the operating region, "
             f"{ends[0]:.6g} to {ends[1]:.6g} rad/s. {why}".strip()
         )
-
-    def at(w: float) -> Change:
-        return Change(w, relative_from_below(unloaded, w), relative_from_below(loaded, w))
-
+    at = partial(change_at, unloaded, loaded)
     zeros = _zeros(at, omega, change)
     least = min((_refined(at, omega, change, 1.0), *zeros), key=lambda one: abs(one.change))
     greatest = _refined(at, omega, change, -1.0)
@@ -309,13 +307,14 @@ def _refined(at: Callable[[float], Change], omega: Real, change: Real, sign: flo
     return between if inside else sampled
 
 
-def relative_from_below(branch: Branch, omega: float) -> float:
-    """Relative amplitude in m at a speed in rad/s as it rises slowly; NaN without a motion."""
-    return amplitude_from_below(branch, omega, "relative")
+def change_at(unloaded: Branch, loaded: Branch, omega: float) -> Change:
+    """Relative amplitudes of both at a speed in rad/s as it rises; NaN without a motion."""
+    pair = (amplitude_from_below(branch, omega, "relative") for branch in (unloaded, loaded))
+    return Change(omega, *pair)
 
 
 def amplitude_from_below(branch: Branch, omega: float, which: Coordinate) -> float:
-    """Amplitude of a coordinate in m, as :func:`relative_from_below`."""
+    """Amplitude of a coordinate in m at a speed as it rises slowly; NaN without a motion."""
     return float(amplitudes_from_below(branch, np.array([omega]), which)[0])
 
 
