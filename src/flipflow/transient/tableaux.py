@@ -10,7 +10,7 @@ Fractions = tuple[Fraction, ...]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Stages a, weights b, nodes c; ``error`` weighs the stages and, last, the slope at the end.
+    """Stages a, weights b; ``error`` weighs the stages and, last, the slope at the end.
 
     A step is s + h sum_i b_i k_i with k_i the slope at s + h sum_j a_ij k_j. The error estimate is
     h sum_i error_i k_i, k at the end of the step included; zeros where there is none.
@@ -19,7 +19,6 @@ class Tableau:
     order: int
     a: tuple[Fractions, ...]
     b: Fractions
-    c: Fractions
     error: Fractions
 
 
@@ -32,7 +31,6 @@ RK4 = Tableau(
     order=4,
     a=(_row(""), _row("1/2"), _row("0 1/2"), _row("0 0 1")),
     b=_row("1/6 1/3 1/3 1/6"),
-    c=_row("0 1/2 1/2 1"),
     error=_row("0 0 0 0 0"),
 )
 
@@ -48,6 +46,5 @@ DORMAND_PRINCE = Tableau(
         _row("9017/3168 -355/33 46732/5247 49/176 -5103/18656"),
     ),
     b=_row("35/384 0 500/1113 125/192 -2187/6784 11/84"),
-    c=_row("0 1/5 3/10 4/5 8/9 1"),
     error=_row("71/57600 0 -71/16695 71/1920 -17253/339200 22/525 -1/40"),
 )
