@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,10 +71,8 @@ class BifurcationCurve(OrbitRow):
     version: str
 
     def __repr__(self) -> str:
-        counts = Counter(point.kind for point in self.special_points)
-        kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
         over = " and ".join(self.parameters)
-        size = len(self.orbits)
+        size, kinds = len(self.orbits), self._counted()
         return (
             f"BifurcationCurve({self.kind} over {over}, {size} points, {kinds}, {self.status.name})"
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -17,6 +16,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
+from flipflow.continuation.orbit_row import Followed
 from flipflow.continuation.refinement import SHARE_TOLERANCE
 from flipflow.continuation.special_points import FOLD, KINDS
 from flipflow.dynamics.motion import phase_of
@@ -33,8 +33,8 @@ from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 from flipflow.periodic.options import Method
 from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Formulation, Point, Solver, Traced
-from flipflow.periodic.stability import STABLE, stability_words
-from flipflow.results.result import Frozen, Result, above
+from flipflow.periodic.stability import stability_words
+from flipflow.results.result import above
 
 AT_TURN = 1e-7  # share of a step within which a peak is found
 Node = tuple[float, float]  # position along the branch, and omega there
@@ -117,7 +117,7 @@ class ShortenedStep:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(Frozen, Result):
+class Branch(Followed):
     """Periodic motions followed over frequency, in their order along the branch.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its
@@ -171,9 +171,7 @@ class Branch(Frozen, Result):
     def __repr__(self) -> str:
         span = f"{self.omega.min():.6g} to {self.omega.max():.6g}" if self.omega.size else ""
         ends = f"{span}{unit_in(self.machine, 'rad/s')}, " if span else ""
-        counts = Counter(point.kind for point in self.special_points)
-        kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
-        return f"Branch({self.omega.size} points, {ends}{kinds}, {self.status.name})"
+        return f"Branch({self.omega.size} points, {ends}{self._counted()}, {self.status.name})"
 
     @property
     def system(self) -> MechanicalSystem:
@@ -193,19 +191,9 @@ class Branch(Frozen, Result):
         return omega
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
-        """Where ``stability`` is "stable", (n,)."""
-        return np.asarray(self.stability == STABLE)
-
-    @property
     def folds(self) -> tuple[SpecialPoint, ...]:
         """The saddle-nodes, in branch order."""
         return self.points_of(FOLD)
-
-    @property
-    def complete(self) -> bool:
-        """Whether the branch was followed to the end of the interval."""
-        return self.status.complete
 
     @cached_property
     def error(self) -> Real:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,9 +70,7 @@ class FieldBranch(OrbitRow):
 
     def __repr__(self) -> str:
         ends = f"{self.values.min():.6g} to {self.values.max():.6g}, " if self.orbits else ""
-        counts = Counter(point.kind for point in self.special_points)
-        kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
-        size = len(self.orbits)
+        size, kinds = len(self.orbits), self._counted()
         return f"FieldBranch({self.field}, {size} points, {ends}{kinds}, {self.status.name})"
 
     @property

@@ -1,8 +1,10 @@
-"""What results have in common that are a row of motions, each of a machine of its own."""
+"""What branches and curves have in common, and those whose motions are each of another machine."""
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +18,33 @@ from flipflow.periodic.stability import STABLE
 from flipflow.results.result import Frozen, Result
 
 
-class OrbitRow(Frozen, Result):
-    """Motions in their order along a branch or a curve, (n,), and what is read off them."""
+class Followed(Frozen, Result):
+    """Motions in their order along a branch or a curve, with special points among them."""
+
+    special_points: tuple[Any, ...]
+    status: BranchStatus
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where ``stability`` is "stable", (n,)."""
+        own: Any = self
+        return np.asarray(own.stability == STABLE)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the branch was followed to both its ends, or all round."""
+        return self.status.complete
+
+    def _counted(self) -> str:
+        """How many special points there are of each kind."""
+        counts = Counter(point.kind for point in self.special_points)
+        return ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
+
+
+class OrbitRow(Followed):
+    """What is read off motions that are each of a machine of its own, (n,)."""
 
     orbits: tuple[Orbit, ...]
-    status: BranchStatus
 
     @cached_property
     def omega(self) -> Real:
@@ -37,20 +61,10 @@ class OrbitRow(Frozen, Result):
         """Words, (n,): "stable", "unstable" or "undetermined"."""
         return np.array([orbit.stability for orbit in self.orbits], dtype="<U12")
 
-    @property
-    def stable(self) -> NDArray[np.bool_]:
-        """Where ``stability`` is "stable", (n,)."""
-        return np.asarray(self.stability == STABLE)
-
     @cached_property
     def error(self) -> Real:
         """Estimated distance of each motion from the exact one in m, (n,); infinite: unknown."""
         return np.array([orbit.error for orbit in self.orbits])
-
-    @property
-    def complete(self) -> bool:
-        """Whether the branch was followed to both its ends, or all round."""
-        return self.status.complete
 
     def amplitude(self, which: Coordinate) -> Real:
         """Half peak-to-peak of a coordinate at every point in m, (n,)."""
