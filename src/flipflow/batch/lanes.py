@@ -6,22 +6,20 @@ chunk has finished is kept whatever happens to the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.batch.side_by_side import processors, side_by_side
+from flipflow.batch.side_by_side import Tell, processors, side_by_side
 from flipflow.compiled import status
-from flipflow.compiled.arrays import Real
+from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.assembly import machine_arrays
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.shooting import new_shooting, new_shooting_work
 from flipflow.periodic.turn_by_turn import NOT_SETTLED, settle_lanes
 
-Int = NDArray[np.int64]
 CHUNK = 64  # lanes that one task of a thread runs
 ROUNDING = 1e-9  # of a square distance from a centre
 MOST_THREADS = 256  # that may be asked for
@@ -134,7 +132,7 @@ class Lanes:
         begin: Real,
         capture: Capture,
         most: int,
-        tick: Callable[[float], None] | None = None,
+        tick: Tell | None = None,
     ) -> Run:
         """Run states (L, 2 N), which hold at times (L,) of the first turn, until they are caught.
 

@@ -11,11 +11,10 @@ from flipflow.batch.run_chunks import executor_or_threads, run_chunks
 from flipflow.compiled.arrays import Int
 
 Work = Callable[[slice, Int], None]
+Tell = Callable[[float], None]  # called with the share of a work that is done
 
 
-def side_by_side(
-    work: Work, count: int, size: int, threads: int, tell: Callable[[float], None] | None = None
-) -> None:
+def side_by_side(work: Work, count: int, size: int, threads: int, tell: Tell | None = None) -> None:
     """Do a work of ``count`` rows, ``size`` at a time, on some threads.
 
     Kernels leave the interpreter free: the thread that calls this one hears of Ctrl-C meanwhile.

@@ -7,7 +7,6 @@ motion of a machine nearby that all lanes share, and neither on other lanes nor 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
 from flipflow.batch.lane_slopes import slope_lanes
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
-from flipflow.batch.side_by_side import side_by_side
+from flipflow.batch.side_by_side import Tell, side_by_side
 from flipflow.batch.slope_readings import Slopes, SlopesAsked, new_slope_work, new_slopes
 from flipflow.batch.variants import Batch, bonded_terms, stacked
 from flipflow.compiled.arrays import Int, Real
@@ -66,7 +65,7 @@ def solve_lanes(
     asked: Asked,
     nearby: Nearby,
     threads: int = 1,
-    tell: Callable[[float], None] | None = None,
+    tell: Tell | None = None,
 ) -> tuple[Found, Readings]:
     """The motions of a batch of machines at frequencies in the order given, in rad/s.
 

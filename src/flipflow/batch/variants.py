@@ -25,10 +25,10 @@ from flipflow.dynamics.law import Stops
 from flipflow.errors import InputError
 from flipflow.model.fields import FIELD
 from flipflow.model.parameters import value_of, with_values
+from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 
-Columns = Mapping[str, NDArray[Any]]
 Bool = NDArray[np.bool_]
 Shapes = dict[str, tuple[int, ...]]
 Own = FlipFlowScreen | MechanicalSystem

@@ -13,14 +13,13 @@ import typer
 
 from flipflow.cli.progress import progress
 from flipflow.errors import InputError
-from flipflow.model import constants
+from flipflow.model.constants import RPM
 from flipflow.model.numerals import case_words, rpm
 
 if TYPE_CHECKING:
     from flipflow.model.project import Project
     from flipflow.model.screen import Load
 
-RPM = constants.RPM
 OR_SPEED = "give it, or --speed '850 rpm'"
 IN_FILE = "give it: the rubber in warm air is as warm as its work at that speed keeps it"
 WARMING = "warming the rubber; the first run of a version compiles"

@@ -10,7 +10,6 @@ import typer
 from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     IN_FILE,
-    RPM,
     Case,
     File,
     Force,
@@ -25,6 +24,7 @@ from flipflow.cli.options import (
 from flipflow.cli.output import DOES_NOT_START, print_list, printable
 from flipflow.cli.progress import progress
 from flipflow.errors import InputError
+from flipflow.model.constants import RPM
 from flipflow.model.numerals import digits
 
 if TYPE_CHECKING:

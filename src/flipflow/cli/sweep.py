@@ -11,7 +11,6 @@ import typer
 from flipflow.cli.destination import Destination
 from flipflow.cli.options import (
     IN_FILE,
-    RPM,
     Case,
     File,
     Force,
@@ -26,6 +25,7 @@ from flipflow.cli.options import (
 from flipflow.cli.output import printable
 from flipflow.cli.progress import progress, stoppable
 from flipflow.errors import InputError
+from flipflow.model.constants import RPM
 from flipflow.model.numerals import rpm
 
 if TYPE_CHECKING:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.lanes import Capture, Lanes, Run
+from flipflow.batch.side_by_side import Tell
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.model.arguments import checked_generator
@@ -90,7 +91,7 @@ class Attractors:
         states: Real,
         most: int,
         begin: Real | None = None,
-        tick: Callable[[float], None] | None = None,
+        tick: Tell | None = None,
     ) -> Run:
         """Run states until they settle; those that do not are searched for further motions.
 
@@ -128,9 +129,7 @@ class Attractors:
         """Lanes that a neighbourhood caught which is smaller by now, and no longer holds them."""
         return np.asarray((run.label != NOT_SETTLED) & ~self.capture.holds(run.states, run.label))
 
-    def _again(
-        self, run: Run, states: Real, starts: Real, most: int, say: Callable[[float], None]
-    ) -> Run:
+    def _again(self, run: Run, states: Real, starts: Real, most: int, say: Tell) -> Run:
         """Lanes that nothing caught or holds, run anew: a motion found since may catch them."""
         open_ = np.flatnonzero(_unsettled(run) | self._let_go(run))
         more = self.lanes.settle(

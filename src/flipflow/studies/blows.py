@@ -8,13 +8,13 @@ a lump the share of its momentum that the frame loses: 1 for an infinitely heavy
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flipflow.batch.side_by_side import Tell
 from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import Cancelled
 from flipflow.model.system import Coordinate, MechanicalSystem
@@ -22,7 +22,6 @@ from flipflow.periodic.solver import Point
 from flipflow.periodic.turn_by_turn import NOT_SETTLED
 from flipflow.studies.attractors import Attractors
 
-Tick = Callable[[float], None]
 Kind = Literal["+", "-", "lump"]
 KINDS: tuple[Kind, ...] = ("+", "-", "lump")
 LINEAR_STEP = 1.0 / 60.0  # of the largest blow, between two rungs from a tenth of it on
@@ -114,7 +113,7 @@ class Blows:
         heavy = lump * self.rows[row].mobility
         return heavy / (1.0 + heavy)
 
-    def labels(self, row: Int, share: Real, phase: Real, tick: Tick) -> Int:
+    def labels(self, row: Int, share: Real, phase: Real, tick: Tell) -> Int:
         """The motion on which the machine settles after each blow, (K,).
 
         Raises
@@ -138,7 +137,7 @@ class Blows:
         """Whether the machine has settled on another motion."""
         return np.asarray((labels != self.home) & (labels != NOT_SETTLED))
 
-    def least(self, row: Int, phase: Real, tick: Tick, around: Real | None = None) -> Real:
+    def least(self, row: Int, phase: Real, tick: Tell, around: Real | None = None) -> Real:
         """The least share that throws, for rows and moments (K,); infinite where none does.
 
         Steps of the ladder up to 1 are a fifth, at most a sixtieth of the whole; the ladder is a
@@ -165,7 +164,7 @@ class Blows:
         least[found] = high
         return least
 
-    def worst_moment(self, row: int, phases: Real, least: Real, tick: Tick) -> tuple[float, float]:
+    def worst_moment(self, row: int, phases: Real, least: Real, tick: Tell) -> tuple[float, float]:
         """Share and phase of a row's least blow, the moment refined between those scanned."""
         best = int(least.argmin())
         share, phase = float(least[best]), float(phases[best])
@@ -182,7 +181,7 @@ class Blows:
         return share, float(np.mod(phase, 2.0 * np.pi * self.turns))
 
 
-def within(tick: Tick, low: float, high: float) -> Tick:
+def within(tick: Tell, low: float, high: float) -> Tell:
     """What tells the share of a part of some work, from ``low`` to ``high`` of the whole."""
     return lambda share: tick(low + (high - low) * share)
 

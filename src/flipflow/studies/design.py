@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -14,6 +14,7 @@ import numpy as np
 
 from flipflow import __version__
 from flipflow.batch.run_chunks import checked_executor
+from flipflow.batch.side_by_side import Tell
 from flipflow.compiled.arrays import Real
 from flipflow.errors import Cancelled, InputError
 from flipflow.model.arguments import checked_count, checked_monitor, checked_path
@@ -435,7 +436,7 @@ def _rounded(space: Space, found: Polished) -> Polished:
     return found
 
 
-def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Callable[[float], None]:
+def _told(monitor: Monitor | None, words: str, low: float, high: float) -> Tell:
     """What tells a stage's share of the whole."""
 
     def tell(share: float) -> None:

@@ -26,12 +26,12 @@ from scipy.optimize import minimize, nnls
 
 from flipflow.batch.chunk_store import ChunkStore
 from flipflow.batch.run_chunks import run_chunks
+from flipflow.batch.side_by_side import Tell
 from flipflow.compiled.arrays import Real
 from flipflow.errors import Cancelled, required
 from flipflow.studies.candidates import MET, TARGET, Judged, Space
 from flipflow.studies.design_store import SHARES, keep, looked_at
 
-Tell = Callable[[float], None]
 POPULATION = 64
 GENERATIONS = 60
 TOGETHER = 8  # candidates that a worker judges at once

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flipflow import __version__
+from flipflow.batch.side_by_side import Tell
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
@@ -20,7 +21,7 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point
 from flipflow.results.result import Result
 from flipflow.studies.attractors import Attractors
-from flipflow.studies.blows import Blows, Tick, within
+from flipflow.studies.blows import Blows, within
 from flipflow.transient.settling import is_stable
 
 PHASES = 60  # in each forcing period at which blows fall
@@ -230,7 +231,7 @@ def jump_risk(
     )
 
 
-def _scanned(blows: Blows, phases: Real, tick: Tick) -> Real:
+def _scanned(blows: Blows, phases: Real, tick: Tell) -> Real:
     """The least share of each row that throws at each phase, (rows, P).
 
     Where no other motion is known, few blows are to find one first.
@@ -276,7 +277,7 @@ def _working_point(system: MechanicalSystem, motion: float | Orbit) -> Point:
     return point
 
 
-def _throw(blows: Blows, row: int, phases: Real, least: Real, tick: Tick) -> Throw | None:
+def _throw(blows: Blows, row: int, phases: Real, least: Real, tick: Tell) -> Throw | None:
     """The least blow of a row, None where none throws the motion."""
     if not np.isfinite(least).any():
         return None

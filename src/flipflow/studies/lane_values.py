@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,12 +13,14 @@ from flipflow.batch.lane_columns import lane_columns
 from flipflow.batch.lane_kernels import Found
 from flipflow.batch.lane_readings import Readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED, UNSTABLE
+from flipflow.batch.side_by_side import Tell
 from flipflow.batch.solutions import nearby_motions, solve_lanes, solve_slopes
 from flipflow.batch.variants import Batch, batches
 from flipflow.compiled.arrays import Int, Real
 from flipflow.continuation.frequency_response import formulation_of
 from flipflow.model.parameters import value_of, with_values
 from flipflow.model.quantities import BranchWord, Quantity
+from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine
 from flipflow.periodic.options import PiecewiseExact
@@ -26,9 +28,6 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.studies.lane_quantities import LaneMotions, LanePlan
 from flipflow.studies.quantity_values import Working, fields_of_rows, number_or_nan, plain
 from flipflow.studies.tilted_lanes import TiltedLanes
-
-Columns = Mapping[str, NDArray[Any]]
-Tell = Callable[[float], None]
 
 ABOVE = 1.001  # least factor on the highest frequency at which one that falls begins
 

@@ -19,11 +19,11 @@ from flipflow.model.arguments import (
 from flipflow.model.monitor import Monitor
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord
+from flipflow.model.sampling import Columns
 from flipflow.model.system import Machine
 from flipflow.model.vary import Distribution, Variation, Vary, variations
 from flipflow.results.result import Result
 from flipflow.studies.sensitivity_samples import (
-    Columns,
     Question,
     checked_threads,
     closed_form_values,

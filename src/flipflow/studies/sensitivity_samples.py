@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.batch.side_by_side import processors, side_by_side
+from flipflow.batch.side_by_side import Tell, processors, side_by_side
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.errors import IncompleteError, InputError
@@ -28,6 +28,7 @@ from flipflow.model.quantities import (
     missing_words,
     quantity_named,
 )
+from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, system_of
 from flipflow.periodic.stability import UNSTABLE
@@ -43,7 +44,6 @@ from flipflow.studies.quantity_values import (
     plain,
 )
 
-Columns = Mapping[str, NDArray[Any]]
 STOP_FIELDS = {"stop_stiffness", "stop_damping", "clearance", "clearance_minus", "stop_law"}
 CHUNK_ROWS = 16  # samples that one task of a thread evaluates
 # Complex numbers in a chunk of the closed form: its temporaries stay in the cache.
@@ -154,9 +154,7 @@ def checked_threads(question: Question, threads: object) -> int:
     return checked_count("threads", free if threads is None else threads, 256)
 
 
-def motion_values(
-    question: Question, columns: Columns, threads: int, tell: Callable[[float], None]
-) -> Real:
+def motion_values(question: Question, columns: Columns, threads: int, tell: Tell) -> Real:
     """The quantity of S samples at the frequencies asked, (S, K); NaN where there is none.
 
     Chunks of samples go to ``threads`` threads; what ``tell`` raises ends the work.
