@@ -11,7 +11,7 @@ import flipflow as ff
 from flipflow.continuation.branch import Branch
 from flipflow.errors import InputError, SampledContactWarning
 from flipflow.model.smooth import smooth_force
-from flipflow.studies.smooth_law import compare_laws
+from flipflow.paper.figure_06 import compare_laws
 from judge import close, kinds, relative_amplitude
 
 pytestmark = pytest.mark.numerical

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from flipflow.compiled.arrays import Real
 from flipflow.io.spreadsheet import Sheet, Value, csv_text, xlsx
 from flipflow.io.units import in_unit
 from flipflow.model.numerals import capitalized
@@ -16,7 +17,7 @@ from flipflow.report.html import KIND, footer_of
 from flipflow.report.numbers import NOTHING
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
-from flipflow.studies.branch_values import branch_values
+from flipflow.studies.quantity_values import Working, number_or_nan
 
 BOOK, PREFIX = "tables.xlsx", "table-"
 FIGURE = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
@@ -70,13 +71,21 @@ def response_sheet(assessment: Assessment) -> Sheet:
 def _response_rows(case: CaseAssessment) -> Iterator[tuple[Value, ...]]:
     branch = case.branch
     columns = [branch.omega * in_unit(1.0, "rpm", "rad/s"), branch.omega / (2.0 * np.pi)]
-    values = branch_values(case.screen, branch, LISTED)
-    for name in LISTED:
+    for name, values in zip(LISTED, _listed(case), strict=True):
         one = QUANTITIES[name]
-        columns.append(values[name] * in_unit(1.0, one.shown_unit, one.unit))
+        columns.append(values * in_unit(1.0, one.shown_unit, one.unit))
     for k, word in enumerate(branch.stability):
         speed, hertz, *others = (float(column[k]) for column in columns)
         yield (case.name, speed, hertz, str(word), *others)
+
+
+def _listed(case: CaseAssessment) -> Real:
+    """What is listed, of every motion of a branch, in SI, (L, n); NaN where data are missing."""
+    branch = case.branch
+    jumps = tuple(fold.omega for fold in branch.folds)
+    motions = (Working(case.screen, branch.orbit(i), jumps) for i in range(branch.omega.size))
+    rows = [[number_or_nan(motion.value(name)) for name in LISTED] for motion in motions]
+    return np.array(rows).reshape(-1, len(LISTED)).T
 
 
 def _report_sheet(assessment: Assessment) -> Sheet:
