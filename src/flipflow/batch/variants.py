@@ -234,11 +234,12 @@ def _with_own(machine: Own, columns: Columns) -> Own:
 
 def variant(machine: Machine, columns: Columns, row: int) -> Machine:
     """The variant of one row."""
-    given = {name: column[row] for name, column in columns.items()}
-    plain = {
-        name: one.item() if isinstance(one, np.generic) else one for name, one in given.items()
-    }
-    return with_values(machine, plain)
+    return with_values(machine, {name: plain(column[row]) for name, column in columns.items()})
+
+
+def plain(value: Any) -> object:
+    """A number of an array as one of Python."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _flat(machine: Machine) -> tuple[Real, Shapes, MechanicalSystem] | None:

@@ -15,10 +15,10 @@ from flipflow.batch.lane_readings import Readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED, UNSTABLE
 from flipflow.batch.side_by_side import Tell
 from flipflow.batch.solutions import nearby_motions, solve_lanes, solve_slopes
-from flipflow.batch.variants import Batch, batches
+from flipflow.batch.variants import Batch, batches, variant
 from flipflow.compiled.arrays import Int, Real
 from flipflow.continuation.frequency_response import formulation_of
-from flipflow.model.parameters import value_of, with_values
+from flipflow.model.parameters import value_of
 from flipflow.model.quantities import BranchWord, Quantity
 from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen
@@ -26,7 +26,7 @@ from flipflow.model.system import Machine
 from flipflow.periodic.options import PiecewiseExact
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.lane_quantities import LaneMotions, LanePlan
-from flipflow.studies.quantity_values import Working, fields_of_rows, number_or_nan, plain
+from flipflow.studies.quantity_values import Working, fields_of_rows, number_or_nan
 from flipflow.studies.tilted_lanes import TiltedLanes
 
 ABOVE = 1.001  # least factor on the highest frequency at which one that falls begins
@@ -247,9 +247,7 @@ class _Question:
         for done, (lane, k) in enumerate(motions):
             if self.tell is not None:
                 self.tell(done / len(motions))
-            row = self.batch.rows[lane]
-            own = {name: plain(column[row]) for name, column in self.columns.items()}
-            machine = with_values(self.machine, own)
+            machine = variant(self.machine, self.columns, self.batch.rows[lane])
             motion = formulation_of(machine.system(), PiecewiseExact(), half_turn=False)
             point = motion.solver().solve(found.state[lane, k], float(omega[k]))
             if point is not None:

@@ -467,11 +467,6 @@ class ContactFree(Frozen):
         return np.full(self.force.shape, math.inf)
 
 
-def plain(value: Any) -> object:
-    """A number of an array as one of Python."""
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def number_or_nan(value: float | None) -> float:
     """A value, or NaN in place of none."""
     return math.nan if value is None else float(value)

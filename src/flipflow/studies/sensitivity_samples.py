@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.side_by_side import Tell, processors, side_by_side
+from flipflow.batch.variants import plain
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch import Branch
 from flipflow.errors import IncompleteError, InputError
@@ -41,7 +42,6 @@ from flipflow.studies.quantity_values import (
     Working,
     fields_of_rows,
     number_or_nan,
-    plain,
 )
 
 STOP_FIELDS = {"stop_stiffness", "stop_damping", "clearance", "clearance_minus", "stop_law"}
