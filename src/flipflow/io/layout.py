@@ -6,6 +6,7 @@ Parser, schema and template walk over the same entries, so none can know a key t
 from __future__ import annotations
 
 import difflib
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -270,3 +271,8 @@ def _listed(names: Sequence[str]) -> str:
     if len(names) <= MOST_LISTED:
         return ", ".join(names)
     return f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more"
+
+
+def toml(value: object) -> str:
+    """A value as a file has it: TOML writes text, numbers and lists as JSON does."""
+    return json.dumps(value, ensure_ascii=False)

@@ -15,6 +15,7 @@ from flipflow.io.layout import (
     SPEED,
     Entry,
     entry_of,
+    toml,
 )
 from flipflow.io.machine import TEMPERATURE_TABLES
 from flipflow.io.units import in_unit, parse_quantity
@@ -60,11 +61,10 @@ def machine_text(project: Project, sources: Mapping[str, str] | None = None) -> 
     if project.drive is not None and not written:
         raise InputError("drive", project.drive, "only a drive that a machine file gave is written")
     sections = {
-        "document": [(e.key, json.dumps(getattr(project.document, e.key), ensure_ascii=False))
-                     for e in SECTIONS["document"]],
+        "document": [(e.key, toml(getattr(project.document, e.key))) for e in SECTIONS["document"]],
         **_screen(project.screen),
         "operation": [("speed", quantity_text(w, SPEED)) for w in (project.speed,) if w],
-        "drive": [(key.removeprefix(DRIVE), _plain(value)) for key, value in written.items()],
+        "drive": [(key.removeprefix(DRIVE), toml(value)) for key, value in written.items()],
         **_limits(project),
     }  # fmt: skip
     parts = [f"format = {FORMAT}\n"]
@@ -162,7 +162,7 @@ def _limit(value: float | tuple[float, float], field: Field) -> str:
 
 
 def _load_case(load: Load) -> str:
-    lines = [("name", json.dumps(load.name or "empty", ensure_ascii=False))]
+    lines = [("name", toml(load.name or "empty"))]
     lines += [
         (entry_of(field).key, quantity_text(value, field))
         for field in LOAD_FIELDS
@@ -187,11 +187,5 @@ def _sources(project: Project, more: Mapping[str, str]) -> str:
         for key, text in {**project.sources, **more}.items()
         if not key.startswith("load_cases.") or key in cases
     }
-    lines = [(json.dumps(key, ensure_ascii=False), json.dumps(text, ensure_ascii=False))
-             for key, text in kept.items()]  # fmt: skip
+    lines = [(toml(key), toml(text)) for key, text in kept.items()]
     return _section("sources", lines) if lines else ""
-
-
-def _plain(value: object) -> str:
-    """A value as its file had it; TOML writes text, numbers and lists as JSON does."""
-    return json.dumps(value, ensure_ascii=False)

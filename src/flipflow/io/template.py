@@ -8,7 +8,7 @@ import textwrap
 from pathlib import Path
 
 from flipflow.errors import InputError
-from flipflow.io.layout import FORMAT, SECTION_SENTENCES, SECTIONS, Entry, unchecked_without
+from flipflow.io.layout import FORMAT, SECTION_SENTENCES, SECTIONS, Entry, toml, unchecked_without
 from flipflow.results.store import write_file
 
 _HEAD = f"""\
@@ -91,16 +91,11 @@ def _lines(entry: Entry) -> list[str]:
     if entry.field is not None and (lost := unchecked_without(entry.field)):
         words += f" Left out, not checked: {lost}."
     off = "# " if entry.label in _ALTERNATIVES else ""
-    return [*_comment(words), f"{off}{entry.key} = {_toml(entry.example)}"]
+    return [*_comment(words), f"{off}{entry.key} = {toml(entry.example)}"]
 
 
 def _comment(words: str) -> list[str]:
     return textwrap.wrap(words, 96, initial_indent="# ", subsequent_indent="# ")
-
-
-def _toml(value: object) -> str:
-    """Write a value as TOML: text, numbers and lists are written as JSON writes them."""
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _load_cases() -> str:
@@ -109,7 +104,7 @@ def _load_cases() -> str:
         "# A case may hold, and leave out what does not apply:",
     ]
     for entry in SECTIONS["load_cases"]:
-        lines += [f"#   {entry.key} = {_toml(entry.example)}", *_indented(entry.sentence)]
+        lines += [f"#   {entry.key} = {toml(entry.example)}", *_indented(entry.sentence)]
     cases = (
         ("empty", ()),
         ("full", ("material", "split_main_floating")),
@@ -118,8 +113,8 @@ def _load_cases() -> str:
     )
     examples = {entry.key: entry.example for entry in SECTIONS["load_cases"]}
     for name, keys in cases:
-        lines += ["", "[[load_cases]]", f"name = {_toml(name)}"]
-        lines += [f"{key} = {_toml(examples[key])}" for key in keys]
+        lines += ["", "[[load_cases]]", f"name = {toml(name)}"]
+        lines += [f"{key} = {toml(examples[key])}" for key in keys]
     return "\n".join(lines) + "\n"
 
 

@@ -33,6 +33,7 @@ from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import (
     FOLDS,
+    folds_known,
     jumped_motions,
     limits_in_words,
     limits_known,
@@ -284,7 +285,7 @@ class _Grid:
     def _sides(self) -> tuple[NDArray[np.bool_], ...]:
         """Machines before and beyond their jump: no line leads from one motion to the other."""
         everywhere = np.ones(self._shape, bool)
-        if not _has_folds(self.study):
+        if not folds_known(self.study):
             return (everywhere,)
         jumped = jumped_motions(self.study)[self._keep, 0, 0]
         beyond = jumped[self._order].reshape(self._shape)
@@ -433,10 +434,6 @@ def _first(study: Study, name: str) -> Real:
     """A quantity at the first frequency, (S, C)."""
     table = study.values[name]
     return np.asarray(table if table.ndim == 2 else table[:, :, 0])
-
-
-def _has_folds(study: Study) -> bool:
-    return all(name in study.values for name in FOLDS)
 
 
 def _axes(study: Study) -> Iterator[tuple[str, Real]]:

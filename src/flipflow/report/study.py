@@ -39,6 +39,7 @@ from flipflow.studies.study import Study
 from flipflow.studies.tolerance import (
     FOLDS,
     Tolerance,
+    folds_known,
     jumped_motions,
     limits_in_words,
     limits_left_out,
@@ -223,7 +224,7 @@ def spread_table(found: Study) -> Table:
 def _nominal(found: Study, one: Quantity, case: int, *, jumped: bool) -> float:
     """The value of the machine itself; NaN where it lies on the other side of the jump."""
     own = float(np.atleast_1d(found.nominal[one.name][case])[0])
-    if one.of == "response" or not all(name in found.values for name in FOLDS):
+    if one.of == "response" or not folds_known(found):
         return own
     end = found.nominal[FOLDS[0] if found.branch == "lower" else FOLDS[1]][case]
     return own if jumped == bool(found.omega[0] > end) else np.nan
@@ -233,7 +234,7 @@ def _spread_words(found: Study) -> Iterator[str]:
     """What the table of the spread leaves out."""
     if found.omega.size > 1:
         yield "This is the first speed of the study; the others are in the table of machines."
-    if all(name in found.values for name in FOLDS):
+    if folds_known(found):
         yield "Machines that have jumped are never counted with the others."
     for name in found.quantities:
         one = quantity_named(name, found.machine)
@@ -255,7 +256,7 @@ def _groups(found: Study, one: Quantity, case: int) -> Iterator[tuple[str, Real]
         return
     values = table[:, case, 0]
     known = (found.reason[:, case, 0] == FOUND) & ~np.isnan(values)
-    if not all(name in found.values for name in FOLDS):
+    if not folds_known(found):
         yield "", values[known]
         return
     beyond = jumped_motions(found)[:, case, 0]

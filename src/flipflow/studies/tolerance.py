@@ -174,7 +174,7 @@ def tolerance(study: Study, limits: Limits) -> Tolerance:
     jumped, coexisting = _jumps(study)
     share, interval = _shares(passing)
     jumping, jump_interval = _shares(jumped)
-    if not _folds_known(study):
+    if not folds_known(study):
         jumping, jump_interval = np.full_like(share, np.nan), np.full_like(interval, np.nan)
     halved, halved_interval = _halved(study, passing)
     scaled, scaled_interval = _scaled(study, passing)
@@ -245,6 +245,11 @@ def limits_known(study: Study, limits: Limits) -> tuple[str, ...]:
     )
 
 
+def folds_known(study: Study) -> bool:
+    """Whether a study has asked for both ends of the region of two motions."""
+    return all(name in study.values for name in FOLDS)
+
+
 def jumped_motions(study: Study) -> Flags:
     """Motions that lie beyond the jump speed, (S, C, F), of a study that asked for folds."""
     end = study.values[FOLDS[0] if study.branch == "lower" else FOLDS[1]]
@@ -277,14 +282,10 @@ def _met(study: Study, limits: Limits, name: str) -> Flags:
     return np.broadcast_to(met, study.reason.shape)
 
 
-def _folds_known(study: Study) -> bool:
-    return all(name in study.values for name in FOLDS)
-
-
 def _jumps(study: Study) -> tuple[Flags, Real]:
     """Machines on the other side of the jump than the nominal one, and the share of two motions."""
     frequencies = study.omega.size
-    if not _folds_known(study):
+    if not folds_known(study):
         return np.zeros((study.size, frequencies), bool), np.full(frequencies, np.nan)
     low, high = (study.values[name][:, :, np.newaxis] for name in FOLDS)
     word = FOLDS[0] if study.branch == "lower" else FOLDS[1]
@@ -390,7 +391,7 @@ def _notes(study: Study, unchecked: dict[str, str]) -> Iterator[str]:
     yield from study.notes
     for name, why in unchecked.items():
         yield f"The limit on {QUANTITIES[name].label} is not checked: {why}."
-    if not _folds_known(study):
+    if not folds_known(study):
         yield "Which machines jump is not known: ask the study for omega_lb and omega_ub, too."
     if study.sample is None:
         yield "The machines are a list: what narrower tolerances would bring is not known."
