@@ -16,7 +16,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.branch_status import STEP_REASON, BranchStatus
-from flipflow.continuation.orbit_row import Followed
+from flipflow.continuation.orbit_row import FollowedMotions
 from flipflow.continuation.refinement import SHARE_TOLERANCE
 from flipflow.continuation.special_points import FOLD, KINDS
 from flipflow.dynamics.motion import phase_of
@@ -117,7 +117,7 @@ class ShortenedStep:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch(Followed):
+class Branch(FollowedMotions):
     """Periodic motions followed over frequency, in their order along the branch.
 
     Folds turn the branch back, so that ``omega`` is not monotone. Arrays are (n,) over its

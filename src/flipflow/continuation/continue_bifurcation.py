@@ -17,7 +17,7 @@ from flipflow.continuation.bifurcation_curve import BifurcationCurve, CurvePoint
 from flipflow.continuation.branch import SpecialPoint
 from flipflow.continuation.branch_status import BranchStatus
 from flipflow.continuation.conditions import FLIP, GRAZING, PAIR, SADDLE_NODE
-from flipflow.continuation.continue_field import checked_bounds, course_over
+from flipflow.continuation.continue_field import SPECIAL_SHARE, checked_bounds, course_over
 from flipflow.continuation.correction import QUICK, SHARP, Course
 from flipflow.continuation.curve_points import GRAZES, TURNING, curve_points, pair_sum
 from flipflow.continuation.field_branch import FieldBranch, FieldSpecialPoint
@@ -44,7 +44,6 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point, Traced
 from flipflow.periodic.stability import UNDETERMINED
 
-SPECIAL_SHARE = 0.8  # of the work is done where the special points are sought
 OMEGA = "omega"
 TESTS = {
     FOLD: SADDLE_NODE, SYMMETRY: FLIP, DOUBLING: FLIP, NEIMARK_SACKER: PAIR,

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from flipflow.continuation import correction
 from flipflow.continuation.branch import Branch, SpecialPoint
-from flipflow.continuation.continue_field import field_branch
+from flipflow.continuation.continue_field import SPECIAL_SHARE, field_branch
 from flipflow.continuation.field_branch import FieldBranch
 from flipflow.continuation.frequency_response import SAMPLED, described, method_of
 from flipflow.continuation.special_points import DOUBLING, SYMMETRY
@@ -34,7 +34,6 @@ from flipflow.periodic.solver import STEP_SHARE, Formulation, Point, Solver
 from flipflow.periodic.stability import UNDETERMINED
 
 SYMMETRIC = 1e-9  # distance from its mirror image, relative: a motion within it is symmetric
-SPECIAL_SHARE = 0.8  # of the work is done where the special points are sought
 
 
 def continue_orbit(

@@ -18,7 +18,7 @@ from flipflow.periodic.stability import STABLE
 from flipflow.results.result import Frozen, Result
 
 
-class Followed(Frozen, Result):
+class FollowedMotions(Frozen, Result):
     """Motions in their order along a branch or a curve, with special points among them."""
 
     special_points: tuple[Any, ...]
@@ -41,7 +41,7 @@ class Followed(Frozen, Result):
         return ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "no special points"
 
 
-class OrbitRow(Followed):
+class OrbitRow(FollowedMotions):
     """What is read off motions that are each of a machine of its own, (n,)."""
 
     orbits: tuple[Orbit, ...]
