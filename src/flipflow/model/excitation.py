@@ -16,8 +16,26 @@ MOST_ORDER = 1000
 Term = tuple[int, NDArray[np.complex128]]
 
 
-@dataclass(frozen=True, eq=False)
-class Unbalance:
+@dataclass(frozen=True, eq=False, init=False)
+class _Turning:
+    """``Re(vector (n w)^power exp(i n w t))``."""
+
+    vector: NDArray[np.complex128]
+    order: int = 1
+    power: ClassVar[int]
+
+    def __init__(self, vector: ArrayLike, order: int = 1) -> None:
+        object.__setattr__(self, "vector", _force_vector(vector))
+        object.__setattr__(self, "order", checked_count("order", order, MOST_ORDER))
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The force's amplitude as a sum of powers of omega: (power, vector (N,)) each."""
+        return ((self.power, self.order**self.power * self.vector),)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Unbalance(_Turning):
     """Rotating unbalance: the force on the machine is ``Re(vector (n w)^2 exp(i n w t))``.
 
     Parameters
@@ -28,23 +46,11 @@ class Unbalance:
         n, a whole number: it turns n times as fast as the shaft.
     """
 
-    vector: NDArray[np.complex128]
-    order: int = 1
-
-    def __init__(self, vector: ArrayLike, order: int = 1) -> None:
-        object.__setattr__(self, "vector", _force_vector(vector))
-        object.__setattr__(self, "order", checked_count("order", order, MOST_ORDER))
-
-    power: ClassVar[int] = 2
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The force's amplitude as a sum of powers of omega: (power, vector (N,)) each."""
-        return ((self.power, self.order**2 * self.vector),)
+    power = 2
 
 
-@dataclass(frozen=True, eq=False)
-class HarmonicForce:
+@dataclass(frozen=True, eq=False, init=False)
+class HarmonicForce(_Turning):
     """Force of constant amplitude: ``Re(vector exp(i n w t))``.
 
     Parameters
@@ -55,19 +61,7 @@ class HarmonicForce:
         n, a whole number.
     """
 
-    vector: NDArray[np.complex128]
-    order: int = 1
-
-    def __init__(self, vector: ArrayLike, order: int = 1) -> None:
-        object.__setattr__(self, "vector", _force_vector(vector))
-        object.__setattr__(self, "order", checked_count("order", order, MOST_ORDER))
-
-    power: ClassVar[int] = 0
-
-    @property
-    def terms(self) -> tuple[Term, ...]:
-        """The force's amplitude as a sum of powers of omega: (power, vector (N,)) each."""
-        return ((self.power, self.vector),)
+    power = 0
 
 
 @dataclass(frozen=True, eq=False)
