@@ -12,9 +12,11 @@ import pytest
 import flipflow as ff
 from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.io.derived import derive
+from flipflow.io.source import bundled_text
 from flipflow.io.vary import read_vary
 from flipflow.studies.assessment import assess_case, energy_balance, input_hash, verdict
 from flipflow.studies.drive_check import power_that_passes
+from flipflow.studies.loading import amplitudes_from_below
 from flipflow.studies.quantity_values import Working
 from judge import close
 
@@ -197,9 +199,12 @@ def test_small_folds_at_first_contact_are_not_those_of_the_main_resonance(screen
     assert region.omega_ub is None
     assert region.lower == region.omega_cs
     assert region.upper == region.branch.peak("relative").omega
-    assert np.isfinite(
-        ff.loading(small, ff.Load(stiffness_factor=1.1)).with_stop.region.change
-    ).all()
+    found = ff.loading(small, ff.Load(stiffness_factor=1.1)).with_stop
+    left_out = np.isnan(found.region.change)
+    # Between its two losses of symmetry the machine leans.
+    leans = [p.omega for p in found.unloaded.special_points if p.kind == "symmetry breaking"]
+    assert not left_out[found.region.omega > 1.05 * max(leans)].any()
+    assert any("the motion followed is unstable" in one for one in found.notes) == left_out.any()
 
 
 def test_a_machine_without_an_operating_region_says_so(screen):
@@ -377,6 +382,58 @@ def test_the_largest_motion_comes_first_in_any_unit_of_length(screen, length):
     ]
     assert len(ways) == 3
     assert ways == sorted(ways, reverse=True)
+
+
+def test_a_branch_without_a_first_harmonic_is_drawn_without_a_phase():
+    stop = ff.ClearanceSpring([1.0], 3.0, 0.1, 1.0)
+    force = ff.HarmonicForce([0.5], order=2)
+    machine = ff.MechanicalSystem([[1.0]], [[0.06]], [[1.0]], (stop,), force)
+    branch = ff.frequency_response(machine, (0.3, 2.0))
+    (panel,) = ff.figure(branch).panels
+    drawn = [np.nanmax(trace.y) for trace in panel.traces if np.isfinite(trace.y).any()]
+    close("highest", max(drawn), branch.peak(0).amplitude(0), rel=1e-3)
+
+
+def test_what_moves_in_another_way_has_no_amplitude_from_below():
+    """Between 2.2 and 2.5 rad/s the motion that is its own mirror image is unstable."""
+    stop = ff.ClearanceSpring([1.0], 20.0, 0.05, 0.5)
+    machine = ff.MechanicalSystem([[1.0]], [[0.05]], [[1.0]], (stop,), ff.HarmonicForce([5.0]))
+    branch = ff.frequency_response(machine, (0.3, 6.0))
+    speeds = np.linspace(0.3, 6.0, 400)
+    orbits = [branch.orbit_from_below(float(w)) for w in speeds]
+    unstable = np.array([orbit is not None and not orbit.stable for orbit in orbits])
+    assert unstable.any()
+    assert not unstable.all()
+    amplitudes = amplitudes_from_below(branch, speeds, 0)
+    np.testing.assert_array_equal(np.isnan(amplitudes), unstable)
+
+
+def test_the_jump_of_a_glide_is_that_of_the_leading_coordinate():
+    """The second mass is tied to the ground: what jumps is the first, and the jump is told."""
+    stop = ff.ClearanceSpring([1.0, 0.0], 30.0, 0.1, 1.0)
+    machine = ff.MechanicalSystem(
+        np.eye(2), 0.06 * np.eye(2), np.diag([1.0, 400.0]), (stop,), ff.HarmonicForce([0.5, 0.0])
+    )
+    found = ff.ramp(machine, (0.5, 6.0), 0.01)
+    assert len(found.jumps) == 1
+
+
+def test_the_name_that_a_value_has_in_python_leads_to_its_key(tmp_path):
+    text = bundled_text("ffs0827").replace("shear_stiffness_factor", "stiffness_factor")
+    (tmp_path / "mill.toml").write_text(text)
+    with pytest.raises(InputError, match="did you mean 'shear_stiffness_factor'"):
+        ff.load_project(tmp_path / "mill.toml")
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_gravity_on_an_unbalance_of_another_order_is_geared(order):
+    machine = ff.MechanicalSystem(
+        [[100.0]], [[500.0]], [[4e5]], (), ff.Unbalance([0.2], order=order)
+    )
+    motor = ff.Motor(rated_power=4e3, synchronous_speed=157.08)
+    run = ff.start_up(machine, ff.Drive(inertia=1.0, motor=motor, ratio=1.0))
+    (note,) = (one for one in run.notes if "gravity on the unbalance" in one)
+    assert f"{order * 0.2 * 9.80665:.3g} N m" in note
 
 
 def test_a_glide_has_no_spectrum(screen):

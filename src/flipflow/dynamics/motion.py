@@ -111,28 +111,6 @@ class Motion:
             owner.append(np.full(count, e))
         return np.concatenate(times), np.concatenate(owner)
 
-    @property
-    def quadrature(self) -> tuple[Real, NDArray[np.intp], Real]:
-        """Times, pieces and weights (K,) of a mean over the period, by Gauss' rule on parts.
-
-        What decays at once, as behind a heavily damped contact, lies at the very start of a piece:
-        its first part is halved towards it.
-        """
-        nodes, weights = _gauss_rule()
-        fastest = np.abs(self.rate.imag).max(
-            axis=1, initial=self.omega * self.order.max(initial=1.0)
-        )
-        steepest = np.abs(self.rate.real).max(axis=1, initial=0.0)
-        limits = [
-            _parts(*piece)
-            for piece in zip(self.length.tolist(), fastest.tolist(), steepest.tolist(), strict=True)
-        ]
-        piece = np.repeat(np.arange(self.start.size), [len(one) for one in limits])
-        begin, end = np.array([part for one in limits for part in one]).T
-        times = (self.start[piece] + begin)[:, None] + (end - begin)[:, None] * nodes
-        share = (end - begin)[:, None] * (weights / self.period)
-        return times.ravel(), np.repeat(piece, nodes.size), share.ravel()
-
     def extremes(self, coordinates: Real) -> tuple[Real, Real, Complex]:
         """Least and greatest value and first harmonic, (G,) each, of coordinates (G, N)."""
         remedy = f"give vectors of {self.system.size} finite numbers, one a row"
@@ -199,6 +177,28 @@ def states_on(motion: Motion, t: Real, piece: NDArray[np.intp]) -> Real:
         motion.omega, t, piece, states,
     )  # fmt: skip
     return states
+
+
+def nodes_on(motion: Motion) -> tuple[Real, NDArray[np.intp], Real]:
+    """Times, pieces and weights (K,) of a mean over the period, by Gauss' rule on parts.
+
+    What decays at once, as behind a heavily damped contact, lies at the very start of a piece:
+    its first part is halved towards it.
+    """
+    nodes, weights = _gauss_rule()
+    fastest = np.abs(motion.rate.imag).max(
+        axis=1, initial=motion.omega * motion.order.max(initial=1.0)
+    )
+    steepest = np.abs(motion.rate.real).max(axis=1, initial=0.0)
+    limits = [
+        _parts(*piece)
+        for piece in zip(motion.length.tolist(), fastest.tolist(), steepest.tolist(), strict=True)
+    ]
+    piece = np.repeat(np.arange(motion.start.size), [len(one) for one in limits])
+    begin, end = np.array([part for one in limits for part in one]).T
+    times = (motion.start[piece] + begin)[:, None] + (end - begin)[:, None] * nodes
+    share = (end - begin)[:, None] * (weights / motion.period)
+    return times.ravel(), np.repeat(piece, nodes.size), share.ravel()
 
 
 def longest_on(

@@ -247,6 +247,15 @@ def _by_section() -> Mapping[str, tuple[Entry, ...]]:
 SECTIONS: Mapping[str, tuple[Entry, ...]] = _by_section()
 
 
+# Keys by the names that their values have in Python, where these are others.
+NAMED_IN_PYTHON = {
+    entry.field.name: entry.key
+    for entries in SECTIONS.values()
+    for entry in entries
+    if entry.field is not None and entry.kind != "each"
+}
+
+
 def sections_within(section: str) -> tuple[str, ...]:
     """Keys under which other sections stand within one, as "start" within "limits"."""
     return tuple(name[len(section) + 1 :] for name in SECTIONS if name.startswith(f"{section}."))
@@ -260,7 +269,8 @@ def refuse_unknown(table: Mapping[str, object], known: Iterable[str], *, place: 
     known = tuple(known)
     for key, value in table.items():
         if key not in known:
-            near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+            own = [NAMED_IN_PYTHON[key]] if NAMED_IN_PYTHON.get(key) in known else []
+            near = own or difflib.get_close_matches(key, known, n=1, cutoff=0.5)
             hint = f"did you mean {near[0]!r}" if near else f"choose one of {_listed(known)}"
             label, shown = (place + key, value) if place else ("section", f"[{key}]")
             raise InputError(label, shown, f"this name is not known, {hint}")

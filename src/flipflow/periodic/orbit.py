@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow.compiled.arrays import Int, Real
-from flipflow.dynamics.motion import ContactInterval, Motion, longest_on, phase_of, states_on
+from flipflow.dynamics.motion import (
+    ContactInterval,
+    Motion,
+    longest_on,
+    nodes_on,
+    phase_of,
+    states_on,
+)
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_index,
@@ -316,7 +323,7 @@ class Orbit(Frozen, Result):
         return cast("NDArray[Any]", found)
 
     def _mean(self, function: Callable[[Real, Pieces], Real]) -> float:
-        t, piece, weight = self.motion.quadrature
+        t, piece, weight = nodes_on(self.motion)
         return float(weight @ function(t, piece))
 
     def _times(self, t: ArrayLike | None) -> Real:

@@ -49,6 +49,8 @@ class Curve:
     def of(cls, branch: Branch, which: Coordinate) -> Curve:
         """The curve of a coordinate, in SI and rad; the phase is continuous and starts near 0.
 
+        It is NaN where nothing moves with the forcing frequency itself.
+
         Points at which the flow over a turn does not end have no amplitude, and are left out.
 
         Raises
@@ -67,13 +69,16 @@ class Curve:
         following = [branch.stability[_next(point.position, branch)] for point in special]
         if branch.status is BranchStatus.CLOSED:
             order = np.append(order, order[0])
-        order = order[np.isfinite(amplitude[order]) & np.isfinite(phase[order])]
+        order = order[np.isfinite(amplitude[order])]
         if order.size == 0:
             raise IncompleteError(f"The branch has no points. {branch.status.value}")
+        continuous = phase[order]
+        known = np.isfinite(continuous)
+        continuous[known] = np.unwrap(continuous[known])
         return cls(
             omega[order],
             amplitude[order],
-            np.unwrap(phase[order]),
+            continuous,
             np.append(branch.stability, following)[order],
             frozenset(fold.omega for fold in branch.folds if not is_jump(branch, fold)),
         )

@@ -74,7 +74,8 @@ def branch_figure(
     Returns
     -------
     Figure
-        Two panels, amplitude and phase, over rpm.
+        Two panels, amplitude and phase, over rpm; the first alone where nothing moves with the
+        forcing frequency itself, so that there is no phase.
     """
     names = coordinates(branch.system, which)
     curves = [Curve.of(branch, name) for name in names]
@@ -93,11 +94,14 @@ def branch_figure(
         axis, _phase_axis(curves, which), traces=tuple(phase),
         lines=_working(omega, text=False),
     )  # fmt: skip
-    caption = (
-        "Amplitude is half the peak-to-peak motion; phase is that of the first harmonic against "
-        f"the unbalance force, negative when the motion lags. {READING}"
+    known = any(np.isfinite(curve.phase).any() for curve in curves)
+    of_phase = (
+        "; phase is that of the first harmonic against the unbalance force, negative when the "
+        "motion lags"
     )
-    return Figure(title or "Response over speed", caption, (top, bottom), height=430)
+    caption = f"Amplitude is half the peak-to-peak motion{of_phase if known else ''}. {READING}"
+    panels = (top, bottom) if known else (top,)
+    return Figure(title or "Response over speed", caption, panels, height=430)
 
 
 def responses_figures(
@@ -438,8 +442,8 @@ def _amplitude_axis(curves: Sequence[Curve], which: Coordinate | None = None) ->
 
 def _phase_axis(curves: Sequence[Curve], which: Coordinate | None = None) -> Axis:
     """Phase in degrees, ticked at quarters or halves of a turn."""
-    low = min(float(curve.phase.min()) for curve in curves) * DEGREES
-    high = max(float(curve.phase.max()) for curve in curves) * DEGREES
+    phases = np.concatenate([curve.phase[np.isfinite(curve.phase)] for curve in curves])
+    low, high = (phases.min() * DEGREES, phases.max() * DEGREES) if phases.size else (-180.0, 0.0)
     step = 90.0 if high - low < 600.0 else 180.0
     first, last = math.floor(low / step + 0.1), math.ceil(high / step - 0.1)
     ticks = tuple((k * step, f"{k * step:.0f}".replace("-", MINUS)) for k in range(first, last + 1))

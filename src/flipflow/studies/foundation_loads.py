@@ -21,6 +21,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from flipflow.compiled.arrays import Real
+from flipflow.dynamics.motion import nodes_on
 from flipflow.dynamics.normal import normal_motion
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_kind, checked_mapping, checked_text, checked_word
@@ -461,7 +462,7 @@ def _orders(orbit: Orbit, screen: FlipFlowScreen) -> list[OrderLoad]:
 
 def harmonic(orbit: Orbit, which: str, order: float) -> complex:
     """X of Re(X exp(i order omega t)) of a coordinate."""
-    t, piece, weight = orbit.motion.quadrature
+    t, piece, weight = nodes_on(orbit.motion)
     x = orbit.motion.piece_derivative(t, piece, 0) @ orbit.system.coordinate(which)
     return complex(2.0 * weight @ (x * np.exp(-1j * order * orbit.omega * t)))
 

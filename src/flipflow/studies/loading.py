@@ -24,6 +24,10 @@ from flipflow.results.result import Result
 from flipflow.studies.landmarks import Landmarks, analysed_range, within_speeds
 
 Start = Literal["unloaded", "loaded"]
+UNSTABLE = (
+    "At {} of {} speeds of the region the motion followed is unstable: the machine leans to one "
+    "side, or takes several turns. They are left out."
+)
 SAMPLES = 121  # speeds over the operating region at which amplitudes are compared
 
 
@@ -66,7 +70,7 @@ class RegionChange:
     omega
         Speeds in rad/s, (n,), both ends of the region included.
     unloaded, loaded
-        Relative amplitude in m, (n,), each solved for; NaN where a motion was not found.
+        Relative amplitude in m, (n,), each solved for; NaN where no stable motion was found.
     least, greatest
         Where the change is least and greatest in size, searched between the speeds.
     """
@@ -154,7 +158,10 @@ class LoadedMachine:
             ("loaded", self.loaded, self.loaded_marks),
         ):
             unfinished = () if branch.complete else (branch.status.value,)
-            texts = (*branch.notes, *marks.notes, *unfinished)
+            amplitude = self.region.unloaded if branch is self.unloaded else self.region.loaded
+            lost = int(np.isnan(amplitude).sum())
+            unstable = (UNSTABLE.format(lost, amplitude.size),) if lost and branch.complete else ()
+            texts = (*branch.notes, *marks.notes, *unfinished, *unstable)
             sentences += [f"{name}: {text}" for text in texts]
         return tuple(sentences)
 
@@ -308,25 +315,27 @@ def _refined(at: Callable[[float], Change], omega: Real, change: Real, sign: flo
 
 
 def change_at(unloaded: Branch, loaded: Branch, omega: float) -> Change:
-    """Relative amplitudes of both at a speed in rad/s as it rises; NaN without a motion."""
+    """Relative amplitudes of both at a speed in rad/s as it rises; NaN without a stable motion."""
     pair = (amplitude_from_below(branch, omega, "relative") for branch in (unloaded, loaded))
     return Change(omega, *pair)
 
 
 def amplitude_from_below(branch: Branch, omega: float, which: Coordinate) -> float:
-    """Amplitude of a coordinate in m at a speed as it rises slowly; NaN without a motion."""
+    """Amplitude of a coordinate in m at a speed as it rises slowly.
+
+    NaN without a motion, and where it is unstable: the machine moves in another way there, to one
+    side or over several turns.
+    """
     return float(amplitudes_from_below(branch, np.array([omega]), which)[0])
 
 
 def amplitudes_from_below(branch: Branch, omega: Real, which: Coordinate) -> Real:
     """The same at several speeds, (n,)."""
-    found, amplitudes = (
-        [branch.orbit_from_below(float(w)) for w in omega],
-        np.full(omega.size, np.nan),
-    )
-    known = [k for k, orbit in enumerate(found) if orbit is not None]
+    amplitudes = np.full(omega.size, np.nan)
+    found = [branch.orbit_from_below(w) for w in omega.tolist()]
+    known = [k for k, orbit in enumerate(found) if orbit is not None and orbit.stable]
     if known:
-        u = np.array([orbit.point.u for orbit in found if orbit is not None])
+        u = np.array([orbit.point.u for orbit in found if orbit is not None and orbit.stable])
         with branch.formulation.lent() as solver:
             low, high, _ = solver.extremes(u, omega[known], branch.system.coordinate(which)[None])
         amplitudes[known] = 0.5 * (high - low)[:, 0]

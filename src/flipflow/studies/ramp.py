@@ -17,6 +17,7 @@ from flipflow.errors import IncompleteError, InputError
 from flipflow.model.arguments import checked_monitor, checked_positive, checked_speeds
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.monitor import Monitor
+from flipflow.model.quantities import leading_coordinate
 from flipflow.model.screen import FlipFlowScreen, unit_in
 from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
@@ -151,7 +152,7 @@ def ramp(
         machine, SpeedProfile((0.0, duration), (first, last)), Start(state, 0.0, first), duration,
         fastest=high, monitor=say,
     )  # fmt: skip
-    which = orbit.system.named[-1]
+    which = leading_coordinate(orbit.system)
     jumps = _jumps(branch, history, orbit, which, rising=last > first)
     return Ramp(machine, math.copysign(rate, last - first), history, branch, jumps)
 

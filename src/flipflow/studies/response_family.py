@@ -80,7 +80,10 @@ class Member(Frozen):
         return min(feet, key=lambda t: t.amplitude(self._driven), default=None)
 
     def relative_amplitude(self, omega: float) -> float:
-        """Amplitude in m of the leading coordinate as the speed rises slowly; NaN without one."""
+        """Amplitude in m of the leading coordinate as the speed rises slowly.
+
+        NaN without a motion, and where it is unstable.
+        """
         return math.nan if self.failure else amplitude_from_below(self.branch, omega, self._leading)
 
     @property

@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 from flipflow.batch.slope_readings import AGREE, TIED
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.machine_columns import Named, stop_columns
-from flipflow.dynamics.motion import phase_of
+from flipflow.dynamics.motion import nodes_on, phase_of
 from flipflow.errors import IncompleteError
 from flipflow.model.contact_law import WHOLE, carries_force, engaged_side, shares
 from flipflow.model.elements import ClearanceSpring
@@ -402,7 +402,7 @@ class TiltedMotion:
     @cached_property
     def _nodes(self) -> tuple[Path, Real]:
         """The motion at Gauss nodes on all pieces, and their weights as shares of the period."""
-        t, piece, weight = self.motion.quadrature
+        t, piece, weight = nodes_on(self.motion)
         return self._path(t, piece), weight
 
     def _average(self, formula: Formula) -> Complex:

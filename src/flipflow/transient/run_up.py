@@ -390,7 +390,10 @@ def _gravity(machine: Machine, drive: Drive) -> list[str]:
     if unbalance_weight(machine).torque != 0.0:
         return []
     forces = machine.system().excitations
-    moment = sum(float(np.abs(f.vector).max()) for f in forces if isinstance(f, Unbalance))
+    # A shaft that turns order times as fast is driven through as much of a gear.
+    moment = sum(
+        abs(f.order) * float(np.abs(f.vector).max()) for f in forces if isinstance(f, Unbalance)
+    )
     torque = moment * GRAVITY
     if torque == 0.0:
         return []
