@@ -18,7 +18,7 @@ from scipy.optimize import curve_fit
 
 import flipflow as ff
 from flipflow.batch.reasons import FOUND
-from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
+from flipflow.batch.solutions import nothing_asked, solve_lanes
 from flipflow.batch.variants import batches
 
 SERIES = {
@@ -53,11 +53,10 @@ def cost(numbers, rng):
     columns = {"forcing": rng.uniform(0.9, 1.1, numbers["lanes"])}
     (batch,), _ = batches(machine, columns)
     asked = nothing_asked(numbers["masses"], SPEEDS.size)
-    nearby = nearby_motions(machine, machine, SPEEDS)
     spent = []
     for _ in range(ROUNDS + 1):
         clock = time.process_time()
-        found, read = solve_lanes(batch, SPEEDS, asked, nearby)
+        found, read = solve_lanes(batch, SPEEDS, asked)
         spent.append(time.process_time() - clock)
     there = found.reason == FOUND
     touching = there & (read.share > 0.0).any(axis=2)

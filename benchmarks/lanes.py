@@ -22,7 +22,7 @@ import flipflow as ff
 from flipflow.batch.lane_columns import lane_columns
 from flipflow.batch.reasons import FOUND
 from flipflow.batch.slope_readings import SlopesAsked
-from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes, solve_slopes
+from flipflow.batch.solutions import nothing_asked, solve_lanes, solve_slopes
 from flipflow.batch.variants import batches
 
 FIELDS = (
@@ -39,33 +39,18 @@ def drawn(machine, rows, seed):
     return {name: getattr(machine, name) * rng.uniform(0.9, 1.1, rows) for name in FIELDS}
 
 
-def rate(batch, machine, omega, threads):
+def rate(batch, omega, threads):
     """Solutions with contact a second of processor and of wall, medians of some rounds."""
     asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
-    nearby = nearby_motions(machine.system(), machine.system(), omega)
     walls, processors = [], []
     for _ in range(ROUNDS):
         wall, processor = time.perf_counter(), time.process_time()
-        found, read = solve_lanes(batch, omega, asked, nearby, threads)
+        found, read = solve_lanes(batch, omega, asked, threads)
         walls.append(time.perf_counter() - wall)
         processors.append(time.process_time() - processor)
     touching = int(((found.reason == FOUND) & (read.share[..., 0] > 0.0)).sum())
     failed = int((found.reason != FOUND).sum())
     return touching / statistics.median(processors), touching / statistics.median(walls), failed
-
-
-def newton_ratio(batch, machine, omega):
-    """Time by Newton's method alone over that with a start from the scalar problem, in turn."""
-    asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
-    nearby = nearby_motions(machine.system(), machine.system(), omega)
-    starts, spent = (nearby, nearby._replace(share=np.zeros(omega.size))), ([], [])
-    for _ in range(4 * ROUNDS):
-        for start, times in zip(starts, spent, strict=True):
-            clock = time.process_time()
-            solve_lanes(batch, omega, asked, start)
-            times.append(time.process_time() - clock)
-    scalar, newton = map(statistics.median, spent)
-    return newton / scalar
 
 
 def slopes_asked(omega):
@@ -80,11 +65,10 @@ def slopes_asked(omega):
 def derivative_ratios(batch, machine, columns, omega):
     """Time of solutions with derivatives over that of solutions alone; then multipliers, too."""
     asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
-    nearby = nearby_motions(machine.system(), machine.system(), omega)
     wanted, spent = slopes_asked(omega), [[], [], []]
     for _ in range(ROUNDS + 1):
         clock = time.process_time()
-        found, _ = solve_lanes(batch, omega, asked, nearby)
+        found, _ = solve_lanes(batch, omega, asked)
         spent[0].append(time.process_time() - clock)
         for k, multipliers in ((1, False), (2, True)):
             clock = time.process_time()
@@ -141,11 +125,9 @@ def main():
     print(f"{'':34s}{'processor':>14s}{given.threads:>6d} threads{'':>12s}")
     for name, omega in (("along speed", along), ("unrelated, one speed", single)):
         for threads in (1, given.threads):
-            of_processor, of_wall, failed = rate(batch, machine, omega, threads)
+            of_processor, of_wall, failed = rate(batch, omega, threads)
             label = f"{name}, {threads} thread{'s' if threads > 1 else ''}"
             print(f"{label:34s}{of_processor:14,.0f}{of_wall:14,.0f}{failed:12d}")
-    ratio = newton_ratio(batch, machine, single)
-    print(f"unrelated, by Newton alone                 {ratio:.2f} times as long")
     for name, omega in (("along speed", along), ("unrelated, one speed", single)):
         slopes, maps = derivative_ratios(batch, machine, columns, omega)
         label = f"with derivatives, {name}"

@@ -30,7 +30,7 @@ from flipflow.batch.lane_readings import new_reading_work, new_readings, read_la
 from flipflow.batch.lane_slopes import read_slopes, state_slopes
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED
 from flipflow.batch.slope_readings import new_slope_work, new_slopes
-from flipflow.batch.solutions import nearby_motions, nothing_asked
+from flipflow.batch.solutions import nothing_asked
 from flipflow.batch.variants import batches
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.assembly import machine_arrays
@@ -129,13 +129,12 @@ def main():
     omega = np.linspace(given.omega - SPEEDS, given.omega, SPEEDS)
     asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
     (batch,), _ = batches(screen, {"clearance": np.array([screen.clearance])})
-    nearby = nearby_motions(system, system, omega)
     work = new_lane_work(machine, np.zeros(1, np.int64))
     reading = new_reading_work(work.shooting.flow, machine, asked)
     found = new_found(1, omega.size, system.size, NOT_COMPUTED)
     readings = new_readings(1, omega.size, machine, asked)
     run_lanes(
-        batch.arrays, 0, 1, omega, length, nearby, work, reading, asked, found, readings,
+        batch.arrays, 0, 1, omega, length, work, reading, asked, found, readings,
     )  # fmt: skip
     assert (found.reason == FOUND).all()
     assert readings.share[0, -1, 0] > 0.0

@@ -10,7 +10,7 @@ from flipflow.batch.lane_columns import lane_columns
 from flipflow.batch.lane_path import CONVERGED
 from flipflow.batch.reasons import FOUND
 from flipflow.batch.slope_readings import SlopesAsked
-from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes, solve_slopes
+from flipflow.batch.solutions import nothing_asked, solve_lanes, solve_slopes
 from flipflow.batch.variants import batches
 from flipflow.model.parameters import with_values
 from flipflow.model.quantities import quantities_for, quantity_named
@@ -81,7 +81,7 @@ def solved(machine, columns, omega, names):
     (batch,), _ = batches(machine, columns)
     changes = lane_columns(machine, columns, batch, names)
     asked = nothing_asked(system.size, omega.size)
-    found, _ = solve_lanes(batch, omega, asked, nearby_motions(system, system, omega))
+    found, _ = solve_lanes(batch, omega, asked)
     none = np.zeros((1, omega.size, 0, P), complex)
     wanted = SlopesAsked(
         linear=np.zeros((1, 0, 3, system.size, P)), along=none, across=none, means=False,

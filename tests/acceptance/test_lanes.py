@@ -7,8 +7,6 @@ import pytest
 
 import flipflow as ff
 from flipflow.batch.reasons import FOUND, REFUSED, UNSTABLE
-from flipflow.batch.solutions import nearby_motions, nothing_asked, solve_lanes
-from flipflow.batch.variants import batches
 from flipflow.model.quantities import quantity_named
 from flipflow.studies.lane_values import lane_values
 from flipflow.studies.quantity_values import MOTION_VALUES, Working
@@ -94,21 +92,6 @@ def test_every_quantity_is_that_of_the_motion_alone(screen, six, name):
     assert (why == FOUND).all()
     for place, motion in motions.items():
         assert found[place] == pytest.approx(motion.value(name), rel=1e-8)
-
-
-@pytest.mark.parametrize("omega", [120.0, 203.0])
-def test_the_scalar_problem_leads_to_the_motion_that_newton_finds(screen, omega):
-    columns, speeds = drawn(screen, FIELDS, 200, 0.5, seed=6), np.array([omega])
-    (batch,), _ = batches(screen, columns)
-    system = screen.system()
-    asked, nearby = nothing_asked(2, 1), nearby_motions(system, system, speeds)
-    assert nearby.share[0] > 0.5
-    found, read = solve_lanes(batch, speeds, asked, nearby)
-    other, read_other = solve_lanes(batch, speeds, asked, nearby._replace(share=np.zeros(1)))
-    np.testing.assert_array_equal(found.reason, other.reason)
-    np.testing.assert_allclose(found.state, other.state, rtol=1e-8, atol=1e-10)
-    assert not np.array_equal(found.state, other.state)  # another way there rounds otherwise
-    np.testing.assert_allclose(read.share, read_other.share, rtol=1e-8)
 
 
 def test_a_lane_that_meets_no_stop_is_not_led_to_a_motion_nearby_that_does():

@@ -46,25 +46,26 @@ def test_all_touching_motions_are_found_without_a_guess(screen, exact, omega):
         np.testing.assert_allclose(states[nearest], orbit.state, rtol=1e-8, atol=1e-10)
 
 
-@pytest.mark.parametrize("omega", [85.0, 120.0, 190.0])
-def test_from_a_share_close_by(screen, exact, omega):
-    """Phase 0 lies within the touch or outside of it, before or behind the middle of the turn."""
+def only_motion(screen, omega):
+    """Share of the only motion, NaN where there may be others, and its state."""
     problem = TwoEventProblem(machine_arrays(screen.system()))
+    share = kernel_calls.only_share(problem._machine, problem._flow, problem._work, omega)
+    return share, problem._work.z
+
+
+@pytest.mark.parametrize("omega", [85.0, 120.0, 190.0])
+def test_the_only_motion_is_found_with_its_state(screen, exact, omega):
+    """Phase 0 lies within the touch or outside of it, before or behind the middle of the turn."""
     orbit = exact.orbit_from_below(omega)
-    for factor in (0.97, 1.0, 1.02):
-        share = factor * orbit.contact_share()
-        assert kernel_calls.touched_twice(
-            problem._machine, problem._flow, problem._work, omega, share
-        )
-        np.testing.assert_allclose(problem._work.z, orbit.state, rtol=1e-8, atol=1e-10)
+    share, state = only_motion(screen, omega)
+    assert share == pytest.approx(orbit.contact_share(), abs=1e-9)
+    np.testing.assert_allclose(state, orbit.state, rtol=1e-8, atol=1e-10)
 
 
-def test_a_share_that_leads_nowhere(screen):
-    weak = screen.replace(eccentric_moment=1e-3 * screen.eccentric_moment)
-    problem = TwoEventProblem(machine_arrays(weak.system()))
-    assert not kernel_calls.touched_twice(
-        problem._machine, problem._flow, problem._work, 120.0, 0.5
-    )
+@pytest.mark.parametrize(("omega", "alone"), [(203.0, np.nan), (230.0, 0.0)])
+def test_no_share_where_no_stop_is_touched_and_none_is_told_between_folds(screen, omega, alone):
+    found, _ = only_motion(screen, omega)
+    np.testing.assert_equal(found, alone)
 
 
 def test_shooting_has_the_last_word_where_motion_leans():

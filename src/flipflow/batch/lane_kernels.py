@@ -9,7 +9,6 @@ import numpy as np
 
 from flipflow.batch.lane_path import (
     FAR,
-    FAR_FROM_GUESS,
     MARGIN,
     PUSH,
     SAME,
@@ -34,11 +33,12 @@ from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_free_range import contact_free_up_to, is_contact_free_below
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.periodic.shooting import Shooting
-from flipflow.periodic.two_event import has_two_events, is_only_motion, two_event_state
+from flipflow.periodic.two_event import only_motion
 
 BEHIND = 1e-3  # share of a frequency at which a motion ends, behind which the next one is sought
 LEAPS = 8  # from motion to motion on the way to one frequency
 DRIFT = 0.02  # share by which a frequency goes on while the motion repeats after no single turn
+LOOKS, BELOW = 4, 0.93  # for a frequency at which there is one motion, each a share of the last
 OCTAVES_BELOW = 4  # below a frequency at which a machine that rests on a stop is let settle first
 OCTAVES = 3  # away from a frequency at which a machine is let settle where it does not there
 
@@ -53,15 +53,6 @@ class Found(NamedTuple):
     leaning: Int  # (L, F) 1 where an even machine moves without symmetry
     jumps: Int  # (L, F) of the path up to here
     reason: Int  # (L, F) one of FOUND, UNSTABLE, ...
-
-
-@by_reference
-class Nearby(NamedTuple):
-    """Motions of a machine nearby at F frequencies, as first guesses."""
-
-    state: Real  # (F, 2 N), NaN where there is none
-    even: Int  # (F,) 1 where it is even
-    share: Real  # (F,) of the turn in which it touches its one stop, 0 of other machines
 
 
 def new_found(lanes: int, speeds: int, degrees: int, reason: int) -> Found:
@@ -87,8 +78,8 @@ def problem_of(machine: MachineArrays, half: bool, length: float) -> Shooting:
 
 @kernel(entry=True)
 def run_lanes(
-    batch: MachineArrays, first: int, last: int, omega: Real, length: float, nearby: Nearby,
-    work: LaneWork, reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
+    batch: MachineArrays, first: int, last: int, omega: Real, length: float, work: LaneWork,
+    reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
 ) -> None:  # fmt: skip
     """Lanes ``first`` to ``last`` - 1 at frequencies (F,) in the order given.
 
@@ -96,12 +87,12 @@ def run_lanes(
     """
     for lane in range(first, last):
         begin_lane(batch, lane, work)
-        run_lane(work.machine, lane, omega, length, nearby, work, reading, asked, found, readings)
+        run_lane(work.machine, lane, omega, length, work, reading, asked, found, readings)
 
 
 @kernel
 def run_lane(
-    machine: MachineArrays, lane: int, omega: Real, length: float, nearby: Nearby, work: LaneWork,
+    machine: MachineArrays, lane: int, omega: Real, length: float, work: LaneWork,
     reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
 ) -> None:  # fmt: skip
     """One lane: its motion is followed from speed to speed, and flown where it jumps."""
@@ -111,7 +102,7 @@ def run_lane(
         begun = not math.isnan(work.omega[0])
         rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
-            begun, half = set_off(machine, work, f, omega, length, nearby, even, rising)
+            begun, half = set_off(machine, work, f == 0, omega[f], length, even, rising)
         reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
         if begun and not lost and not reached:
             jumps += 1
@@ -137,60 +128,35 @@ def run_lane(
 
 @kernel
 def set_off(
-    machine: MachineArrays, work: LaneWork, f: int, omega: Real, length: float, nearby: Nearby,
-    even: bool, rising: bool,
+    machine: MachineArrays, work: LaneWork, first: bool, omega: float, length: float, even: bool,
+    rising: bool,
 ) -> tuple[bool, bool]:  # fmt: skip
-    """Begin the path of a lane for frequency f: whether it is begun, and whether even.
-
-    A motion nearby may be one to which this machine does not come from below: one that meets no
-    stop on its way up begins without contact, and so does one that may have other motions there.
-    """
-    half, flow = even and nearby.even[f] != 0, work.shooting.flow
-    free = rising and is_contact_free_below(machine, flow.modes, omega[f])
-    if not free and (not rising or is_only_motion(machine, flow, work.touch, omega[f])):
-        problem = problem_of(machine, half, length)
-        if start_from_guess(problem, work, omega[f], nearby.state[f], nearby.share[f]):
-            return True, half
+    """Begin the path of a lane for a frequency: whether it is begun, and whether even."""
+    free = rising and is_contact_free_below(machine, work.shooting.flow.modes, omega)
     problem = problem_of(machine, even, length)
-    if start_without_contact(problem, work, omega[f], rising and not free):
+    if rising and even and not free and start_from_only_motion(problem, work, omega):
+        return True, True
+    if start_without_contact(problem, work, omega, rising and not free):
         return True, even
-    if rising and f == 0:
-        return start_far_below(machine, work, omega[f], length, even)
+    if rising and first:
+        return start_far_below(machine, work, omega, length, even)
     return False, even
 
 
 @kernel
-def start_from_guess(
-    problem: Shooting, work: LaneWork, omega: float, guess: Real, share: float
-) -> bool:
-    """Begin the path with the stable motion that Newton reaches from a guess close by.
-
-    Where it is a motion of two events, the scalar problem has the motion itself.
-    """
-    for k in range(guess.shape[0]):
-        if math.isnan(guess[k]):
-            return False
-    machine, found = problem.machine, work.touch.z
-    near = problem.sign < 0.0 and share > 0.0 and has_two_events(machine)
-    near = near and two_event_state(machine, work.shooting.flow, work.touch, omega, share)
-    near = near and is_near(found, guess, omega, problem.length)
-    for of_guess in range(0 if near else 1, 2):
-        for k in range(guess.shape[0]):
-            work.guess[k] = guess[k] if of_guess else found[k]
-        if begun(problem, work, omega, FAR_FROM_GUESS if of_guess else SAME):
+def start_from_only_motion(problem: Shooting, work: LaneWork, omega: float) -> bool:
+    """Begin the path with the only motion that there is at omega, or a little below."""
+    machine, touch = problem.machine, work.touch
+    for _ in range(LOOKS):
+        share = only_motion(machine, work.shooting.flow, touch, omega)
+        if share > 0.0:
+            for k in range(work.guess.shape[0]):
+                work.guess[k] = touch.z[k]
+        known = share > 0.0 or (share == 0.0 and contact_free_state(machine, work, omega))
+        if known and begun(problem, work, omega, SAME):
             return True
+        omega *= BELOW
     return False
-
-
-@kernel
-def is_near(z: Real, guess: Real, omega: float, length: float) -> bool:
-    """Whether a state lies no farther from a guess than Newton's first step may lead."""
-    n = z.shape[0] // 2
-    large, apart = length, 0.0
-    for k in range(n):
-        large = max(large, abs(guess[k]), abs(guess[n + k]) / omega)
-        apart = max(apart, abs(z[k] - guess[k]), abs(z[n + k] - guess[n + k]) / omega)
-    return apart < FAR_FROM_GUESS * large
 
 
 @kernel

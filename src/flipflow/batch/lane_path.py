@@ -45,7 +45,6 @@ DIVERGED = 1e3  # Newton step, as a share of the motion, from which none follows
 FAR = 0.1  # first Newton step along a path, as a share of the motion: farther lies another motion
 ASTRAY = 0.2  # share of the way of a step by which it may differ from what its tangents tell
 UNSEEN = 1e-3  # the same as a share of the motion
-FAR_FROM_GUESS = 0.3  # the same from the motion of another machine
 LONGEST = 0.05  # step in frequency, as a share of it
 SHORTEST = 2e-5  # step in frequency, as a share of it, below which the motion has ended
 KEPT = 10  # last motions through which a guess goes; more change it by no more than rounding

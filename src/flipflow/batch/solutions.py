@@ -1,7 +1,7 @@
 """Periodic motions of many machines at many frequencies, on threads.
 
-Every lane is solved by itself: what it finds depends on its machine, on the frequencies, and on a
-motion of a machine nearby that all lanes share, and neither on other lanes nor on the threads.
+Every lane is solved by itself: what it finds depends on its machine and on the frequencies, and
+neither on other lanes nor on the threads.
 """
 
 from __future__ import annotations
@@ -10,42 +10,21 @@ import threading
 
 import numpy as np
 
-from flipflow.batch.lane_kernels import Found, Nearby, new_found, run_lanes
+from flipflow.batch.lane_kernels import Found, new_found, run_lanes
 from flipflow.batch.lane_path import new_lane_work
 from flipflow.batch.lane_readings import Asked, Readings, new_reading_work, new_readings
 from flipflow.batch.lane_slopes import slope_lanes
-from flipflow.batch.reasons import FOUND, NOT_COMPUTED
+from flipflow.batch.reasons import NOT_COMPUTED
 from flipflow.batch.side_by_side import Tell, side_by_side
 from flipflow.batch.slope_readings import Slopes, SlopesAsked, new_slope_work, new_slopes
-from flipflow.batch.variants import Batch, bonded_terms, stacked
+from flipflow.batch.variants import Batch
 from flipflow.compiled.arrays import Int, Real
-from flipflow.dynamics.assembly import machine_arrays
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.parameter_tangent import Columns
-from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.solver import characteristic_length
 
 MOST = 2048  # motions that one task finds
 TASKS = 4  # of each thread at least, since the last one to end is waited for
-
-
-def nearby_motions(nominal: MechanicalSystem, like: MechanicalSystem, omega: Real) -> Nearby:
-    """Motions of a machine up to its first jump along the frequencies, (F,) in their order.
-
-    None where its coordinates and stops are other ones than those of ``like``.
-    """
-    none = np.zeros(omega.size)
-    nothing = Nearby(np.full((omega.size, 2 * like.size), np.nan), none.astype(np.int64), none)
-    if (nominal.size, len(nominal.springs)) != (like.size, len(like.springs)):
-        return nothing
-    arrays = stacked([machine_arrays(nominal)])
-    bonded = bonded_terms(nominal)[None]
-    alone = Batch(np.zeros(1, np.int64), nominal, arrays, bonded, nominal.M[None])
-    found, read = solve_lanes(alone, omega, nothing_asked(nominal.size, omega.size), nothing)
-    good = (found.reason[0] == FOUND) & (found.jumps[0] == 0)
-    even = np.where(nominal.symmetric & (found.leaning[0] == 0), 1, 0)
-    share = read.share[0, :, 0] if len(nominal.springs) == 1 else none
-    return Nearby(np.where(good[:, None], found.state[0], np.nan), even, np.where(good, share, 0.0))
 
 
 def nothing_asked(degrees: int, speeds: int) -> Asked:
@@ -63,7 +42,6 @@ def solve_lanes(
     batch: Batch,
     omega: Real,
     asked: Asked,
-    nearby: Nearby,
     threads: int = 1,
     tell: Tell | None = None,
 ) -> tuple[Found, Readings]:
@@ -80,8 +58,6 @@ def solve_lanes(
         Frequencies, (F,), rising or falling.
     asked
         What is read off.
-    nearby
-        Motions of a machine like these, as first guesses.
     threads
         Threads among which chunks of lanes are shared.
     tell
@@ -94,7 +70,6 @@ def solve_lanes(
     length = characteristic_length(batch.system, nominal)
     # A read-only array is another type to the compiler, and would be compiled for anew.
     speeds_in_order = np.array(omega)
-    guesses = Nearby(np.array(nearby.state), np.array(nearby.even), np.array(nearby.share))
 
     own = threading.local()
 
@@ -104,7 +79,7 @@ def solve_lanes(
             own.work = new_lane_work(_machine(batch.arrays, 0), stop)
             own.reading = new_reading_work(own.work.shooting.flow, nominal, asked)
         run_lanes(
-            batch.arrays, part.start, part.stop, speeds_in_order, length, guesses, own.work,
+            batch.arrays, part.start, part.stop, speeds_in_order, length, own.work,
             own.reading, asked, found, readings,
         )  # fmt: skip
 

@@ -38,8 +38,8 @@ MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
 FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
 NEARLY_ZERO = 0.5  # share of its least sample down to which a parabola may fall to have no zero
-MOST_SECANTS = 9  # values of f from a share close by; six are usual
-ON_ZERO = 1e-10  # |f| from which the state is that of the motion
+SHARP = 1e-14  # |f| of a zero, and the share within which it is
+ON_ZERO = 1e-10  # |f| from which a state is so near to the motion's that Newton confirms it at once
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
 
 
@@ -199,13 +199,13 @@ def _excess(F: complex) -> float:
 @kernel
 def root_between(
     machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float,
-    f_a: float, f_b: float,
+    f_a: float, f_b: float, tolerance: float,
 ) -> float:  # fmt: skip
     """Zero of f in [a, b] by false position with halving of the stale end (Illinois)."""
     for _ in range(MOST_ROOT_STEPS):
         s = (a * f_b - b * f_a) / (f_b - f_a)
         f = force_excess(machine, flow, work, omega, s)
-        if abs(f) < 1e-14 or abs(b - a) < 1e-14:
+        if abs(f) < tolerance or abs(b - a) < SHARP:
             return s
         if f * f_b < 0.0:
             a, f_a = b, f_b
@@ -230,7 +230,7 @@ def two_event_states(
         s = (i + 0.5) / samples
         f = force_excess(machine, flow, work, omega, s)
         if f * f_before < 0.0 and found < states.shape[0]:
-            root = root_between(machine, flow, work, omega, before, s, f_before, f)
+            root = root_between(machine, flow, work, omega, before, s, f_before, f, SHARP)
             F = required_force(machine, flow, work, omega, root)
             to_phase_zero(machine, flow, work, omega, root, F)
             for k in range(work.z.shape[0]):
@@ -242,33 +242,41 @@ def two_event_states(
 
 
 @kernel
-def is_only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float) -> bool:
-    """Whether there is one motion alone at omega: one zero of f, or the motion without contact.
+def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float) -> float:
+    """Share of contact of the only motion at omega, its state at phase 0 into work.z.
 
-    That one is the limit s = 0, where f is what the gap is more than its amplitude, as a share.
-    Where f comes so near to zero between samples that two zeros may be missed, there may be more.
+    0 stands for the motion without contact, the limit of these motions, where f is what the gap is
+    more than its amplitude, as a share. NaN where there are more, or may be: where f comes so near
+    to zero between samples that two zeros are missed.
     """
     if not has_two_events(machine):
-        return False
-    if math.isnan(force_excess(machine, flow, work, omega, 1.0 / FEW_SAMPLES)):
-        return False
-    open_motion = 0j
+        return math.nan
+    f = force_excess(machine, flow, work, omega, 0.5 / FEW_SAMPLES)
+    without_contact = 0j
     for k in range(machine.direction.shape[1]):
-        open_motion += machine.direction[0, k] * flow.drive[OPEN_SLOT, 0, k]
-    last = machine.stops.gap[0, 0] / modulus(open_motion) - 1.0
-    before, motions = last, 1 if last > 0.0 else 0
-    for i in range(FEW_SAMPLES):
-        f = force_excess(machine, flow, work, omega, (i + 0.5) / FEW_SAMPLES)
+        without_contact += machine.direction[0, k] * flow.drive[OPEN_SLOT, 0, k]
+    last = machine.stops.gap[0, 0] / modulus(without_contact) - 1.0
+    free, zeros, before, s, s_last = last > 0.0, 0, last, 0.5 / FEW_SAMPLES, 0.0
+    low, high, f_low, f_high = 0.0, 0.0, 0.0, 0.0
+    for i in range(1, FEW_SAMPLES + 1):
         if not f * last > 0.0:
-            motions += 1
+            zeros += 1
+            low, high, f_low, f_high = s_last, s, last, f
         elif last * before > 0.0 and abs(last) < min(abs(before), abs(f)):
             dip = last - (f - before) ** 2 / (8.0 * (f - 2.0 * last + before))
-            if dip < NEARLY_ZERO * last if last > 0.0 else dip > NEARLY_ZERO * last:
-                return False
-        if motions > 1:
-            return False
-        before, last = last, f
-    return motions == 1
+            if dip / last < NEARLY_ZERO:
+                return math.nan
+        if zeros + free > 1:
+            return math.nan
+        before, last, s_last, s = last, f, s, (i + 0.5) / FEW_SAMPLES
+        if i < FEW_SAMPLES:
+            f = force_excess(machine, flow, work, omega, s)
+    if free or zeros == 0:
+        return 0.0 if free else math.nan
+    share = root_between(machine, flow, work, omega, low, high, f_low, f_high, ON_ZERO)
+    F = required_force(machine, flow, work, omega, share)
+    to_phase_zero(machine, flow, work, omega, share, F)
+    return share
 
 
 @kernel
@@ -276,25 +284,6 @@ def has_two_events(machine: MachineArrays) -> bool:
     """Whether a machine, an even one, has the one stop and the one force of these motions."""
     one = machine.direction.shape[0] == 1 and machine.power.shape[0] == 1
     return one and machine.order[0] == 1 and machine.stops.law[0] == PAPER
-
-
-@kernel
-def two_event_state(
-    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, share: float
-) -> bool:
-    """The zero of f near a share, by the secant method: its state at phase 0 into work.z."""
-    before, s, f_before = share, 0.99 * share, math.nan
-    for k in range(MOST_SECANTS):
-        F = required_force(machine, flow, work, omega, s)
-        f = _excess(F)
-        if abs(f) < ON_ZERO:
-            to_phase_zero(machine, flow, work, omega, s, F)
-            return True
-        new = share if k == 0 else s - f * (s - before) / (f - f_before)
-        before, s, f_before = s, new, f
-        if not 0.0 < s < 1.0:
-            return False
-    return False
 
 
 @kernel

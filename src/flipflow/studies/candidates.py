@@ -132,7 +132,7 @@ class Space:
     duty
         What is asked.
     near
-        A machine near those looked at, whose motions are first guesses; None: that of the duty.
+        A machine near those looked at, whose range of speeds is theirs; None: that of the duty.
     margin_as_built
         Whether machines with all parts at one end of their scatter have to keep the margin to the
         jump, too, not the drawing alone.

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flipflow.batch.solutions import nearby_motions
+from flipflow.batch.solutions import nothing_asked, solve_lanes
+from flipflow.batch.variants import batches
 from flipflow.compiled.eigen import eigenvalues
 from flipflow.compiled.workers import compile_parts, work
 from flipflow.continuation import correction
@@ -57,7 +58,8 @@ def _section_part() -> None:
 def _lanes_part() -> None:
     solver = _small_solver()
     solver.residual(np.zeros(2), 0.5)
-    nearby_motions(solver.system, solver.system, np.array([0.5, 0.51]))
+    (batch,), _ = batches(solver.system, {"forcing": np.ones(1)})
+    solve_lanes(batch, np.array([0.5, 0.51]), nothing_asked(1, 2))
 
 
 def _start_up_part() -> None:

@@ -14,7 +14,7 @@ from flipflow.batch.lane_kernels import Found
 from flipflow.batch.lane_readings import Readings
 from flipflow.batch.reasons import FOUND, NOT_COMPUTED, REFUSED, UNSTABLE
 from flipflow.batch.side_by_side import Tell
-from flipflow.batch.solutions import nearby_motions, solve_lanes, solve_slopes
+from flipflow.batch.solutions import solve_lanes, solve_slopes
 from flipflow.batch.variants import Batch, batches, variant
 from flipflow.compiled.arrays import Int, Real
 from flipflow.continuation.frequency_response import formulation_of
@@ -217,14 +217,13 @@ class _Question:
         return up, down, same & np.isin(why, reasons) & np.isin(why_down, reasons)
 
     def _solved(self, omega: Real) -> Answer:
-        nearby = nearby_motions(self.machine.system().with_bonded(), self.batch.system, omega)
         rows = self.batch.rows
         own = {name: column[rows] for name, column in self.columns.items()}
         of_screen = isinstance(self.machine, FlipFlowScreen)
         fields = fields_of_rows(self.machine, own) if of_screen else {}
         told_by_lanes = tuple(one for one in self.quantities if on_lanes(self.machine, one))
         plan = LanePlan(self.machine, self.batch, fields, omega, told_by_lanes)
-        found, read = solve_lanes(self.batch, omega, plan.asked, nearby, self.threads, self.tell)
+        found, read = solve_lanes(self.batch, omega, plan.asked, self.threads, self.tell)
         told = LaneMotions(plan, read, found.multiplier)
         values = {one.name: told.value(one) for one in told_by_lanes}
         others = [one for one in self.quantities if one not in told_by_lanes]
