@@ -113,7 +113,7 @@ def run_lane(
             reached, half = settled(machine, work, omega[f], length, even)
             if f == 0 and not reached:
                 reached, half = led(machine, work, omega[f], length, even, rising)
-            lost = not reached
+        lost = not reached
         found.jumps[lane, f] = jumps
         if reached:
             half, stable = stability(machine, work, omega[f], length, even, half)
