@@ -13,6 +13,7 @@ from flipflow.batch.lane_path import (
     PUSH,
     SAME,
     TURNS_BETWEEN,
+    TURNS_MOST,
     LaneWork,
     begin_lane,
     contact_free_state,
@@ -103,13 +104,14 @@ def run_lane(
         rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
             begun, half = set_off(machine, work, f == 0, omega[f], length, even, rising)
+            lost = False
         reached = begun and not lost and follow(problem_of(machine, half, length), work, omega[f])
-        if begun and not lost and not reached:
-            jumps += 1
-            reached, half = leapt(machine, work, omega[f], length, even, half)
         if lost:
             reached, half = resumed(machine, work, omega[f - 1], omega[f], length, even)
-        if not reached:
+        elif begun and not reached:
+            jumps += 1
+            reached, half = leapt(machine, work, omega[f], length, even, half)
+        elif not begun:
             reached, half = settled(machine, work, omega[f], length, even)
             if f == 0 and not reached:
                 reached, half = led(machine, work, omega[f], length, even, rising)
@@ -226,11 +228,11 @@ def leapt(
         if not reached:
             reached, half_there = drifted(machine, work, beyond, omega, length), False
         if not reached:
-            break
+            return False, False
         half = half_there
         if follow(problem_of(machine, half, length), work, omega):
             return True, half
-    return False, half
+    return settled(machine, work, omega, length, even)
 
 
 @kernel
@@ -239,13 +241,13 @@ def drifted(
 ) -> bool:
     """Let the speed go on slowly from where the flow of work.z repeats after no single turn.
 
-    False where it settles on no motion of one turn before omega.
+    False where it settles on no motion of one turn up to omega; work.z is where it has come to.
     """
     problem, at = problem_of(machine, False, length), begin
     while at != omega:
         ahead = at * (1.0 + math.copysign(DRIFT, omega - at))
         at = ahead if (omega - ahead) * (omega - at) > 0.0 else omega
-        if settle(problem, work, at, TURNS_BETWEEN):
+        if settle(problem, work, at, TURNS_MOST if at == omega else TURNS_BETWEEN):
             return True
     return False
 

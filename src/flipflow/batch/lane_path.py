@@ -4,10 +4,10 @@ Newton's method follows the motion from frequency to frequency, each guess a pol
 last motions. Where speeds lie close, the guess is as good as the motion, and one flow with its
 tangent shows that it is.
 
-A step is taken back and halved where Newton leads far away or where an eigenvalue of the return map
-has passed +1: the motion behind a fold is another one. Where no step is short enough the machine
-jumps: the exact flow runs turn after turn from the last motion, at the frequency ahead, until
-Newton finds the motion that it settles on.
+A step is taken back and halved where Newton leads far away, where it does not go as the tangents at
+its ends do, or where an eigenvalue of the return map has passed +1: the motion behind a fold is
+another one. Where no step is short enough the machine jumps: the exact flow runs turn after turn
+from the last motion, at the frequency ahead, until Newton finds the motion that it settles on.
 
 A machine with equal gaps, odd multiples of the frequency and no constant force is flown over half a
 turn, with sign. Where that motion loses its symmetry, the lane is flown to one that leans.

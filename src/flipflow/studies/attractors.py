@@ -122,7 +122,8 @@ class Attractors:
             done += wave.size
         while not whole.cancelled and self._let_go(whole).any():
             whole = self._again(whole, states, starts, most, say)
-            self._found_further(whole)
+            if not whole.cancelled:
+                self._found_further(whole)
         return whole
 
     def _let_go(self, run: Run) -> NDArray[np.bool_]:

@@ -29,7 +29,7 @@ from flipflow.batch.run_chunks import run_chunks
 from flipflow.batch.side_by_side import Tell
 from flipflow.compiled.arrays import Real
 from flipflow.errors import Cancelled, required
-from flipflow.studies.candidates import MET, TARGET, Judged, Space
+from flipflow.studies.candidates import JUMP, MET, TARGET, Judged, Space
 from flipflow.studies.design_store import SHARES, keep, looked_at
 
 POPULATION = 64
@@ -106,7 +106,7 @@ def search(
         cancelled = True
     u = np.unique(np.array(algorithm.pop.get("X"), float), axis=0)
     judged = space.judge(u, margins=space.duty.loads)
-    if not judged.fits.any():
+    if not judged.fits.any() and JUMP in space.constraints and space.duty.scatter:
         space = replace(space, margin_as_built=False)
         judged = space.judge(u, margins=space.duty.loads)
     best = _front(space, judged)

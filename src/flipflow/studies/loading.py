@@ -159,7 +159,9 @@ class LoadedMachine:
         ):
             unfinished = () if branch.complete else (branch.status.value,)
             amplitude = self.region.unloaded if branch is self.unloaded else self.region.loaded
-            lost = int(np.isnan(amplitude).sum())
+            omega, ends = self.region.omega, (branch.omega.min(), branch.omega.max())
+            followed = (omega >= ends[0]) & (omega <= ends[1])
+            lost = int(np.isnan(amplitude[followed]).sum())
             unstable = (UNSTABLE.format(lost, amplitude.size),) if lost and branch.complete else ()
             texts = (*branch.notes, *marks.notes, *unfinished, *unstable)
             sentences += [f"{name}: {text}" for text in texts]

@@ -65,7 +65,7 @@ def evaluate(
 ) -> Values:
     """Quantities of L machines at F frequencies.
 
-    The values of a row depend on the row, on the machine itself, whose motions are first guesses,
+    The values of a row depend on the row, on the machine itself, whose range of speeds is analysed,
     and on the frequencies: on no other row.
 
     Parameters
@@ -206,7 +206,7 @@ class _Under:
 
     @cached_property
     def near(self) -> FlipFlowScreen:
-        """The screen under the load, whose motions are first guesses."""
+        """The screen under the load, whose range of speeds is analysed."""
         return self.screen.loaded(self.load)
 
     @property
