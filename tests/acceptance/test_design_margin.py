@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
 from test_design import FREE, duty
 
 import flipflow as ff
 from flipflow.studies.candidates import Space
 from flipflow.studies.design_search import search
 from judge import close
-
-pytestmark = pytest.mark.numerical
 
 
 def quarry() -> tuple[ff.Duty, ff.FlipFlowScreen]:
