@@ -68,6 +68,20 @@ def test_no_share_where_no_stop_is_touched_and_none_is_told_between_folds(screen
     np.testing.assert_equal(found, alone)
 
 
+@pytest.mark.parametrize("omega", [191.56, 178.15, 165.68, 154.08])
+def test_two_motions_that_lie_close_are_seen_between_samples(omega):
+    """|F| falls to 1 and rises within a sixteenth of the turn: it is no parabola there."""
+    light = ff.FlipFlowScreen(
+        main_mass=1843.494, floating_mass=446.5357, eccentric_moment=2.671156,
+        isolation_stiffness=248356.9, isolation_damping=1590.1, shear_stiffness=3020566.0,
+        shear_damping=425.71, stop_stiffness=54414500.0, stop_damping=7089.23, clearance=0.0146515,
+    )  # fmt: skip
+    states, _ = TwoEventProblem(machine_arrays(light.system())).states(omega)
+    assert len(states) == 2
+    share, _ = only_motion(light, omega)
+    assert np.isnan(share)
+
+
 def test_shooting_has_the_last_word_where_motion_leans():
     """e = 2 mm at 57.7 rad/s: of the scalar problem's candidates one is a motion.
 

@@ -14,6 +14,11 @@ Work = Callable[[slice, Int], None]
 Tell = Callable[[float], None]  # called with the share of a work that is done
 
 
+def within(tell: Tell, low: float, high: float) -> Tell:
+    """What tells the share of a part of some work, from ``low`` to ``high`` of the whole."""
+    return lambda share: tell(low + (high - low) * share)
+
+
 def side_by_side(work: Work, count: int, size: int, threads: int, tell: Tell | None = None) -> None:
     """Do a work of ``count`` rows, ``size`` at a time, on some threads.
 

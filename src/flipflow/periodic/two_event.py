@@ -37,7 +37,8 @@ OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop en
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
 FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
-NEARLY_ZERO = 0.5  # share of its least sample down to which a parabola may fall to have no zero
+BULGE = 0.25  # of a second difference of F: how far the way between samples lies from the chord
+CLOSER = 4  # parts of the way between two samples that is looked at more closely
 SHARP = 1e-14  # |f| of a zero, and the share within which it is
 ON_ZERO = 1e-10  # |f| from which a state is so near to the motion's that Newton confirms it at once
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
@@ -245,38 +246,65 @@ def two_event_states(
 def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float) -> float:
     """Share of contact of the only motion at omega, its state at phase 0 into work.z.
 
-    0 stands for the motion without contact, the limit of these motions, where f is what the gap is
-    more than its amplitude, as a share. NaN where there are more, or may be: where f comes so near
-    to zero between samples that two zeros are missed.
+    0 stands for the motion without contact, the limit of these motions. NaN where there are more.
+    Where F comes so near to the unit circle between samples that two zeros may be missed, it is
+    looked at more closely.
     """
     if not has_two_events(machine):
         return math.nan
-    f = force_excess(machine, flow, work, omega, 0.5 / FEW_SAMPLES)
+    s, s_last = 0.5 / FEW_SAMPLES, 0.0
+    F = required_force(machine, flow, work, omega, s)
     without_contact = 0j
     for k in range(machine.direction.shape[1]):
         without_contact += machine.direction[0, k] * flow.drive[OPEN_SLOT, 0, k]
-    last = machine.stops.gap[0, 0] / modulus(without_contact) - 1.0
-    free, zeros, before, s, s_last = last > 0.0, 0, last, 0.5 / FEW_SAMPLES, 0.0
-    low, high, f_low, f_high = 0.0, 0.0, 0.0, 0.0
-    for i in range(1, FEW_SAMPLES + 1):
-        if not f * last > 0.0:
+    last = machine.stops.gap[0, 0] / without_contact
+    free, zeros, low, high, f_low, f_high = _excess(last) > 0.0, 0, 0.0, 0.0, 0.0, 0.0
+    before = last
+    for _ in range(FEW_SAMPLES):
+        f_last, f = _excess(last), _excess(F)
+        if not f * f_last > 0.0:
             zeros += 1
-            low, high, f_low, f_high = s_last, s, last, f
-        elif last * before > 0.0 and abs(last) < min(abs(before), abs(f)):
-            dip = last - (f - before) ** 2 / (8.0 * (f - 2.0 * last + before))
-            if dip / last < NEARLY_ZERO:
-                return math.nan
+            low, high, f_low, f_high = s_last, s, f_last, f
+        elif _may_leave(last, F, BULGE * modulus(F - 2.0 * last + before)):
+            zeros += _zeros_within(machine, flow, work, omega, s_last, s, f)
         if zeros + free > 1:
             return math.nan
-        before, last, s_last, s = last, f, s, (i + 0.5) / FEW_SAMPLES
-        if i < FEW_SAMPLES:
-            f = force_excess(machine, flow, work, omega, s)
+        before, last, s_last, s = last, F, s, s + 1.0 / FEW_SAMPLES
+        if s < 1.0:
+            F = required_force(machine, flow, work, omega, s)
     if free or zeros == 0:
         return 0.0 if free else math.nan
     share = root_between(machine, flow, work, omega, low, high, f_low, f_high, ON_ZERO)
     F = required_force(machine, flow, work, omega, share)
     to_phase_zero(machine, flow, work, omega, share, F)
     return share
+
+
+@kernel
+def _zeros_within(
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float, f: float
+) -> int:
+    """Two where f has another sign somewhere between two shares than at both, else none."""
+    for k in range(1, CLOSER):
+        between = a + (b - a) * k / CLOSER
+        if not f * force_excess(machine, flow, work, omega, between) > 0.0:
+            return 2
+    return 0
+
+
+@kernel
+def _may_leave(start: complex, end: complex, bulge: float) -> bool:
+    """Whether F may cross the unit circle, and again, between two values on one side of it.
+
+    ``bulge`` is how far its way may lie from the straight one.
+    """
+    if _excess(start) < 0.0:
+        return max(modulus(start), modulus(end)) + bulge > 1.0
+    step = end - start
+    share = -(start.real * step.real + start.imag * step.imag) / (
+        step.real * step.real + step.imag * step.imag
+    )
+    return modulus(start + min(max(share, 0.0), 1.0) * step) - bulge < 1.0
 
 
 @kernel

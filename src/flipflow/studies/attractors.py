@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flipflow.batch.lanes import Capture, Lanes, Run
-from flipflow.batch.side_by_side import Tell
+from flipflow.batch.side_by_side import Tell, within
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.model.arguments import checked_generator
@@ -105,14 +105,9 @@ class Attractors:
         )  # fmt: skip
         first = np.arange(0, count, max(count // FIRST_SHARE, 1))
         rest = np.setdiff1d(np.arange(count), first)
-        done = 0
+        told, done = tick or (lambda _: None), 0
         for wave in (first, rest):
-            base, share = done / count, wave.size / count
-
-            def say(part: float, base: float = base, share: float = share) -> None:
-                if tick is not None:
-                    tick(base + share * part)
-
+            say = within(told, done / count, (done + wave.size) / count)
             run = self.lanes.settle(states[wave], starts[wave], self.capture, most, say)
             while not run.cancelled and self._found_further(run):
                 run = self._again(run, states[wave], starts[wave], most, say)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.batch.side_by_side import Tell
+from flipflow.batch.side_by_side import Tell, within
 from flipflow.compiled.arrays import Int, Real
 from flipflow.errors import Cancelled
 from flipflow.model.system import Coordinate, MechanicalSystem
@@ -179,11 +179,6 @@ class Blows:
                 share, phase = float(shares[k]), float(near[k])
             step *= 2.0 / (NEARBY - 1)
         return share, float(np.mod(phase, 2.0 * np.pi * self.turns))
-
-
-def within(tick: Tell, low: float, high: float) -> Tell:
-    """What tells the share of a part of some work, from ``low`` to ``high`` of the whole."""
-    return lambda share: tick(low + (high - low) * share)
 
 
 def frames_of(system: MechanicalSystem) -> list[tuple[Coordinate, int]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flipflow import __version__
-from flipflow.batch.side_by_side import Tell
+from flipflow.batch.side_by_side import Tell, within
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.frequency_response import first_unknowns
 from flipflow.errors import IncompleteError, InputError
@@ -21,15 +21,13 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.periodic.solver import Point
 from flipflow.results.result import Result
 from flipflow.studies.attractors import Attractors
-from flipflow.studies.blows import Blows, within
+from flipflow.studies.blows import Blows
 from flipflow.transient.settling import is_stable
 
 PHASES = 60  # in each forcing period at which blows fall
 LONE_STRIDE = 6  # every so many phases serve where no other motion is known
-LONE, REFINED = (
-    0.1,
-    0.9,
-)  # shares of the work when another motion is looked for, when all are scanned
+LONE = 0.1  # share of the scan when another motion has been looked for
+REFINED = 0.9  # shares of the work when all blows are scanned, of a throw when it is refined
 MOST_IMPULSE = 1e9  # kg m/s, largest impulse that may be asked for
 NO_OTHER = "No other motion found: it cannot jump."
 
