@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 import flipflow as ff
+from flipflow.batch.variants import batches
 from flipflow.errors import Cancelled, IncompleteError, InputError
 from flipflow.io.derived import derive
 from flipflow.io.source import bundled_text
+from flipflow.io.study_file import read_study_file
 from flipflow.io.vary import read_vary
+from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import assess_case, energy_balance, input_hash, verdict
 from flipflow.studies.drive_check import power_that_passes
 from flipflow.studies.loading import amplitudes_from_below
@@ -450,3 +453,70 @@ def test_a_tolerance_in_degrees_may_have_their_sign(screen):
         read_vary(("deck_angle=+-1 deg",), tilted)["deck_angle"],
         rel=1e-15,
     )
+
+
+def plain_machine(gap=0.4, law="paper"):
+    spring = ff.ClearanceSpring([1.0], 20.0, 0.1, gap, law=law)
+    return ff.MechanicalSystem([[1.0]], [[0.1]], [[1.0]], (spring,), ff.HarmonicForce([0.5]))
+
+
+@pytest.mark.parametrize(
+    "vary",
+    [{"forcing": [0.8, 1.0, 1.2]}, {"forcing": (0.8, 1.2), "springs[0].clearance": (0.3, 0.5)}],
+)
+def test_a_study_of_a_machine_in_its_own_units_tells_none(vary):
+    """Its numbers stood in figures and tables a thousand times as large, as mm."""
+    sampling = {"sampling": ff.Sample(n=8)} if isinstance(vary["forcing"], tuple) else {}
+    found = ff.study(plain_machine(), vary, ["amplitude[0]", "stop_force"], 1.2, **sampling)
+    notes = [n.text for panel in ff.figure(found).panels for n in panel.notes]
+    most = found.values["amplitude[0]"].max()
+    assert notes == [] or any(math.isclose(float(text), most, rel_tol=1e-3) for text in notes)
+    for told in (repr(ff.figure(found)), *map(repr, blocks_of(found))):
+        for unit in (" mm", " kN", " rpm", ", mm", ", kN"):
+            assert unit not in told
+
+
+def test_the_ends_of_a_worst_case_stand_in_the_units_of_its_axis(screen):
+    found = ff.worst_case(screen, {"clearance": (4e-3, 6e-3)}, "relative_amplitude", 90.0)
+    for units, scale in (("engineering", 1e3), ("SI", 1.0)):
+        (bar,) = ff.figure(found, units=units).panels[0].bars
+        low, high = map(float, bar.words.split(" to "))
+        ends = scale * np.array([found.least[0], found.greatest[0]])
+        close(f"ends, {units}", [low, high], ends, rel=1e-3)
+
+
+def test_true_is_no_format_of_a_study_file(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('format = true\nmachine = "ffs0827"\n')
+    with pytest.raises(InputError, match="format"):
+        read_study_file(path)
+
+
+@dataclass(frozen=True)
+class Plain:
+    """A machine of which words vary, so that each variant is assembled by itself."""
+
+    gap: float = 0.4
+    law: str = "paper"
+
+    def system(self):
+        """A mass on a spring and a stop."""
+        return plain_machine(self.gap, self.law)
+
+
+def test_what_a_row_of_a_study_is_told_hangs_on_no_other_row():
+    """Rows assembled by themselves took the gap of the first one as the machine's length."""
+    columns = {"gap": np.array([0.2, 0.3]), "law": np.array(["elasto-gap"] * 2, object)}
+    (together,), _ = batches(Plain(), columns)
+    (alone,), _ = batches(Plain(), {name: column[1:] for name, column in columns.items()})
+    assert together.length == alone.length == Plain().gap
+
+
+def test_a_spring_without_stiffness_and_gap_never_has_a_force():
+    dead = ff.ClearanceSpring([1.0], 0.0, 0.0, 0.0)
+    live = plain_machine()
+    machine = replace(live, springs=(dead, *live.springs))
+    orbit = ff.periodic_orbits(machine, 1.2)[0]
+    assert orbit.contact_share(0) == 0.0 < orbit.contact_share(1)
+    assert orbit.stop_force_peak(0) == 0.0
+    assert ff.lyapunov_exponents(machine, 1.2, periods=100).contact_share[0] == 0.0

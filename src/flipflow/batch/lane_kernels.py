@@ -99,9 +99,9 @@ def run_lane(
     """One lane: its motion is followed from speed to speed, and flown where it jumps."""
     even = is_even(machine)
     half, lost, jumps = even, False, 0
+    rising = omega[-1] >= omega[0]
     for f in range(omega.shape[0]):
         begun = not math.isnan(work.omega[0])
-        rising = f + 1 == omega.shape[0] or omega[f + 1] >= omega[f]
         if not begun:
             begun, half = set_off(machine, work, f == 0, omega[f], length, even, rising)
             lost = False

@@ -20,13 +20,19 @@ from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
 from flipflow.dynamics.contact_search import (
-    GapMotion,
-    exponential,
+    begin_later,
     extremes,
     prepare_search,
 )
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow, end_segment, force_peak, segment_motion, segment_state
+from flipflow.dynamics.flow import (
+    Flow,
+    end_segment,
+    force_peak,
+    segment_motion,
+    segment_state,
+    stop_force,
+)
 from flipflow.dynamics.law import damping_share, kind, signed_gap, stiffness_share
 from flipflow.dynamics.multiplier_slopes import MultiplierWork, new_multiplier_work
 from flipflow.dynamics.parameter_tangent import (
@@ -225,7 +231,7 @@ def set_extremes(
         e = part // parts
         begin, duration = (part % parts) * flow.length[e] / parts, flow.length[e] / parts
         count = segment_motion(machine, flow, e, omega, coordinate, motion)
-        delay(motion, count, g, begin)
+        begin_later(motion, count, g, begin)
         prepare_search(motion, count)
         least, most, at_least, at_most = extremes(motion, count, g, duration)
         low = lower and (not upper or -least > most)
@@ -270,14 +276,6 @@ def is_summit(summits: Summits, part: int, parts: int) -> bool:
     if summits.height[part] < top - TIED * abs(top):
         return False
     return part == best or summits.at_end[part] == 0 or summits.at_end[best] != 0
-
-
-@kernel
-def delay(motion: GapMotion, count: int, g: int, t: float) -> None:
-    """A sum of exponentials counted from a later time."""
-    motion.offset[g] += motion.drift[g] * t
-    for i in range(count if t != 0.0 else 0):
-        motion.amplitude[g, i] *= exponential(motion.rate[i] * t)
 
 
 @kernel
@@ -343,18 +341,6 @@ def shifted(flow: Flow, shift: Real, e: int, t: float, p: int) -> float:
     if t <= 0.0:
         return float(shift[e, p])
     return float(shift[e + 1, p]) if t >= flow.length[e] * (1.0 - AT_END) else 0.0
-
-
-@kernel
-def stop_force(machine: MachineArrays, flow: Flow, e: int, j: int, z: Real) -> float:
-    """Force of stop j in segment e at a state."""
-    stops, regime, n = machine.stops, flow.regimes[e, j], machine.direction.shape[1]
-    depth, rate = -signed_gap(stops, j, regime), 0.0
-    for s in range(n):
-        depth += machine.direction[j, s] * z[s]
-        rate += machine.direction[j, s] * z[n + s]
-    spring = stiffness_share(stops, j, regime) * stops.stiffness[j] * depth
-    return float(spring + damping_share(stops, j, regime) * stops.damping[j] * rate)
 
 
 @kernel

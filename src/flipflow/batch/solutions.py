@@ -21,7 +21,6 @@ from flipflow.batch.variants import Batch
 from flipflow.compiled.arrays import Int, Real
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.parameter_tangent import Columns
-from flipflow.periodic.solver import characteristic_length
 
 MOST = 2048  # motions that one task finds
 TASKS = 4  # of each thread at least, since the last one to end is waited for
@@ -67,7 +66,6 @@ def solve_lanes(
     nominal = _machine(batch.arrays, 0)
     found = new_found(lanes, speeds, batch.system.size, NOT_COMPUTED)
     readings = new_readings(lanes, speeds, nominal, asked)
-    length = characteristic_length(batch.system, nominal)
     # A read-only array is another type to the compiler, and would be compiled for anew.
     speeds_in_order = np.array(omega)
 
@@ -79,7 +77,7 @@ def solve_lanes(
             own.work = new_lane_work(_machine(batch.arrays, 0), stop)
             own.reading = new_reading_work(own.work.shooting.flow, nominal, asked)
         run_lanes(
-            batch.arrays, part.start, part.stop, speeds_in_order, length, own.work,
+            batch.arrays, part.start, part.stop, speeds_in_order, batch.length, own.work,
             own.reading, asked, found, readings,
         )  # fmt: skip
 
@@ -127,15 +125,14 @@ def solve_slopes(
     """
     nominal, parameters = _machine(batch.arrays, 0), columns.touches.shape[0]
     slopes = new_slopes(found, nominal, asked, parameters)
-    length = characteristic_length(batch.system, nominal)
     speeds_in_order, own = np.array(omega), threading.local()
 
     def chunk(part: slice, stop: Int) -> None:
         if not hasattr(own, "work"):
             own.work = new_slope_work(_machine(batch.arrays, 0), asked, columns, stop)
         slope_lanes(
-            batch.arrays, columns, part.start, part.stop, speeds_in_order, length, asked, wanted,
-            own.work, found, slopes,
+            batch.arrays, columns, part.start, part.stop, speeds_in_order, batch.length, asked,
+            wanted, own.work, found, slopes,
         )  # fmt: skip
 
     lanes = batch.rows.size

@@ -28,6 +28,7 @@ from flipflow.model.parameters import value_of, with_values
 from flipflow.model.sampling import Columns
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
+from flipflow.periodic.solver import characteristic_length
 
 Bool = NDArray[np.bool_]
 Shapes = dict[str, tuple[int, ...]]
@@ -56,6 +57,9 @@ class Batch:
         (L, B, 2, N).
     inertia
         Their mass matrices, (L, N, N).
+    length
+        What is short, in m: of the machine of which they are variants, so that none hangs on
+        another.
     slopes
         What each parameter adds to the parts of
         :func:`~flipflow.dynamics.assembly.machine_parts`, where all of them are sums; else None.
@@ -66,6 +70,7 @@ class Batch:
     arrays: MachineArrays
     bonded: Real
     inertia: Real
+    length: float
     slopes: Mapping[str, Mapping[str, Real]] | None = None
 
 
@@ -84,14 +89,16 @@ def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
     for name, column in columns.items():
         if column.dtype.kind == "f" and name in FIELD and isinstance(machine, FlipFlowScreen):
             allowed &= FIELD[name].allows(column)
+    system = machine.system().with_bonded()
+    length = characteristic_length(system, machine_arrays(system))
     found, left = [], allowed.copy()
     # What a user's own class refuses only its ``system()`` tells.
     if isinstance(machine, Own):
-        at_once = _sums(machine, columns, np.flatnonzero(allowed))
+        at_once = _sums(machine, columns, np.flatnonzero(allowed), length)
         if at_once is not None:
             found.append(at_once)
             left[at_once.rows] = False
-    by_themselves, refused = _one_by_one(machine, columns, left)
+    by_themselves, refused = _one_by_one(machine, columns, left, length)
     allowed[refused] = False
     return [*found, *by_themselves], allowed
 
@@ -112,7 +119,9 @@ def stacked(machines: list[MachineArrays]) -> MachineArrays:
     return first._replace(**joined, stops=Stops(first.stops.law, *stops))
 
 
-def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[Batch], list[int]]:
+def _one_by_one(
+    machine: Machine, columns: Columns, asked: Bool, length: float
+) -> tuple[list[Batch], list[int]]:
     """Each variant assembled by its ``system()``, and the rows of those that it refuses."""
     found: dict[tuple[Any, ...], list[_Alone]] = {}
     refused = []
@@ -135,6 +144,7 @@ def _one_by_one(machine: Machine, columns: Columns, asked: Bool) -> tuple[list[B
             arrays=stacked([arrays for _, _, arrays, *_ in alike]),
             bonded=np.array([bonded for *_, bonded in alike]),
             inertia=np.array([inertia for *_, inertia, _ in alike]),
+            length=length,
         )
         for alike in found.values()
     ], refused
@@ -145,12 +155,12 @@ def bonded_terms(system: MechanicalSystem) -> Real:
     terms = [
         np.outer((spring.stiffness, spring.damping), spring.direction)
         for spring in system.springs
-        if spring.bonded and spring.acts
+        if spring.bonded
     ]
     return np.array(terms).reshape(-1, 2, system.size)
 
 
-def _sums(machine: Own, columns: Columns, rows: Int) -> Batch | None:
+def _sums(machine: Own, columns: Columns, rows: Int, length: float) -> Batch | None:
     """The variants of some rows as sums over their parameters, those that are machines.
 
     None where variants are no sums, and where none is a machine.
@@ -177,7 +187,7 @@ def _sums(machine: Own, columns: Columns, rows: Int) -> Batch | None:
         for name, slope in linear.slopes.items()
     }
     arrays = _assembled(linear.system, kept)
-    return Batch(rows[sound], linear.system, arrays, none, kept["inertia"], slopes)
+    return Batch(rows[sound], linear.system, arrays, none, kept["inertia"], length, slopes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +255,7 @@ def plain(value: Any) -> object:
 def _flat(machine: Machine) -> tuple[Real, Shapes, MechanicalSystem] | None:
     """All numbers of a machine in one row; None where a stop has no gap at all."""
     system = machine.system()
-    if any(not spring.acts or spring.bonded for spring in system.springs):
+    if not all(spring.opens for spring in system.springs):
         return None
     parts = machine_parts(system)
     flat = np.concatenate([part.ravel() for part in parts.values()])

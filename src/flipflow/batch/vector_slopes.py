@@ -8,20 +8,18 @@ from flipflow.batch.lane_readings import set_vector
 from flipflow.batch.slope_readings import (
     Place,
     SlopeWork,
-    delay,
     force_slope,
     is_summit,
     keep,
     move_to,
     note_summit,
     shifted,
-    stop_force,
 )
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.contact_search import exponential
+from flipflow.dynamics.contact_search import begin_later, exponential
 from flipflow.dynamics.equation_of_motion import MachineArrays
-from flipflow.dynamics.flow import Flow
+from flipflow.dynamics.flow import Flow, stop_force
 from flipflow.dynamics.law import damping_share, kind, stiffness_share
 from flipflow.dynamics.parameter_tangent import Columns
 from flipflow.dynamics.pieces import length_at, longest
@@ -41,8 +39,8 @@ def vector_slopes(
         e = part // parts
         begin, duration = (part % parts) * flow.length[e] / parts, flow.length[e] / parts
         count = set_vector(machine, flow, motion, e, omega, linear, along, across)
-        delay(motion, count, 0, begin)
-        delay(motion, count, 1, begin)
+        begin_later(motion, count, 0, begin)
+        begin_later(motion, count, 1, begin)
         height, at = longest(motion, count, duration)
         note_summit(summits, part, height, at, begin, duration)
         longer = longer or height > 0.0

@@ -102,7 +102,7 @@ class FieldSolver(ExactSolver):
         low, high = bounds
         middle = 0.5 * sum(sought.bounds)
         inner = system_at(own if low < own < high else 0.5 * (low + high), middle)
-        kept = [j for j, spring in enumerate(inner.springs) if spring.acts and not spring.bonded]
+        kept = inner.opening
         super().__init__(with_springs(inner, kept), half_turn=half_turn, turns=turns)
         self.system_at, self.bounds, self.own, self.omega = system_at, bounds, own, omega
         self.sought = sought

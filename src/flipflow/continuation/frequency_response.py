@@ -34,7 +34,7 @@ from flipflow.periodic.options import (
     checked_method,
 )
 from flipflow.periodic.orbit import Orbit, state_at_rest
-from flipflow.periodic.solver import POINTS_MOST, STEP_SHARE, Formulation, Solver, Traced
+from flipflow.periodic.solver import STEP_SHARE, Formulation, Solver, Traced
 from flipflow.periodic.stability import (
     UNDETERMINED,
     beyond_where_rising,
@@ -141,7 +141,7 @@ def _others(solver: Solver, course: correction.Course) -> Iterator[Traced]:
     """
     down = course._replace(direction=-1.0)
     start = some_unknowns(solver, course.upper)
-    last = solver.end_of_branch(start, course.upper, down, POINTS_MOST)
+    last = solver.end_of_branch(start, course.upper, down)
     if last is not None:
         yield solver.trace(last, course.lower, course)
     exact = _exact(solver, half_turn=solver.half_turn)

@@ -384,6 +384,14 @@ def _changes_less(
     return False
 
 
+@kernel(inline=True)
+def begin_later(motion: GapMotion, count: int, j: int, elapsed: float) -> None:
+    """Count the time of row j of sums of exponentials from a later moment."""
+    motion.offset[j] += motion.drift[j] * elapsed
+    for i in range(count if elapsed != 0.0 else 0):
+        motion.amplitude[j, i] *= exponential(motion.rate[i] * elapsed)
+
+
 @kernel(shared=True)
 def extremes(
     motion: GapMotion, count: int, j: int, duration: float

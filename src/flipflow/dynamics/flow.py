@@ -33,6 +33,7 @@ from flipflow.dynamics.contact_search import (
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.law import (
     damping_share,
+    force,
     kind,
     regime_at,
     signed_gap,
@@ -456,6 +457,17 @@ def saltation(machine: MachineArrays, spring: int, sign: float, U: Real, size: i
             gap += machine.direction[spring, k] * U[k, c]
         for k in range(n):
             U[n + k, c] += kick * machine.reach[spring, k] * gap
+
+
+@kernel(inline=True)
+def stop_force(machine: MachineArrays, flow: Flow, e: int, j: int, z: Real) -> float:
+    """Force of spring j in segment e at a state."""
+    n = machine.direction.shape[1]
+    y, v = 0.0, 0.0
+    for k in range(n):
+        y += machine.direction[j, k] * z[k]
+        v += machine.direction[j, k] * z[n + k]
+    return force(machine.stops, j, flow.regimes[e, j], y, v)
 
 
 @kernel

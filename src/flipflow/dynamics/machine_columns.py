@@ -74,7 +74,7 @@ def machine_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> Ma
     InputError
         Where the machine changes its kind at a parameter's value, and has no derivative.
     """
-    kept = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
+    kept = system.opening
     own = machine_parts(with_springs(system, kept))
     rows = [_slopes(system, kept, own, one) for one in parameters]
     parts = {
@@ -206,7 +206,7 @@ def _parts_at(
 
 def _kind(system: MechanicalSystem) -> object:
     """What must not change under a derivative."""
-    springs = [(one.law, one.acts, one.bonded) for one in system.springs]
+    springs = [(one.law, one.opens, one.bonded) for one in system.springs]
     terms = [(one.order, power) for one in system.excitations for power, _ in one.terms]
     return system.size, springs, terms
 

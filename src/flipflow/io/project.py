@@ -92,7 +92,9 @@ def load_project(name_or_path: str | os.PathLike[str], *, force: bool = False) -
     source = read_source(name_or_path)
     tables, cases = _sections(source.tables)
     notes = Notes()
-    _check_format(source.tables, notes)
+    check_format(source.tables)
+    if "format" not in source.tables:
+        notes.assumed.append(f"format = {FORMAT}")
     screen = read_screen(tables, notes)
     speed = _speed(tables.get("operation", {}), notes)
     project = Project(
@@ -165,9 +167,8 @@ def refuse_other_files(tables: Mapping[str, object], kind: str) -> None:
         raise InputError("section", f"[{FRAMES}]", remedy)
 
 
-def _check_format(tables: Mapping[str, object], notes: Notes) -> None:
-    if "format" not in tables:
-        notes.assumed.append(f"format = {FORMAT}")
+def check_format(tables: Mapping[str, object]) -> None:
+    """Refuse a file of another format."""
     written = tables.get("format", FORMAT)
     if isinstance(written, bool) or written != FORMAT:
         raise InputError("format", written, f"this version of flipflow reads format = {FORMAT}")

@@ -12,8 +12,8 @@ import numpy as np
 
 from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
-from flipflow.io.layout import FORMAT, SPEED, refuse_unknown
-from flipflow.io.project import load_project, refuse_other_files
+from flipflow.io.layout import SPEED, refuse_unknown
+from flipflow.io.project import check_format, load_project, refuse_other_files
 from flipflow.io.source import Source, bundled_names, read_source
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Table, read_number
@@ -116,9 +116,7 @@ def read_with_machine(
     source = read_source(path)
     refuse_other_files(source.tables, kind)
     refuse_unknown(source.tables, sections, place="")
-    if source.tables.get("format", FORMAT) != FORMAT:
-        remedy = f"this version of flipflow reads format = {FORMAT}"
-        raise InputError("format", source.tables["format"], remedy)
+    check_format(source.tables)
     return source, load_project(_machine_file(source.tables, source.path), force=force)
 
 

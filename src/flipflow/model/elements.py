@@ -104,7 +104,12 @@ class ClearanceSpring:
     @property
     def bonded(self) -> bool:
         """Whether the spring always acts: no gap on either side."""
-        return self.gaps == (0.0, 0.0) and self.law == "paper"
+        return self.acts and self.gaps == (0.0, 0.0) and self.law == "paper"
+
+    @property
+    def opens(self) -> bool:
+        """Whether the spring acts at times and at times does not."""
+        return self.acts and not self.bonded
 
     @property
     def acts(self) -> bool:

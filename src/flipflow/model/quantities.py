@@ -14,7 +14,7 @@ from typing import Literal
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import FIELD
-from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.screen import FlipFlowScreen, is_screen
 from flipflow.model.system import Coordinate, Machine, MechanicalSystem
 
 Direction = Literal["at most", "at least", "between"]
@@ -353,7 +353,8 @@ def quantities_for(machine: Machine) -> Mapping[str, Quantity]:
 
     A screen has those of the table. Any other machine has those of the table that every machine
     has, and amplitude and phase of each of its coordinates: ``"left_amplitude"`` of one that is
-    named "left", ``"amplitude[0]"`` of the first degree of freedom.
+    named "left", ``"amplitude[0]"`` of the first degree of freedom. Its own units are not known:
+    angles and shares alone have one there.
     """
     table = (*quantities_of("motion"), *quantities_of("response"))
     if isinstance(machine, FlipFlowScreen):
@@ -362,7 +363,12 @@ def quantities_for(machine: Machine) -> Mapping[str, Quantity]:
     coordinates = (*system.coordinates, *range(system.size))
     own = [_of_coordinate(which, part) for which in coordinates for part in _READ]
     shared = [replace(one, label=one.elsewhere) for one in table if one.elsewhere]
-    return {one.name: one for one in (*own, *shared)}
+    told = (*own, *shared)
+    if not is_screen(machine):
+        told = tuple(
+            one if one.unit in ("", "rad") else replace(one, unit="", shown_unit="") for one in told
+        )
+    return {one.name: one for one in told}
 
 
 def quantity_named(name: object, machine: Machine) -> Quantity:

@@ -221,9 +221,14 @@ class MechanicalSystem:
                 "and no steady state exists; give one damping above 0 besides the stops'",
             )
 
+    @property
+    def opening(self) -> list[int]:
+        """Numbers of the springs that open and close; motions know no others."""
+        return [j for j, spring in enumerate(self.springs) if spring.opens]
+
     def with_bonded(self) -> MechanicalSystem:
         """Return the same machine with springs that always act moved into C and K."""
-        if all(spring.acts and not spring.bonded for spring in self.springs):
+        if all(spring.opens for spring in self.springs):
             return self
         C, K = self.C.copy(), self.K.copy()
         kept = []
@@ -231,7 +236,7 @@ class MechanicalSystem:
             if spring.bonded:
                 outer = np.outer(spring.direction, spring.direction)
                 C, K = C + spring.damping * outer, K + spring.stiffness * outer
-            elif spring.acts:
+            elif spring.opens:
                 kept.append(spring)
         return replace(self, C=C, K=K, springs=tuple(kept))
 

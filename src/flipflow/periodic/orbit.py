@@ -185,7 +185,7 @@ class Orbit(Frozen, Result):
     @property
     def contact_intervals(self) -> tuple[ContactInterval, ...]:
         """Every touch of every stop with a gap within the period."""
-        kept = self._kept
+        kept = self._given.opening
         return tuple(
             replace(touch, spring=kept[touch.spring]) for touch in self.motion.contact_intervals()
         )
@@ -342,31 +342,26 @@ class Orbit(Frozen, Result):
     @property
     def touches(self) -> bool:
         """Whether any stop carries a force during the period; one without gap always does."""
-        always = any(spring.bonded and spring.acts for spring in self._springs)
+        always = any(spring.bonded for spring in self._given.springs)
         return always or bool(self.contact_intervals)
 
     @cached_property
-    def _springs(self) -> tuple[ClearanceSpring, ...]:
-        """The springs of the machine as it was given."""
-        return self.machine.system().springs
-
-    @property
-    def _kept(self) -> list[int]:
-        """Numbers of the springs that can open and close: the motion knows no others."""
-        return [j for j, one in enumerate(self._springs) if one.acts and not one.bonded]
+    def _given(self) -> MechanicalSystem:
+        """The machine with all its springs, those too that never open or never act."""
+        return self.machine.system()
 
     def _spring(self, number: int) -> ClearanceSpring:
-        count = len(self._springs)
+        count = len(self._given.springs)
         remedy = f"the machine has {count} springs, from 0 on"
-        return self._springs[checked_index("spring", number, count, remedy)]
+        return self._given.springs[checked_index("spring", number, count, remedy)]
 
     def _regime(self, spring: int, piece: Pieces) -> Int:
         """Regime of a spring in each piece: one without gap always pushes."""
         if self._spring(spring).bonded:
             return np.full(piece.shape, WHOLE)
-        if spring not in self._kept:
+        if spring not in self._given.opening:
             return np.full(piece.shape, OPEN)
-        return np.asarray(self.motion.regime[piece, self._kept.index(spring)])
+        return np.asarray(self.motion.regime[piece, self._given.opening.index(spring)])
 
     def _force(self, spring: int, x: Real, v: Real, piece: Pieces) -> Real:
         """Force of a spring of the machine as it was given, at displacement and velocity (K, N)."""

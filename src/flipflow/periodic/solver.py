@@ -301,7 +301,7 @@ class Solver(ABC):
         return Traced.recorded(record, points, code, course)
 
     def end_of_branch(
-        self, u: Real, omega: float, course: correction.Course, points: int
+        self, u: Real, omega: float, course: correction.Course, points: int = POINTS_MOST
     ) -> Real | None:
         """Unknowns where the branch through (u, omega) meets the bound of ``course`` ahead.
 

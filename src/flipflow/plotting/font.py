@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -22,6 +23,7 @@ FILE = "DejaVuSans.ttf"
 LAST_RESORT = "LastResort"  # a font that draws a box for every letter there is
 # In pixels: capitals above the base line, half of that, letters below it, from line to line.
 ASCENT, MIDDLE, DESCENT, LINE_HEIGHT = 0.76 * FONT, 0.365 * FONT, 0.24 * FONT, 1.2 * FONT
+_ONE_AT_A_TIME = threading.Lock()  # a font holds the letter that it loaded last
 
 
 def require_matplotlib() -> None:
@@ -91,9 +93,10 @@ def width_of(text: str) -> float:
 def _advance(letter: str) -> float:
     """Width of a letter in pixels; one that the font has not is taken from another, and wide."""
     font = _font()
-    if not font.get_char_index(ord(letter)):
-        return FONT
-    return float(font.load_char(ord(letter)).linearHoriAdvance / 65536.0)
+    with _ONE_AT_A_TIME:
+        if not font.get_char_index(ord(letter)):
+            return FONT
+        return float(font.load_char(ord(letter)).linearHoriAdvance / 65536.0)
 
 
 @cache

@@ -104,8 +104,8 @@ def fitted(panel: Panel, width: float) -> Panel:
         return panel
     low, high = panel.x.bounds
     for bar in panel.bars:
-        share = 1.0 - _length(bar.text, width)
-        if bar.text and share > 0.0:
+        share = 1.0 - _length(bar.words, width)
+        if bar.words and share > 0.0:
             high = max(high, low + (bar.high - low) / share)
     notes = tuple(
         dataclasses.replace(note, x=min(note.x, high - _length(note.text, width) * (high - low)))

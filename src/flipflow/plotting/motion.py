@@ -256,7 +256,7 @@ def _stops(orbit: Orbit) -> dict[int, tuple[int, ClearanceSpring]]:
     return {
         number: (next((s for s in (1, -1) if np.allclose(s * drawn, stop.direction)), 0), stop)
         for number, stop in enumerate(orbit.machine.system().springs)
-        if stop.acts and not stop.bonded
+        if stop.opens
     }
 
 

@@ -122,7 +122,10 @@ def cell_edges(middles: Real) -> Real:
 
 @dataclass(frozen=True)
 class Bar:
-    """A horizontal bar from ``low`` to ``high`` at height ``y``; ``thickness`` in units of y."""
+    """A horizontal bar from ``low`` to ``high`` at height ``y``; ``thickness`` in units of y.
+
+    Beside it stands ``text``, or the numbers of its ``ends``.
+    """
 
     name: str
     y: float
@@ -133,6 +136,12 @@ class Bar:
     hatch: str = ""
     legend: bool = False
     text: str = ""
+    ends: bool = False
+
+    @property
+    def words(self) -> str:
+        """What stands beside it."""
+        return f"{self.low:.4g} to {self.high:.4g}" if self.ends else self.text
 
 
 @dataclass(frozen=True)

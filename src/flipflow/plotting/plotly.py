@@ -277,7 +277,7 @@ def _bars(bars: tuple[Bar, ...], key: str) -> Iterator[Json]:
             "showlegend": any(bar.legend for bar in some), "xaxis": f"x{key}", "yaxis": f"y{key}",
             "base": [bar.low for bar in some], "x": [bar.high - bar.low for bar in some],
             "y": [bar.y for bar in some], "width": [bar.thickness for bar in some],
-            "text": [words(bar.text) for bar in some], "textposition": "outside",
+            "text": [words(bar.words) for bar in some], "textposition": "outside",
             "cliponaxis": False,
             "customdata": [[bar.low, bar.high] for bar in some],
             "hovertemplate": f"<b>{words(name)}</b><br>"

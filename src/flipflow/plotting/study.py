@@ -19,7 +19,7 @@ from flipflow.errors import InputError, required
 from flipflow.model.arguments import checked_word
 from flipflow.model.fields import FIELD, symbol_of
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import capitalized, digits, rpm
+from flipflow.model.numerals import capitalized, digits
 from flipflow.model.parameters import value_of
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -29,10 +29,12 @@ from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace, cell_edges
 from flipflow.plotting.scales import MM
 from flipflow.plotting.sensitivity import SHOWN, tornado_figure
+from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import (
     FOLDS,
+    Tolerance,
     folds_known,
     jumped_motions,
     limits_in_words,
@@ -151,7 +153,7 @@ def curves_figure(study: Study, field: str) -> Figure:
             for c, case in enumerate(study.cases)
         )
         panels.append(Panel(_field_axis(study, field, x), Axis(one.label, one.shown_unit), traces))
-    title = f"{symbol_of(field)} varied{speed_in_words(study.omega[0])}"
+    title = f"{symbol_of(field)} varied{speed_in_words(study, study.omega[0])}"
     caption = (
         "Each line: a load case. Where a line is broken the quantity has no value."
         f"{_held_words(study, (field,))}"
@@ -317,7 +319,8 @@ def _fold_contours(grid: _Grid) -> Iterator[Trace]:
     for name, dash in zip(FOLDS, ("dot", "dash"), strict=True):
         if name in grid.study.values and np.isfinite(omega):
             lines = grid.lines(grid.values(name), omega, parted=False)
-            yield _joined(f"{QUANTITIES[name].label} = {rpm(omega)} rpm", lines, "jump", dash=dash)
+            words = f"{QUANTITIES[name].label} = {speed_of(grid.study, omega)}"
+            yield _joined(words, lines, "jump", dash=dash)
 
 
 def _met_cells(grid: _Grid, limits: Limits) -> Cells:
@@ -495,10 +498,10 @@ def _where(study: Study, one: Quantity | None) -> str:
     name = within(study.cases[0], LEGEND_LETTERS)
     case = f"load case {name}" if len(study.cases) > 1 else ""
     whole = one is not None and one.of == "response"
-    speed = "" if whole else speed_in_words(study.omega[0]).removeprefix(" ")
+    speed = "" if whole else speed_in_words(study, study.omega[0]).removeprefix(" ")
     return " ".join(filter(None, (case, speed)))
 
 
-def speed_in_words(omega: float) -> str:
+def speed_in_words(found: Study | Tolerance, omega: float) -> str:
     """A blank and "at 850 rpm"; nothing for a study of whole responses alone."""
-    return f" at {rpm(float(omega))} rpm" if np.isfinite(omega) else ""
+    return f" at {speed_of(found, float(omega))}" if np.isfinite(omega) else ""

@@ -178,7 +178,7 @@ def _labels(panel: Panel, view: View, geometry: Geometry, index: int) -> Iterato
     for bar in panel.bars:
         if view.holds(bar.high, bar.y):
             x, y = view.at(bar.high, bar.y)
-            yield written(x + 4.0 * PT, _centred(y, bar.text), bar.text, "left")
+            yield written(x + 4.0 * PT, _centred(y, bar.words), bar.words, "left")
     yield from (_note(note, view) for note in panel.notes)
 
 

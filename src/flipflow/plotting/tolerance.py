@@ -60,7 +60,7 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
         )
     if alone:
         caption += " Other factors need machines drawn at random, and more of them."
-    title = f"What tolerances cost{speed_in_words(found.omega[at])}"
+    title = f"What tolerances cost{speed_in_words(found, found.omega[at])}"
     return Figure(title, caption, panels, height=300 + 60 + 30 * len(order))
 
 

@@ -88,7 +88,7 @@ def _span(found: WorstCase, one: Quantity) -> Panel:
     )
     known = [value for value in (low, high, own) if np.isfinite(value)] or [0.0]
     margin = 0.25 * (max(known) - min(known)) or 0.1 * abs(known[0]) or 1.0
-    bar = Bar("least to greatest", 0.0, low, high, 0.5, "case 1", text=f"{low:.4g} to {high:.4g}")
+    bar = Bar("least to greatest", 0.0, low, high, 0.5, "case 1", ends=True)
     return Panel(
         Axis(one.label, one.shown_unit, (min(known) - margin, max(known) + margin)),
         Axis("", "", (-0.6, 0.6), ((0.0, "range"),)),

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from flipflow.model.fields import FIELD
-from flipflow.model.numerals import rpm
 from flipflow.model.quantities import quantity_named
 from flipflow.plotting.sensitivity import changes, index_order, sensitivity_figure, tornado_figure
+from flipflow.plotting.units import speed_of
 from flipflow.report.blocks import (
     Block,
     Column,
@@ -33,7 +33,7 @@ def summary_of_indices(result: Sensitivity) -> Iterator[Block]:
     one = quantity_named(result.quantity, result.machine)
     rows = [("Quantity", one.label), ("Samples", f"{result.n * (len(result.names) + 2)}")]
     if isinstance(result.omega, float):
-        rows.append(("Speed", f"{rpm(result.omega)} rpm"))
+        rows.append(("Speed", speed_of(result, result.omega)))
     if not result.over_frequency:
         rows.append(("Nominal", quantity(float(result.nominal), one.shown_unit, one.unit)))
     yield Values(tuple(rows))
@@ -84,12 +84,12 @@ def _at_one(result: Sensitivity) -> Table:
 
 
 def _over_frequency(result: Sensitivity) -> Table:
+    speeds = [speed_of(result, float(one)).partition(" ") for one in np.asarray(result.omega)]
+    at = Column("at", speeds[0][2], numeric=True)
     columns = (
         Column("Field"), Column("Symbol"), Column("Greatest", "total", numeric=True),
-        Column("+/-", "95 %", numeric=True), Column("at", "rpm", numeric=True),
-        Column("Least", "total", numeric=True), Column("at", "rpm", numeric=True),
+        Column("+/-", "95 %", numeric=True), at, Column("Least", "total", numeric=True), at,
     )  # fmt: skip
-    omega = np.asarray(result.omega)
     rows = []
     for i in index_order(result):
         total = result.total[:, i]
@@ -100,8 +100,8 @@ def _over_frequency(result: Sensitivity) -> Table:
         rows.append(
             cells(
                 result.names[i], _symbol(result.names[i]),
-                _index(total[top]), _index(result.total_confidence[top, i]), rpm(omega[top]),
-                _index(total[foot]), rpm(omega[foot]),
+                _index(total[top]), _index(result.total_confidence[top, i]), speeds[top][0],
+                _index(total[foot]), speeds[foot][0],
             )
         )  # fmt: skip
     return Table("Sobol indices over frequency", columns, tuple(rows))

@@ -10,8 +10,9 @@ from flipflow.batch.reasons import FOUND
 from flipflow.compiled.arrays import Real
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import Limits, limit_bounds
-from flipflow.model.numerals import capitalized, rpm
+from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
+from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.vary import Choice, Distribution, Normal
 from flipflow.plotting.study import (
     curves_figure,
@@ -22,6 +23,7 @@ from flipflow.plotting.study import (
     wide_fields,
 )
 from flipflow.plotting.tolerance import tolerance_figure
+from flipflow.plotting.units import speed_of
 from flipflow.report.blocks import (
     Block,
     Column,
@@ -65,7 +67,7 @@ def summary_of_study(found: Study) -> Iterator[Block]:
         ("Load cases", ", ".join(found.cases)),
     ]
     if np.isfinite(found.omega).all():
-        rows.append(("Speed", _speeds(found.omega)))
+        rows.append(("Speed", _speeds(found)))
     if found.sample is not None:
         rows.append(("Seed", str(found.sample.seed)))
         together = "; ".join(_together(found))
@@ -76,7 +78,7 @@ def summary_of_study(found: Study) -> Iterator[Block]:
     yield Values(tuple(rows))
     columns = (Column("Field"), Column("Symbol", brief=False), Column("Varies"))
     shown = [
-        cells(name, FIELD[name].symbol if name in FIELD else NOTHING, _range(name, one))
+        cells(name, FIELD[name].symbol if name in FIELD else NOTHING, _range(found, name, one))
         for name, one in zip(found.names, found.distributions, strict=True)
     ]
     yield Table("What varies", columns, tuple(shown))
@@ -139,11 +141,11 @@ def _figures(found: Study, judged: Tolerance | None, limits: Limits | None) -> I
         yield FigureBlock(curves_figure(found, wide[0]))
         return
     if found.sampling == "grid" and len(wide) > 1:
-        yield Heading(f"Maps{speed_in_words(found.omega[0])}", 1, new_page=False)
+        yield Heading(f"Maps{speed_in_words(found, found.omega[0])}", 1, new_page=False)
         for name in motions[:MOST_FIGURES]:
             yield FigureBlock(map_figure(found, name, limits))
         return
-    heading = f"What moves each quantity{speed_in_words(found.omega[0])}"
+    heading = f"What moves each quantity{speed_in_words(found, found.omega[0])}"
     yield Heading(heading, 1, new_page=False)
     for name in motions[:MOST_FIGURES]:
         if np.isfinite(found.nominal[name]).all():
@@ -163,7 +165,7 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
     for j, omega in enumerate(found.omega):
         share, (low, high) = found.share[j], found.share_interval[j]
         yield Text(
-            f"of {found.size} machines{speed_in_words(omega)} meet {met} in every load case "
+            f"of {found.size} machines{speed_in_words(found, omega)} meet {met} in every load case "
             f"({_share(low)} to {_share(high)} with 95 % confidence)."
             f"{_jump_words(found, j)}{_cost_words(found, j)}",
             lead=_share(share),
@@ -173,7 +175,7 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
         yield Note(f"Not looked at: {', '.join(left_out)}.")
     columns = (
         Column("Limit"), Column("Allowed"), *(
-            Column(f"{rpm(omega)} rpm" if np.isfinite(omega) else "Met", "%", numeric=True)
+            Column(speed_of(found, omega) if np.isfinite(omega) else "Met", "%", numeric=True)
             for omega in found.omega[:MOST_COLUMNS]
         ),
     )  # fmt: skip
@@ -217,7 +219,7 @@ def spread_table(found: Study) -> Table:
                 numbers = [_nominal(found, one, c, jumped=bool(words)), *_quantiles(values)]
                 texts = [_value(one, float(x)) for x in numbers]
                 rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
-    title = f"What the machines do{speed_in_words(found.omega[0])}"
+    title = f"What the machines do{speed_in_words(found, found.omega[0])}"
     return Table(title, columns, tuple(rows), " ".join(_spread_words(found)))
 
 
@@ -278,9 +280,10 @@ def _quantiles(values: Real) -> list[float]:
     return [float(x) for x in np.quantile(values, QUANTILES, method="inverted_cdf")]
 
 
-def _range(name: str, one: Distribution) -> str:
+def _range(found: Study, name: str, one: Distribution) -> str:
     """How a field varies, in words."""
-    unit, shown = (FIELD[name].unit, FIELD[name].file_unit) if name in FIELD else ("", "")
+    known = name in FIELD and isinstance(found.machine, FlipFlowScreen)
+    unit, shown = (FIELD[name].unit, FIELD[name].file_unit) if known else ("", "")
 
     def words(value: object) -> str:
         return quantity(value, shown, unit) if isinstance(value, float) else str(value)
@@ -294,10 +297,12 @@ def _range(name: str, one: Distribution) -> str:
     return f"{words(low)} to {words(high)}{count}"
 
 
-def _speeds(omega: Real) -> str:
+def _speeds(found: Study) -> str:
+    omega = found.omega
     if omega.size <= 4:
-        return f"{', '.join(rpm(float(one)) for one in omega)} rpm"
-    return f"{rpm(float(omega.min()))} to {rpm(float(omega.max()))} rpm, {omega.size} speeds"
+        return ", ".join(speed_of(found, float(one)) for one in omega)
+    low, high = (speed_of(found, float(end)) for end in (omega.min(), omega.max()))
+    return f"{low} to {high}, {omega.size} speeds"
 
 
 def _jump_words(found: Tolerance, j: int) -> str:

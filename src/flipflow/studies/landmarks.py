@@ -96,7 +96,7 @@ def landmarks(machine: Machine, branch: Branch) -> Landmarks:
         When the branch has no points.
     """
     ea, ar = equal_amplitude_frequency(machine), antiresonance_frequency(machine)
-    works = any(one.acts and not one.bonded for one in machine.system().springs)
+    works = bool(machine.system().opening)
     peak = _main_peak(branch, ar)
     touched = peak.orbit.touches and works
     begins = [p.omega for p in branch.points_of(CONTACT_BEGIN) if p.position < peak.position]

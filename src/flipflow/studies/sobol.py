@@ -7,7 +7,6 @@ SALib's.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,11 +65,11 @@ def saltelli_sample(inputs: int, n: int, seed: int | np.random.Generator) -> Rea
         "names": [f"x{k}" for k in range(inputs)],
         "bounds": [[0.0, 1.0]] * inputs,
     }
-    with warnings.catch_warnings():
-        # n that is no power of 2 is allowed: the result says so in its notes.
-        warnings.filterwarnings("ignore", "The balance properties of Sobol'", UserWarning)
-        points = sobol.sample(problem, n, calc_second_order=False, seed=seed)
-    return np.asarray(points).reshape(n, inputs + 2, inputs)
+    # The first n of a power of two, without the warning that any other number comes with: that is
+    # allowed, and the result says so in its notes.
+    whole = 1 << (n - 1).bit_length()
+    points = sobol.sample(problem, whole, calc_second_order=False, seed=seed)
+    return np.asarray(points).reshape(whole, inputs + 2, inputs)[:n]
 
 
 def sobol_indices(values: Real, rng: np.random.Generator) -> SobolIndices:

@@ -25,9 +25,8 @@ from flipflow.dynamics.machine_columns import Named, stop_columns
 from flipflow.dynamics.motion import nodes_on, phase_of
 from flipflow.errors import IncompleteError
 from flipflow.model.contact_law import WHOLE, carries_force, engaged_side, shares
-from flipflow.model.elements import ClearanceSpring
 from flipflow.model.screen import FlipFlowScreen
-from flipflow.model.system import Coordinate
+from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.derivatives import MotionDerivatives
 from flipflow.periodic.orbit import Orbit
 from flipflow.studies.quantity_values import Frame, number_or_nan
@@ -178,7 +177,7 @@ class TiltedMotion:
 
     def stop_force(self) -> Complex:
         """Greatest force of the stop springs of one side in N."""
-        acting = [j for j, one in enumerate(self._springs) if one.acts]
+        acting = [j for j, one in enumerate(self._given.springs) if one.acts]
         peaks = [peak for j in acting for peak in self._force_peaks(j)]
         return self._highest(peaks, "stop forces")
 
@@ -188,14 +187,14 @@ class TiltedMotion:
 
     def depth(self, spring: int, side: int) -> Complex:
         """Greatest depth in m beyond a gap of a stop that opens and closes, counted among those."""
-        stop = self._stop(self._kept[spring])
+        stop = self._stop(self._given.opening[spring])
         d, gap = stop.direction, stop.gaps[0 if side > 0 else 1]
         sign = 1.0 if side > 0 else -1.0
         return np.asarray(self._summit(lambda path: sign * np.sum(d * path.x, axis=1)) - gap)
 
     def contact_share(self, spring: int = 0) -> Complex:
         """Share of the period during which a stop has a force."""
-        own, kept = self._springs[spring], self._kept
+        own, kept = self._given.springs[spring], self._given.opening
         if own.bonded or spring not in kept:
             return self._tilted(float(own.bonded))
         engaged = engaged_side(own.law, self.motion.regime[:, kept.index(spring)]) != 0
@@ -205,7 +204,7 @@ class TiltedMotion:
 
     def longest_contact(self) -> Complex:
         """Greatest share of the period during which a stop has a force."""
-        acting = [j for j, one in enumerate(self._springs) if one.acts]
+        acting = [j for j, one in enumerate(self._given.springs) if one.acts]
         return self._highest([self.contact_share(j) for j in acting], "times of contact")
 
     def shear_force(self) -> Complex:
@@ -294,14 +293,9 @@ class TiltedMotion:
         return self._tilted(math.nan)
 
     @cached_property
-    def _springs(self) -> tuple[ClearanceSpring, ...]:
-        """The springs of the machine as it was given."""
-        return self.machine.system().springs
-
-    @property
-    def _kept(self) -> list[int]:
-        """Numbers of the springs that can open and close."""
-        return [j for j, one in enumerate(self._springs) if one.acts and not one.bonded]
+    def _given(self) -> MechanicalSystem:
+        """The machine with all its springs, those too that never open or never act."""
+        return self.machine.system()
 
     @cached_property
     def _shifts(self) -> Real:
@@ -323,9 +317,9 @@ class TiltedMotion:
     @cached_property
     def _stops(self) -> dict[str, Real]:
         """Derivatives of the numbers of every spring that acts, by the names of the columns."""
-        if all(one.acts and not one.bonded for one in self._springs):
+        if all(one.opens for one in self._given.springs):
             return dict(self.slopes.columns.parts)
-        return stop_columns(self.machine.system(), self.parameters)
+        return stop_columns(self._given, self.parameters)
 
     def _tilted(self, value: float, column: int | None = None) -> Complex:
         """A number; one that is a parameter itself has the derivative 1 in its column."""
@@ -342,12 +336,12 @@ class TiltedMotion:
 
     def _force_peaks(self, spring: int) -> list[Complex]:
         """The highest |H| of a stop, those that are as high among them; none without contact."""
-        own = self._springs[spring]
+        own = self._given.springs[spring]
         regimes = np.full(self.motion.start.size, WHOLE)
         if not own.bonded:
-            if spring not in self._kept:
+            if spring not in self._given.opening:
                 return []
-            regimes = self.motion.regime[:, self._kept.index(spring)]
+            regimes = self.motion.regime[:, self._given.opening.index(spring)]
         held = carries_force(own.law, regimes)
         if not held.any():
             return []
@@ -365,8 +359,8 @@ class TiltedMotion:
 
     def _stop(self, spring: int) -> TiltedStop:
         """The numbers of a spring that acts, tilted."""
-        own = self._springs[spring]
-        at = [j for j, one in enumerate(self._springs) if one.acts].index(spring)
+        own = self._given.springs[spring]
+        at = [j for j, one in enumerate(self._given.springs) if one.acts].index(spring)
         stop, gap, turned = (self._stops[name] for name in ("stop", "gap", "direction"))
         # No motion reaches an infinite gap.
         gaps = [e if math.isfinite(e) else 0.0 for e in own.gaps]

@@ -159,11 +159,10 @@ class Recording:
 
 def _springs(system: MechanicalSystem, work: ShootingWork) -> Springs:
     """The springs of a machine, for the scratch of its flow."""
-    place = [k for k, one in enumerate(system.springs) if one.acts and not one.bonded]
     always = [k for k, one in enumerate(system.springs) if one.bonded]
     held = [system.springs[k] for k in always]
     return Springs(
-        place=np.array(place, np.int64),
+        place=np.array(system.opening, np.int64),
         always=np.array(always, np.int64),
         direction=np.array([one.direction for one in held]).reshape(len(held), system.size),
         stiffness=np.array([one.stiffness for one in held]),

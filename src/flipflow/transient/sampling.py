@@ -9,7 +9,7 @@ from flipflow.compiled import status
 from flipflow.compiled.arrays import Complex, Int, Real
 from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
-from flipflow.dynamics.contact_search import GapMotion, exponential, extremes, prepare_search
+from flipflow.dynamics.contact_search import GapMotion, begin_later, extremes, prepare_search
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import (
     Flow,
@@ -18,8 +18,9 @@ from flipflow.dynamics.flow import (
     segment_motion,
     segment_state,
     set_force,
+    stop_force,
 )
-from flipflow.dynamics.law import force, kind
+from flipflow.dynamics.law import kind
 from flipflow.periodic.shooting import Shooting, ShootingWork
 
 PANEL = 2.0  # radians of the fastest mode in a Gauss panel
@@ -143,7 +144,7 @@ def sample(
         table.v[row, k] = flow.z[n + k]
         table.a[row, k] = work.rate[n + k]
     for j in range(springs.place.shape[0]):
-        table.force[row, springs.place[j]] = spring_force(problem.machine, flow, e, j)
+        table.force[row, springs.place[j]] = stop_force(problem.machine, flow, e, j, flow.z)
     for b in range(springs.always.shape[0]):
         H = 0.0
         for k in range(n):
@@ -194,27 +195,8 @@ def add_peak(
             prepare_search(motion, count)
             low, high, _, _ = extremes(motion, count, j, end - begin)
             table.peak[r, place] = max(table.peak[r, place], high, -low)
-        go_on(motion, count, j, end - begin)
+        begin_later(motion, count, j, end - begin)
         begin = end
-
-
-@kernel(inline=True)
-def go_on(motion: GapMotion, count: int, j: int, elapsed: float) -> None:
-    """Let row j of sums of exponentials begin later."""
-    motion.offset[j] += motion.drift[j] * elapsed
-    for i in range(count):
-        motion.amplitude[j, i] *= exponential(motion.rate[i] * elapsed)
-
-
-@kernel(inline=True)
-def spring_force(machine: MachineArrays, flow: Flow, e: int, j: int) -> float:
-    """Force of spring j in segment e at flow.z."""
-    n = machine.direction.shape[1]
-    y, v = 0.0, 0.0
-    for k in range(n):
-        y += machine.direction[j, k] * flow.z[k]
-        v += machine.direction[j, k] * flow.z[n + k]
-    return force(machine.stops, j, flow.regimes[e, j], y, v)
 
 
 @kernel
@@ -250,4 +232,4 @@ def add_work(problem: Shooting, work: ShootingWork, e: int, omega: float, budget
                 rate = 0.0
                 for k in range(n):
                     rate += machine.direction[j, k] * flow.z[n + k]
-                budget.work[2] += share * rate * spring_force(machine, flow, e, j)
+                budget.work[2] += share * rate * stop_force(machine, flow, e, j, flow.z)

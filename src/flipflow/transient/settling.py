@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.continuation import correction
 from flipflow.errors import IncompleteError
@@ -212,11 +211,8 @@ class Settling:
             correction.QUICK,
         )  # fmt: skip
         solver = self.solver_of(point.formulation.turns)
-        traced = solver.trace(point.u, point.omega, course)
-        reached = traced.code in (status.REACHED_UPPER, status.REACHED_LOWER)
-        if not reached or traced.omega[-1] != omega:
-            return None
-        return solver.solve(traced.u[-1], omega)
+        reached = solver.end_of_branch(point.u, point.omega, course)
+        return None if reached is None else solver.solve(reached, omega)
 
     def size(self, states: Real, omega: float) -> float:
         """Largest displacement, or velocity over omega, of states (K, 2 N)."""

@@ -257,7 +257,7 @@ def _history(
     x, v = s[:, :n], s[:, size : size + n]
     speed = s[:, 2 * size + 1]
     across = [s[:, n], s[:, size + n], slope[:, size + n]] if size > n else None
-    columns = [j for j, spring in enumerate(system.springs) if spring.acts and not spring.bonded]
+    columns = system.opening
     stored = [stepper.stored_energy(s[k], contacts[k]) for k in (0, -1)]
     field, worked, damped, rubbed = s[:, 2 * size + 2 :].T
     return History(
