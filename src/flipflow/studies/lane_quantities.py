@@ -22,10 +22,10 @@ from flipflow.model.quantities import Quantity, leading_coordinate
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Machine, MechanicalSystem
 from flipflow.periodic.derivatives import SMOOTH_LAWS
-from flipflow.studies.quantity_values import MOTION_VALUES, Frame, vector_terms
+from flipflow.studies.quantity_values import MOTION_VALUES, Vector, vector_terms
 
 # Peaks of vectors by name, and the quantities that are read off them.
-VECTORS: Mapping[str, tuple[str, ...]] = {
+VECTORS: Mapping[Vector, tuple[str, ...]] = {
     "main": ("main_frame_acceleration",),
     "floating": ("floating_frame_acceleration",),
     "foundation": ("foundation_force", "support_force"),
@@ -83,8 +83,8 @@ class LanePlan:
         return self.coordinates.index(tuple(self.system.coordinate(which).tolist()))
 
     @cached_property
-    def vectors(self) -> list[str]:
-        """Names of the vectors whose peaks are read."""
+    def vectors(self) -> list[Vector]:
+        """The vectors whose peaks are read."""
         names = {one.name for one in self.quantities}
         return [vector for vector, needed in VECTORS.items() if names & set(needed)]
 
@@ -102,23 +102,23 @@ class LanePlan:
             return asked
         linear = np.zeros((lanes, peaks, 3, self.system.size))
         along, across = np.zeros((2, lanes, self.omega.size, peaks), np.complex128)
-        for q, name in enumerate(self.vectors):
+        for q, vector in enumerate(self.vectors):
             self._set_terms(
-                name, self.fields, self.normal, linear[:, q], along[:, :, q], across[:, :, q]
+                vector, self.fields, self.normal, linear[:, q], along[:, :, q], across[:, :, q]
             )
         linear[:, len(self.vectors) :, :2] = self.bonded
         return asked._replace(linear=linear, along=along, across=across)
 
     def _set_terms(
-        self, name: str, fields: Mapping[str, Real], normal: Complex, linear: Real, along: Complex,
-        across: Complex,
+        self, vector: Vector, fields: Mapping[str, Real], normal: Complex, linear: Real,
+        along: Complex, across: Complex,
     ) -> None:  # fmt: skip
         """Coefficients (L, 3, 2) of x, x', x'' and harmonics (L, K) of one vector of a screen.
 
         Y is the amplitude ``normal`` to the surface.
         """
         field = fields.__getitem__
-        terms, along[:], across[:] = vector_terms(name, field, self.omega, normal, self.sense)
+        terms, along[:], across[:] = vector_terms(vector, field, self.omega, normal, self.sense)
         for (derivative, degree), value in terms.items():
             linear[:, derivative, degree] = np.ravel(value)
 
@@ -148,7 +148,7 @@ class LanePlan:
         )
 
     def _set_changes(
-        self, vector: str, name: str, linear: Real, along: Complex, across: Complex
+        self, vector: Vector, name: str, linear: Real, along: Complex, across: Complex
     ) -> None:
         """How a vector's terms change with a field: they are at most quadratic in it and in Y."""
         if name not in self.fields:
@@ -234,19 +234,13 @@ class LaneMotions:
     def normal_amplitude(self) -> Real:
         return np.abs(self.plan.normal)
 
-    def peak_acceleration(self, frame: Frame) -> Real:
-        return self._peak(frame)
-
-    def foundation_force(self) -> Real:
-        return self._peak("foundation")
+    def peak(self, vector: Vector) -> Real:
+        return self.read.peak[..., self.plan.vectors.index(vector)]
 
     def stop_force(self) -> Real:
         always = self.read.peak[..., len(self.plan.vectors) :]
         forces = np.concatenate([self.read.force, always], axis=2)
         return np.asarray(forces.max(axis=2, initial=0.0))
-
-    def shear_force(self) -> Real:
-        return self._peak("shear")
 
     def shear_power(self) -> Real:
         return np.asarray(self.field("shear_damping") * self.read.square[..., 0])
@@ -262,9 +256,6 @@ class LaneMotions:
     def largest_multiplier(self) -> Real:
         return np.asarray(np.abs(self.multiplier).max(axis=2))
 
-    def bearing_load(self) -> Real:
-        return self._peak("bearing")
-
     def dissipated_power(self) -> Real:
         X = self.read.first[..., self.plan.place("main")]
         force = self.field("eccentric_moment") * self.omega**2
@@ -273,6 +264,3 @@ class LaneMotions:
 
     def jump_margin(self) -> Real:
         return np.full(self.read.approach.shape, np.nan)
-
-    def _peak(self, name: str) -> Real:
-        return self.read.peak[..., self.plan.vectors.index(name)]

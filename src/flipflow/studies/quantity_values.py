@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,11 @@ from flipflow.results.result import Frozen
 
 Values = float | Real
 Harmonics = complex | NDArray[Any]
-Frame = Literal["main", "floating"]
+# What has a greatest length: accelerations of the frames, forces of springs and on the bearings.
+Vector = Literal["main", "floating", "foundation", "shear", "bearing"]
 EVEN = 1e-9  # offset over amplitude below which a motion is about the middle but for rounding
-FRAMES = get_args(Frame)  # in the order of the degrees of freedom
 Coordinate = Literal["main", "floating", "relative"]
+FRAMES: tuple[Coordinate, ...] = "main", "floating"  # in the order of the degrees of freedom
 
 
 class Motions(Protocol):
@@ -72,20 +73,16 @@ class Motions(Protocol):
         """Amplitude normal to the surface in m."""
         ...
 
-    def peak_acceleration(self, frame: Frame) -> Values:
-        """Greatest acceleration of a frame in m/s^2, both directions together."""
-        ...
+    def peak(self, vector: Vector) -> Values:
+        """Greatest length of a vector in SI, both directions together.
 
-    def foundation_force(self) -> Values:
-        """Greatest force of the isolation springs in N, both directions together."""
+        Of the acceleration of a frame, or of the force of the isolation springs, of all shear
+        springs, or on all exciter bearings.
+        """
         ...
 
     def stop_force(self) -> Values:
         """Greatest force of the stop springs of one side in N."""
-        ...
-
-    def shear_force(self) -> Values:
-        """Greatest dynamic force of all shear springs in N."""
         ...
 
     def shear_power(self) -> Values:
@@ -102,10 +99,6 @@ class Motions(Protocol):
 
     def largest_multiplier(self) -> Values:
         """Size of the largest Floquet multiplier of the period."""
-        ...
-
-    def bearing_load(self) -> Values:
-        """Greatest load on all exciter bearings together in N, with the frame's motion."""
         ...
 
     def dissipated_power(self) -> Values:
@@ -127,11 +120,11 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     "floating_amplitude": lambda m: m.amplitude("floating"),
     "relative_offset": lambda m: beyond_rounding(m.offset(), m.amplitude("relative")),
     "relative_phase": lambda m: m.phase("relative"),
-    "main_frame_acceleration": lambda m: m.peak_acceleration("main"),
-    "floating_frame_acceleration": lambda m: m.peak_acceleration("floating"),
+    "main_frame_acceleration": lambda m: m.peak("main"),
+    "floating_frame_acceleration": lambda m: m.peak("floating"),
     "shear_strain": lambda m: m.reach() / m.field("shear_height"),
     "stop_force": lambda m: m.stop_force(),
-    "shear_piece_force": lambda m: m.shear_force() / m.field("shear_pieces"),
+    "shear_piece_force": lambda m: m.peak("shear") / m.field("shear_pieces"),
     "shear_piece_power": lambda m: m.shear_power() / m.field("shear_pieces"),
     "shear_temperature_rise": lambda m: (
         m.shear_power() / (m.field("shear_pieces") * m.field("shear_conductance"))
@@ -139,14 +132,14 @@ MOTION_VALUES: Mapping[str, Callable[[Motions], Values]] = {
     "stop_piece_force": lambda m: m.stop_force() / m.field("stop_pieces"),
     "stop_approach_speed": lambda m: m.approach_speed(),
     "contact_share": lambda m: m.longest_contact(),
-    "foundation_force": lambda m: m.foundation_force(),
-    "support_force": lambda m: m.foundation_force() / m.field("supports"),
+    "foundation_force": lambda m: m.peak("foundation"),
+    "support_force": lambda m: m.peak("foundation") / m.field("supports"),
     "exciter_force": lambda m: m.field("eccentric_moment") * m.omega**2,
     "bearing_force": lambda m: m.field("eccentric_moment") * m.omega**2 / m.field("bearings"),
-    "bearing_load": lambda m: m.bearing_load() / m.field("bearings"),
+    "bearing_load": lambda m: m.peak("bearing") / m.field("bearings"),
     "bearing_life": lambda m: rated_life(
         m.field("bearing_rating"),
-        m.field("bearing_load_factor") * m.bearing_load() / m.field("bearings"),
+        m.field("bearing_load_factor") * m.peak("bearing") / m.field("bearings"),
         m.field("bearing_life_exponent"),
         m.omega,
     ),
@@ -255,17 +248,8 @@ class Working(Frozen):
     def normal_amplitude(self) -> float:
         return math.nan if self.normal is None else self.normal.amplitude
 
-    def peak_acceleration(self, frame: Frame) -> float:
-        return self._peak(frame)
-
-    def foundation_force(self) -> float:
-        return self._peak("foundation")
-
     def stop_force(self) -> float:
         return max((self.orbit.stop_force_peak(j) for j in self.stops), default=0.0)
-
-    def shear_force(self) -> float:
-        return self._peak("shear")
 
     def shear_power(self) -> float:
         return self.field("shear_damping") * self.orbit.mean_square_velocity("relative")
@@ -281,9 +265,6 @@ class Working(Frozen):
     def largest_multiplier(self) -> float:
         return float(np.abs(self.orbit.multipliers[0]))
 
-    def bearing_load(self) -> float:
-        return self._peak("bearing")
-
     def dissipated_power(self) -> float:
         if self.screen is None:
             return self.orbit.input_power()
@@ -295,11 +276,10 @@ class Working(Frozen):
             return 0.0
         return min((abs(self.omega - jump) / jump for jump in self.jumps), default=math.inf)
 
-    def _peak(self, name: str) -> float:
-        """Greatest length over the turn of a vector."""
+    def peak(self, vector: Vector) -> float:
         Y = math.nan if self.normal is None else self.normal.complex_amplitude
         sense = 1.0 if self.screen is None else self.screen.normal_sense
-        terms, along, across = vector_terms(name, self.field, self.omega, Y, sense)
+        terms, along, across = vector_terms(vector, self.field, self.omega, Y, sense)
         linear = np.zeros((3, self.orbit.system.size))
         for place, value in terms.items():
             linear[place] = value
@@ -309,20 +289,20 @@ class Working(Frozen):
 
 
 def vector_terms(
-    name: str, field: Callable[[str], Values], omega: Values, normal: Harmonics, sense: float
+    vector: Vector, field: Callable[[str], Values], omega: Values, normal: Harmonics, sense: float
 ) -> tuple[dict[tuple[int, int], Values], Harmonics, Harmonics]:
     """A vector of a screen along its surface and normal to it, by the name of what it is.
 
     Coefficients of derivatives of degrees of freedom, by (derivative, degree), and the harmonics A
     and B of :mod:`flipflow.dynamics.pieces`; ``normal`` is Y.
     """
-    if name in FRAMES:
-        return {(2, FRAMES.index(name)): 1.0}, 0.0, -(omega**2) * normal
-    if name == "foundation":
+    if vector in FRAMES:
+        return {(2, FRAMES.index(vector)): 1.0}, 0.0, -(omega**2) * normal
+    if vector == "foundation":
         k, c = field("isolation_stiffness"), field("isolation_damping")
         across = field("normal_stiffness") + 1j * omega * field("normal_damping")
         return {(0, 0): k, (1, 0): c}, 0.0, across * normal
-    if name == "shear":
+    if vector == "shear":
         k, c = field("shear_stiffness"), field("shear_damping")
         return {(0, 0): k, (0, 1): -k, (1, 0): c, (1, 1): -c}, 0.0, 0.0
     # The frame's acceleration of the rotating mass comes through the bearings, too.
@@ -418,22 +398,19 @@ class ContactFree(Frozen):
     def normal_amplitude(self) -> Real:
         return np.abs(self.normal)
 
-    def peak_acceleration(self, frame: Frame) -> Real:
-        return np.asarray(self.omega**2 * peak_of_both(self.coordinate(frame), self.normal))
-
-    def foundation_force(self) -> Real:
-        f, rate = self.fields, 1j * self.omega
-        along = f["isolation_stiffness"] + rate * f["isolation_damping"]
-        across = f["normal_stiffness"] + rate * f["normal_damping"]
-        return peak_of_both(along * self.main, across * self.normal)
+    def peak(self, vector: Vector) -> Real:
+        if vector == "shear":  # through X2, in which stiff springs cost no digits
+            f = self.fields
+            stiffness = f["shear_stiffness"] + 1j * self.omega * f["shear_damping"]
+            return np.abs(stiffness * self.relative)
+        terms, along, across = vector_terms(vector, self.field, self.omega, self.normal, 1.0)
+        for (derivative, degree), value in terms.items():
+            X = self.coordinate(FRAMES[degree])
+            along = along + value * (1j * self.omega) ** derivative * X
+        return peak_of_both(np.asarray(along), np.asarray(across))
 
     def stop_force(self) -> Real:
         return np.zeros(self.force.shape)
-
-    def shear_force(self) -> Real:
-        f = self.fields
-        stiffness = f["shear_stiffness"] + 1j * self.omega * f["shear_damping"]
-        return np.abs(stiffness * self.relative)
 
     def shear_power(self) -> Real:
         speed = self.omega * np.abs(self.relative)
@@ -448,11 +425,6 @@ class ContactFree(Frozen):
     def largest_multiplier(self) -> Real:
         slowest = np.linalg.eigvals(state_matrix(*self._matrices)).real.max(axis=-1)
         return np.asarray(np.exp(2.0 * math.pi / self.omega * slowest))
-
-    def bearing_load(self) -> Real:
-        inertia = self.fields["rotating_mass"] * self.omega**2
-        along = self.force + inertia * self.main
-        return peak_of_both(along, -1j * self.force + inertia * self.normal)
 
     def dissipated_power(self) -> Real:
         parts = (

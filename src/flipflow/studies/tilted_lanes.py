@@ -18,7 +18,7 @@ from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.motion import phase_of
 from flipflow.model.quantities import Quantity
 from flipflow.studies.lane_quantities import LanePlan
-from flipflow.studies.quantity_values import MOTION_VALUES, Frame
+from flipflow.studies.quantity_values import MOTION_VALUES, Vector
 from flipflow.studies.tilted_motion import TILT, beside_zero, size_of_multiplier
 
 
@@ -91,11 +91,9 @@ class TiltedLanes:
         force = self.field("eccentric_moment") * self.omega**2
         return np.asarray(force / np.sqrt(spring**2 + (self.omega * c) ** 2))
 
-    def peak_acceleration(self, frame: Frame) -> Complex:
-        return self._peak(frame)
-
-    def foundation_force(self) -> Complex:
-        return self._peak("foundation")
+    def peak(self, vector: Vector) -> Complex:
+        q = self.plan.vectors.index(vector)
+        return _tilted(self.read.peak[..., q], self.slopes.peak[..., q, :])
 
     def stop_force(self) -> Complex:
         always = slice(len(self.plan.vectors), None)
@@ -104,9 +102,6 @@ class TiltedLanes:
         forces = _tilted(values, slopes)
         none = np.zeros((1, *forces.shape[:2], forces.shape[3]), np.complex128)
         return _greatest(np.concatenate([none, np.moveaxis(forces, 2, 0)]))
-
-    def shear_force(self) -> Complex:
-        return self._peak("shear")
 
     def shear_power(self) -> Complex:
         square = _tilted(self.read.square[..., 0], self.slopes.square[..., 0, :])
@@ -123,9 +118,6 @@ class TiltedLanes:
     def largest_multiplier(self) -> Complex:
         sizes = size_of_multiplier(self.multiplier[..., None], self.slopes.multiplier)
         return _greatest(np.moveaxis(sizes, 2, 0))
-
-    def bearing_load(self) -> Complex:
-        return self._peak("bearing")
 
     def dissipated_power(self) -> Complex:
         harmonic, slope = self._first("main")
@@ -147,10 +139,6 @@ class TiltedLanes:
         """First harmonic of a coordinate, and its derivatives."""
         g = self.plan.place(which)
         return self.read.first[..., g, None], self.slopes.first[..., g, :]
-
-    def _peak(self, name: str) -> Complex:
-        q = self.plan.vectors.index(name)
-        return _tilted(self.read.peak[..., q], self.slopes.peak[..., q, :])
 
 
 def _tilted(values: Real, slopes: Real) -> Complex:

@@ -29,7 +29,7 @@ from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.system import Coordinate, MechanicalSystem
 from flipflow.periodic.derivatives import MotionDerivatives
 from flipflow.periodic.orbit import Orbit
-from flipflow.studies.quantity_values import Frame, number_or_nan
+from flipflow.studies.quantity_values import FRAMES, Vector, number_or_nan
 
 Pieces = NDArray[np.intp]
 TILT = 1e-60  # size of an imaginary part, as a share of the derivative it stands for
@@ -162,18 +162,13 @@ class TiltedMotion:
         """Amplitude normal to the surface in m."""
         return self._normal.amplitude
 
-    def peak_acceleration(self, frame: Frame) -> Complex:
-        """Greatest acceleration of a frame in m/s^2, both directions together."""
-        degree, normal = (0 if frame == "main" else 1), self._normal
+    def peak(self, vector: Vector) -> Complex:
+        """Greatest length of a vector in SI, both directions together."""
+        forces = {"foundation": self._on_foundation, "shear": self._shear, "bearing": self._bearing}
+        if vector in forces:
+            return self._peak(forces[vector]())
+        degree, normal = FRAMES.index(vector), self._normal
         return self._peak(lambda path: _length(path.a[:, degree], normal.acceleration(path)))
-
-    def foundation_force(self) -> Complex:
-        """Greatest force of the isolation springs in N, both directions together."""
-        k, c = self.field("isolation_stiffness"), self.field("isolation_damping")
-        normal = self._normal
-        return self._peak(
-            lambda path: _length(k * path.x[:, 0] + c * path.v[:, 0], normal.foundation_force(path))
-        )
 
     def stop_force(self) -> Complex:
         """Greatest force of the stop springs of one side in N."""
@@ -206,12 +201,6 @@ class TiltedMotion:
         """Greatest share of the period during which a stop has a force."""
         acting = [j for j, one in enumerate(self._given.springs) if one.acts]
         return self._highest([self.contact_share(j) for j in acting], "times of contact")
-
-    def shear_force(self) -> Complex:
-        """Greatest dynamic force of all shear springs in N."""
-        k, c = self.field("shear_stiffness"), self.field("shear_damping")
-        d = np.array([1.0, -1.0])
-        return self._peak(lambda path: k * (d @ path.x) + c * (d @ path.v))
 
     def shear_power(self) -> Complex:
         """Mean power of all shear springs in W."""
@@ -248,19 +237,6 @@ class TiltedMotion:
         values, slopes = self.slopes.multipliers
         sizes = size_of_multiplier(values[:, None], slopes)
         return self._highest([np.append(one, one[0].real) for one in sizes], "multipliers")
-
-    def bearing_load(self) -> Complex:
-        """Greatest load on all exciter bearings together in N, with the frame's motion."""
-        normal, mass = self._normal, self.field("rotating_mass")
-        force = self.field("eccentric_moment") * self.omega**2
-        sense = self.machine.normal_sense if isinstance(self.machine, FlipFlowScreen) else 1.0
-
-        def load(path: Path) -> Complex:
-            along = force * path.cos - mass * path.a[:, 0]
-            across = sense * force * path.sin - mass * normal.acceleration(path)
-            return _length(along, across)
-
-        return self._peak(load)
 
     def input_power(self) -> Complex:
         """Mean power that the excitation feeds in, W."""
@@ -403,6 +379,31 @@ class TiltedMotion:
         """Mean over the period of what does not jump at a change of contact."""
         path, weights = self._nodes
         return np.asarray(weights @ formula(path))
+
+    def _on_foundation(self) -> Formula:
+        """Force of the isolation springs."""
+        k, c = self.field("isolation_stiffness"), self.field("isolation_damping")
+        across = self._normal.foundation_force
+        return lambda path: _length(k * path.x[:, 0] + c * path.v[:, 0], across(path))
+
+    def _shear(self) -> Formula:
+        """Force of all shear springs."""
+        k, c = self.field("shear_stiffness"), self.field("shear_damping")
+        d = np.array([1.0, -1.0])
+        return lambda path: k * (d @ path.x) + c * (d @ path.v)
+
+    def _bearing(self) -> Formula:
+        """Load on all exciter bearings together, with the frame's motion."""
+        normal, mass = self._normal, self.field("rotating_mass")
+        force = self.field("eccentric_moment") * self.omega**2
+        sense = self.machine.normal_sense if isinstance(self.machine, FlipFlowScreen) else 1.0
+
+        def load(path: Path) -> Complex:
+            along = force * path.cos - mass * path.a[:, 0]
+            across = sense * force * path.sin - mass * normal.acceleration(path)
+            return _length(along, across)
+
+        return load
 
     def _peak(self, formula: Formula) -> Complex:
         """Greatest size of a formula over the period."""
