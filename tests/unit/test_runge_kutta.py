@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flipflow as ff
+from flipflow.dynamics.normal import NormalDirection
 from flipflow.errors import InputError
 from flipflow.model.contact_law import ContactLaw
 from flipflow.model.drive import Drive, Motor, SpeedProfile
@@ -23,7 +24,7 @@ from flipflow.model.system import MechanicalSystem
 from flipflow.periodic.exact_solver import ExactSolver
 from flipflow.transient.run_up import top_between_steps
 from flipflow.transient.tableaux import DORMAND_PRINCE, RK4
-from flipflow.transient.time_stepping import NormalDirection, RungeKutta, Stepper
+from flipflow.transient.time_stepping import RungeKutta, Stepper
 from judge import close
 
 pytestmark = pytest.mark.numerical

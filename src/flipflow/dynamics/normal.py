@@ -10,6 +10,30 @@ from numpy.typing import ArrayLike
 from flipflow.compiled.arrays import Complex, Real
 from flipflow.dynamics.contact_free import contact_free
 from flipflow.model.screen import FlipFlowScreen
+from flipflow.model.system import Machine
+
+
+@dataclass(frozen=True)
+class NormalDirection:
+    """Mass, stiffness and damping of the motion normal to the surface, in SI.
+
+    ``sense`` is that of the unbalance: :attr:`~flipflow.FlipFlowScreen.normal_sense`.
+    """
+
+    mass: float
+    stiffness: float
+    damping: float
+    sense: float
+
+
+def normal_direction(machine: Machine) -> NormalDirection | None:
+    """The direction normal to the surface; None where its data are missing."""
+    if not isinstance(machine, FlipFlowScreen):
+        return None
+    k, c = machine.normal_stiffness, machine.normal_damping
+    if k is None or c is None:
+        return None
+    return NormalDirection(machine.main_mass + machine.floating_mass, k, c, machine.normal_sense)
 
 
 @dataclass(frozen=True)
@@ -72,14 +96,13 @@ class NormalMotion:
         return np.asarray((self.complex_amplitude * turn).real)
 
 
-def normal_motion(screen: FlipFlowScreen, omega: float) -> NormalMotion | None:
-    """The motion normal to the surface; None for a screen without normal stiffness or damping."""
-    k, c = screen.normal_stiffness, screen.normal_damping
-    if k is None or c is None:
+def normal_motion(machine: Machine, omega: float) -> NormalMotion | None:
+    """The steady motion normal to the surface; None where its data are missing."""
+    one = normal_direction(machine)
+    if one is None or not isinstance(machine, FlipFlowScreen):
         return None
-    mass = screen.main_mass + screen.floating_mass
-    Y = screen.normal_sense * normal_amplitude(mass, c, k, screen.eccentric_moment, omega)
-    return NormalMotion(omega, complex(Y), k, c)
+    Y = normal_amplitude(one.mass, one.damping, one.stiffness, machine.eccentric_moment, omega)
+    return NormalMotion(omega, complex(one.sense * Y), one.stiffness, one.damping)
 
 
 def normal_amplitude(

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.linear_response import linear_response
-from flipflow.dynamics.normal import normal_amplitude
+from flipflow.dynamics.normal import normal_amplitude, normal_direction
 from flipflow.model.drive import Drive
 from flipflow.model.numerals import case_words, rpm
 from flipflow.model.screen import FlipFlowScreen
@@ -138,11 +138,10 @@ def free_power(screen: FlipFlowScreen, omega: Real) -> Real:
     along = screen.isolation_damping * found.amplitude("main") ** 2
     between = screen.shear_damping * found.amplitude("relative") ** 2
     power = 0.5 * omega**2 * (along + between)
-    k, c = screen.normal_stiffness, screen.normal_damping
-    if k is not None and c is not None:
-        mass = screen.main_mass + screen.floating_mass
-        across = normal_amplitude(mass, c, k, screen.eccentric_moment, omega)
-        power = power + 0.5 * c * (omega * np.abs(across)) ** 2
+    one = normal_direction(screen)
+    if one is not None:
+        Y = normal_amplitude(one.mass, one.damping, one.stiffness, screen.eccentric_moment, omega)
+        power = power + 0.5 * one.damping * (omega * np.abs(Y)) ** 2
     return np.asarray(power)
 
 

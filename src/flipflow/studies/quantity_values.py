@@ -228,7 +228,7 @@ class Working(Frozen):
     @cached_property
     def normal(self) -> NormalMotion | None:
         """Motion normal to the surface, None where its data are missing."""
-        return None if self.screen is None else normal_motion(self.screen, self.omega)
+        return normal_motion(self.machine, self.omega)
 
     def field(self, name: str) -> float:
         return number_or_nan(None if self.screen is None else getattr(self.screen, name))

@@ -18,13 +18,13 @@ from flipflow.model.arguments import checked_monitor, checked_positive, checked_
 from flipflow.model.drive import SpeedProfile
 from flipflow.model.monitor import Monitor
 from flipflow.model.quantities import leading_coordinate
-from flipflow.model.screen import FlipFlowScreen, unit_in
+from flipflow.model.screen import unit_in
 from flipflow.model.system import Coordinate, Machine
 from flipflow.periodic.orbit import Orbit
 from flipflow.results.result import Result
 from flipflow.studies.periodic_orbits import attracting_orbits
 from flipflow.transient.history import History
-from flipflow.transient.speed_run import Start, normal_direction, run_history, swings
+from flipflow.transient.speed_run import Start, run_history, swings
 from flipflow.transient.startup import MOST_SECONDS
 
 BEYOND = 1e-4  # relative distance past the end of a motion at which the next one is looked for
@@ -179,8 +179,6 @@ def _branch_over(machine: Machine, low: float, high: float) -> Branch:
 
 def _with_normal(machine: Machine, omega: float, state: Real) -> Real:
     """The state with the steady motion normal to the surface last in each half."""
-    if normal_direction(machine) is None or not isinstance(machine, FlipFlowScreen):
-        return state
     steady = normal_motion(machine, omega)
     if steady is None:
         return state

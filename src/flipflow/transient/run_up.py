@@ -12,6 +12,7 @@ import numpy as np
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.linear_response import linear_response
+from flipflow.dynamics.normal import normal_direction
 from flipflow.model.constants import GRAVITY, RPM
 from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.excitation import Unbalance
@@ -21,7 +22,6 @@ from flipflow.results.result import Result
 from flipflow.transient.history import History
 from flipflow.transient.speed_run import (
     STATUS,
-    normal_direction,
     swings,
     turn_means,
     unbalance_weight,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flipflow.compiled.arrays import Real
-from flipflow.dynamics.normal import normal_motion
+from flipflow.dynamics.normal import NormalDirection, normal_direction, normal_motion
 from flipflow.errors import InputError
 from flipflow.model.arguments import (
     checked_all,
@@ -299,7 +299,7 @@ def _normal(
     end: float,
 ) -> Real | None:
     """y, y', y'' normal to the surface (K, 3): from rest, else from its steady motion."""
-    steady = normal_motion(machine, omega) if isinstance(machine, FlipFlowScreen) else None
+    steady = normal_motion(machine, omega)
     if steady is None:
         return None
     z = np.zeros(2)
@@ -314,11 +314,7 @@ def _normal(
 
 def _normal_system(machine: Machine) -> MechanicalSystem:
     """Both frames as one mass on the isolation, under s m0r w^2 sin(w t), s its sense."""
-    screen = cast("FlipFlowScreen", machine)
-    return MechanicalSystem(
-        [[screen.main_mass + screen.floating_mass]],
-        [[cast("float", screen.normal_damping)]],
-        [[cast("float", screen.normal_stiffness)]],
-        (),
-        Unbalance([-1j * screen.normal_sense * screen.eccentric_moment]),
-    )
+    one = cast("NormalDirection", normal_direction(machine))
+    moment = one.sense * cast("FlipFlowScreen", machine).eccentric_moment
+    unbalance = Unbalance([-1j * moment])
+    return MechanicalSystem([[one.mass]], [[one.damping]], [[one.stiffness]], (), unbalance)

@@ -10,6 +10,7 @@ import numpy as np
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
+from flipflow.dynamics.normal import normal_direction
 from flipflow.errors import InputError
 from flipflow.model.constants import GRAVITY
 from flipflow.model.contact_law import engaged_side
@@ -21,7 +22,6 @@ from flipflow.model.system import Machine, MechanicalSystem, system_of
 from flipflow.transient.history import ContactChange, History, stop_forces
 from flipflow.transient.time_stepping import (
     WEIGHTLESS,
-    NormalDirection,
     RungeKutta,
     Stepper,
     Stretch,
@@ -57,16 +57,6 @@ class Start:
     angle: float
     speed: float
     settled: bool = True
-
-
-def normal_direction(machine: Machine) -> NormalDirection | None:
-    """The direction normal to the surface, None where its data are missing."""
-    if not isinstance(machine, FlipFlowScreen):
-        return None
-    k, c = machine.normal_stiffness, machine.normal_damping
-    if k is None or c is None:
-        return None
-    return NormalDirection(machine.main_mass + machine.floating_mass, k, c, machine.normal_sense)
 
 
 def unbalance_weight(machine: Machine) -> UnbalanceWeight:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.dynamics.assembly import stops_of
+from flipflow.dynamics.normal import NormalDirection
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_number, checked_positive, checked_word
 from flipflow.model.contact_law import stored_energy
@@ -69,19 +70,6 @@ class RungeKutta:
         object.__setattr__(self, "tolerance", tolerance)
         if self.step is not None:
             object.__setattr__(self, "step", checked_positive("step", self.step, "s"))
-
-
-@dataclass(frozen=True)
-class NormalDirection:
-    """Mass, stiffness and damping of the motion normal to the surface, in SI.
-
-    ``sense`` is that of the unbalance: :attr:`~flipflow.FlipFlowScreen.normal_sense`.
-    """
-
-    mass: float
-    stiffness: float
-    damping: float
-    sense: float
 
 
 class UnbalanceWeight(NamedTuple):
