@@ -143,3 +143,12 @@ def test_at_the_resonance_of_an_undamped_mode_there_is_no_motion(size):
     branch = ff.frequency_response(machine, (2.0, 3.0))
     assert branch.omega.size == 0
     assert branch.status in (BranchStatus.NOT_FINITE, BranchStatus.NO_MODES)
+
+
+@pytest.mark.parametrize("omega", np.linspace(70.0, 245.0, 8).tolist())
+def test_the_only_motion_is_the_one_to_which_every_way_up_leads(omega):
+    """FFS0827 has one motion at most of these speeds, and three between its folds."""
+    solver = solver_of(screen({}), half_turn=True)
+    branch = ff.frequency_response(screen({}), omega=(5.0, 250.0))
+    reached = solver.solve(first_unknowns(solver, omega), omega)
+    assert reached.u == pytest.approx(branch.orbit_from_below(omega).unknowns, rel=1e-9)

@@ -42,6 +42,7 @@ from flipflow.periodic.stability import (
     saddle_side,
     stability_words,
 )
+from flipflow.periodic.two_event import TwoEventProblem
 
 SETTLING_TURNS = 4000  # forcing periods for which a machine is left to settle from rest
 BACK = 0.6  # share of the last frequency without contact down to which its branch may turn back
@@ -50,6 +51,7 @@ RATIO_UP = 1.25  # of the frequencies above that are tried for a motion without 
 RATIOS_UP = 40  # of them at most
 RATIO_SETTLED = 2.0  # of those at which the machine is left to settle
 RATIOS_SETTLED = 6  # of them at most
+REPEATS = 1e-8  # share of a motion within which it is the same after half a turn
 SAMPLED = (
     "The contact force was sampled at fixed times, to reproduce that method: the branch may stall "
     "or show turning points that the machine does not have. HarmonicBalance integrates it exactly."
@@ -255,9 +257,26 @@ def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
     A machine that is its own mirror image is followed by half turns: over whole ones the loop may
     leave the branch, or end, where motions that lean to one side begin.
     """
-    if isinstance(solver, ExactSolver) and solver.system.symmetric and not solver.half_turn:
+    if isinstance(solver, ExactSolver) and not solver.half_turn and solver.system.symmetric:
         solver = ExactSolver(solver.system, half_turn=True)
+    only = _only_unknowns(solver, omega)
+    if only is not None:
+        return only
     return _led(solver, contact_free_unknowns(solver, free), free, omega)
+
+
+def _only_unknowns(solver: Solver, omega: float) -> Real | None:
+    """The only motion by half turns at ``omega``, at which every way up ends; None: not known."""
+    if not isinstance(solver, ExactSolver) or not solver.half_turn:
+        return None
+    if not TwoEventProblem.applies(solver.system):
+        return None
+    only = TwoEventProblem(solver.machine, solver.flow).only_state(omega)
+    found = None if only is None else solver.residual(only, omega)
+    if only is None or found is None:
+        return None
+    # It does not repeat where there are other events than those assumed.
+    return only if np.abs(found[0]).max() <= REPEATS * np.abs(only).max() else None
 
 
 def _led(solver: Solver, start: Real, begin: float, omega: float) -> Real | None:

@@ -280,6 +280,12 @@ def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float
     return share
 
 
+@kernel(entry=True)
+def only_share(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float) -> float:
+    """:func:`only_motion` for Python."""
+    return only_motion(machine, flow, work, omega)
+
+
 @kernel
 def _zeros_within(
     machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float, f: float
@@ -354,9 +360,10 @@ def _rest(machine: MachineArrays, flow: Flow, slot: int, k: int) -> float:
 class TwoEventProblem:
     """The scalar problem f(s) = |F(s, omega)| - 1 of a machine with one symmetric stop."""
 
-    def __init__(self, machine: MachineArrays) -> None:
+    def __init__(self, machine: MachineArrays, flow: Flow | None = None) -> None:
         self._machine = machine
-        self._flow, self._work = new_flow(machine), new_two_event(machine)
+        self._flow = new_flow(machine) if flow is None else flow
+        self._work = new_two_event(machine)
 
     @staticmethod
     def applies(system: MechanicalSystem) -> bool:
@@ -368,6 +375,14 @@ class TwoEventProblem:
         if len(springs) != 1 or springs[0].law != "paper":
             return False
         return system.symmetric and system.orders == (1,)
+
+    def only_state(self, omega: float) -> Real | None:
+        """State at t = 0, (2 N,), of the only motion at ``omega``; None where there may be more.
+
+        None, too, where that motion has no contact.
+        """
+        share = only_share(self._machine, self._flow, self._work, omega)
+        return self._work.z.copy() if share > 0.0 else None
 
     def states(self, omega: float) -> tuple[Real, Real]:
         """States at t = 0, (k, 2 N), and contact shares, (k,), of the candidates at ``omega``."""
