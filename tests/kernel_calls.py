@@ -19,7 +19,7 @@ from flipflow.dynamics.flow import contact_number, saltation
 from flipflow.dynamics.law import force, regime_at, stored_energy
 from flipflow.dynamics.machine_series import set_machine
 from flipflow.periodic.shooting import shooting_step
-from flipflow.periodic.two_event import force_excess, only_motion
+from flipflow.periodic.two_event import force_excess
 
 NO_STEPS = Course(0.0, math.inf, math.nan, math.nan, 1.0, 1.0)
 
@@ -91,12 +91,6 @@ def balance(problem, work, u, omega, r, J):
 def excess(machine, flow, work, omega, share):
     """``force_excess``."""
     return force_excess(machine, flow, work, omega, share)
-
-
-@kernel(entry=True)
-def only_share(machine, flow, work, omega):
-    """``only_motion``."""
-    return only_motion(machine, flow, work, omega)
 
 
 @kernel(entry=True)

@@ -8,6 +8,8 @@ import pytest
 import flipflow as ff
 from flipflow.batch.reasons import FOUND, REFUSED, UNSTABLE
 from flipflow.model.quantities import quantity_named
+from flipflow.periodic.exact_solver import ExactSolver
+from flipflow.periodic.two_event import TwoEventProblem, new_two_event, two_event_states
 from flipflow.studies.lane_values import lane_values
 from flipflow.studies.quantity_values import MOTION_VALUES, Working
 from judge import close
@@ -356,3 +358,46 @@ def test_a_machine_that_rests_on_a_stop_is_brought_up_from_below():
         found = ff.study(machine, {"forcing": np.array([0.99, 1.0])}, "amplitude[0]", omega)
         own = branch.orbit_from_below(omega).amplitude(0)
         assert found.values["amplitude[0]"][1, 0, 0] == pytest.approx(own, rel=1e-6)
+
+
+def test_the_only_motion_of_the_scalar_problem_has_no_other_beside_it():
+    """Of screens with hard, hardly damped stops F passes through its poles between two samples."""
+    rng, told = np.random.default_rng(77), 0
+    states, shares = np.empty((8, 4)), np.empty(8)
+    for number in range(300):
+        screen, speed = hard_screen(rng)
+        solver = ExactSolver(screen.system(), half_turn=True)
+        for omega in (speed * rng.uniform(0.3, 1.6, 3)).tolist():
+            share, _ = TwoEventProblem(solver.machine, solver.flow).only(omega)
+            if np.isnan(share):
+                continue
+            told += 1
+            touch = new_two_event(solver.machine)
+            asked = solver.machine, solver.flow, touch, omega, 2000, states, shares
+            for k in range(two_event_states(*asked)):
+                r, _ = solver.residual(states[k], omega)
+                repeats = np.abs(r).max() < 1e-7 * np.abs(states[k]).max()
+                other = abs(shares[k] - share) > 1e-6
+                assert not (repeats and other), f"screen {number} at {omega}: {shares[k]}"
+    assert told > 400
+
+
+def hard_screen(rng):
+    """A screen with stops up to a hundred times as hard as its shear springs, and its speed."""
+    main, speed = np.exp(rng.uniform(6.0, 8.5)), rng.uniform(60.0, 100.0)
+    floating = main * rng.uniform(0.12, 0.6)
+    total, reduced = main + floating, main * floating / (main + floating)
+    isolation = total * rng.uniform(10.0, 25.0) ** 2
+    shear = reduced * (rng.uniform(0.6, 1.5) * speed) ** 2
+    stop = shear * 10.0 ** rng.uniform(0.0, 2.0)
+    screen = ff.FlipFlowScreen(
+        main_mass=main, floating_mass=floating, eccentric_moment=rng.uniform(1e-3, 6e-3) * total,
+        isolation_stiffness=isolation,
+        isolation_damping=0.1 * np.sqrt(isolation * total),
+        shear_stiffness=shear,
+        shear_damping=2.0 * 10.0 ** rng.uniform(-3.0, -1.0) * np.sqrt(shear * reduced),
+        stop_stiffness=stop,
+        stop_damping=2.0 * 10.0 ** rng.uniform(-3.0, 0.0) * np.sqrt(stop * reduced),
+        clearance=10.0 ** rng.uniform(-3.5, -1.9),
+    )  # fmt: skip
+    return screen, speed

@@ -46,25 +46,18 @@ def test_all_touching_motions_are_found_without_a_guess(screen, exact, omega):
         np.testing.assert_allclose(states[nearest], orbit.state, rtol=1e-8, atol=1e-10)
 
 
-def only_motion(screen, omega):
-    """Share of the only motion, NaN where there may be others, and its state."""
-    problem = TwoEventProblem(machine_arrays(screen.system()))
-    share = kernel_calls.only_share(problem._machine, problem._flow, problem._work, omega)
-    return share, problem._work.z
-
-
 @pytest.mark.parametrize("omega", [85.0, 120.0, 190.0])
 def test_the_only_motion_is_found_with_its_state(screen, exact, omega):
     """Phase 0 lies within the touch or outside of it, before or behind the middle of the turn."""
     orbit = exact.orbit_from_below(omega)
-    share, state = only_motion(screen, omega)
+    share, state = TwoEventProblem(machine_arrays(screen.system())).only(omega)
     assert share == pytest.approx(orbit.contact_share(), abs=1e-9)
     np.testing.assert_allclose(state, orbit.state, rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize(("omega", "alone"), [(203.0, np.nan), (230.0, 0.0)])
 def test_no_share_where_no_stop_is_touched_and_none_is_told_between_folds(screen, omega, alone):
-    found, _ = only_motion(screen, omega)
+    found, _ = TwoEventProblem(machine_arrays(screen.system())).only(omega)
     np.testing.assert_equal(found, alone)
 
 
@@ -76,10 +69,9 @@ def test_two_motions_that_lie_close_are_seen_between_samples(omega):
         isolation_stiffness=248356.9, isolation_damping=1590.1, shear_stiffness=3020566.0,
         shear_damping=425.71, stop_stiffness=54414500.0, stop_damping=7089.23, clearance=0.0146515,
     )  # fmt: skip
-    states, _ = TwoEventProblem(machine_arrays(light.system())).states(omega)
-    assert len(states) == 2
-    share, _ = only_motion(light, omega)
-    assert np.isnan(share)
+    problem = TwoEventProblem(machine_arrays(light.system()))
+    assert len(problem.states(omega)[0]) == 2
+    assert np.isnan(problem.only(omega)[0])
 
 
 def test_shooting_has_the_last_word_where_motion_leans():

@@ -271,12 +271,12 @@ def _only_unknowns(solver: Solver, omega: float) -> Real | None:
         return None
     if not TwoEventProblem.applies(solver.system):
         return None
-    only = TwoEventProblem(solver.machine, solver.flow).only_state(omega)
-    found = None if only is None else solver.residual(only, omega)
-    if only is None or found is None:
-        return None
+    share, only = TwoEventProblem(solver.machine, solver.flow).only(omega)
+    found = solver.residual(only, omega) if share > 0.0 else None
     # It does not repeat where there are other events than those assumed.
-    return only if np.abs(found[0]).max() <= REPEATS * np.abs(only).max() else None
+    if found is None or np.abs(found[0]).max() > REPEATS * np.abs(only).max():
+        return None
+    return only
 
 
 def _led(solver: Solver, start: Real, begin: float, omega: float) -> Real | None:

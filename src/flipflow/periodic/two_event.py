@@ -22,8 +22,8 @@ import numpy as np
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_factor, lu_solve
-from flipflow.dynamics.contact_search import exponential, modulus
+from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
+from flipflow.dynamics.contact_search import exponential
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, new_flow, prepare_drive
 from flipflow.dynamics.modes import Modes, prepare
@@ -32,13 +32,15 @@ from flipflow.model.contact_law import NUMBER
 if TYPE_CHECKING:
     from flipflow.model.system import MechanicalSystem
 
+Homogeneous = tuple[float, float, float]  # F and 1 times a common factor
 PAPER = NUMBER["paper"]
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
 FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
 BULGE = 0.25  # of a second difference of F: how far the way between samples lies from the chord
-CLOSER = 4  # parts of the way between two samples that is looked at more closely
+CLOSER = 8  # values that are looked at where F may cross the unit circle between two samples
+INNER = 0.05, 0.95  # shares of a way within which the next value lies
 SHARP = 1e-14  # |f| of a zero, and the share within which it is
 ON_ZERO = 1e-10  # |f| from which a state is so near to the motion's that Newton confirms it at once
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
@@ -56,6 +58,7 @@ class TwoEvent(NamedTuple):
     begin: Real  # (2 N, 3) state at contact: constant, per real and per imaginary part of F
     end: Real  # (2 N, 3) the same at release
     z: Real  # (2 N,) state at contact, and at last at phase 0
+    size: Real  # (1,) determinant of the equations for z and F, which is smooth in s
 
 
 def new_two_event(machine: MachineArrays) -> TwoEvent:
@@ -71,6 +74,7 @@ def new_two_event(machine: MachineArrays) -> TwoEvent:
         begin=np.zeros((size, 3)),
         end=np.zeros((size, 3)),
         z=np.zeros(size),
+        size=np.zeros(1),
     )
 
 
@@ -116,6 +120,9 @@ def required_force(
             work.A[r, c] = total
     if not lu_factor(work.A, work.pivot):
         return complex(math.nan, math.nan)
+    work.size[0] = lu_sign(work.A, work.pivot)
+    for r in range(size):
+        work.size[0] *= abs(work.A[r, r])
     for part in range(3):
         _solve_begin(flow, work, turn, part)
     return _solve_force(machine, work, s * half)
@@ -177,6 +184,7 @@ def _solve_force(machine: MachineArrays, work: TwoEvent, touch: float) -> comple
         next1 += d * (work.end[k, 1] - work.begin[k, 1]) / touch
         next2 += d * (work.end[k, 2] - work.begin[k, 2]) / touch
     det = first1 * next2 - first2 * next1
+    work.size[0] *= det
     a = (first2 * next0 - first0 * next2) / det
     b = (first0 * next1 - first1 * next0) / det
     for k in range(work.z.shape[0]):
@@ -247,31 +255,34 @@ def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float
     """Share of contact of the only motion at omega, its state at phase 0 into work.z.
 
     0 stands for the motion without contact, the limit of these motions. NaN where there are more.
-    Where F comes so near to the unit circle between samples that two zeros may be missed, it is
-    looked at more closely.
+    Where |F| comes so near to 1 between samples that two zeros may be missed, it is looked at more
+    closely.
     """
     if not has_two_events(machine):
         return math.nan
     s, s_last = 0.5 / FEW_SAMPLES, 0.0
     F = required_force(machine, flow, work, omega, s)
+    here = _homogeneous(F, work.size[0])
     without_contact = 0j
     for k in range(machine.direction.shape[1]):
         without_contact += machine.direction[0, k] * flow.drive[OPEN_SLOT, 0, k]
-    last = machine.stops.gap[0, 0] / without_contact
-    free, zeros, low, high, f_low, f_high = _excess(last) > 0.0, 0, 0.0, 0.0, 0.0, 0.0
-    before = last
+    free_force = machine.stops.gap[0, 0] / without_contact
+    last = _homogeneous(free_force, work.size[0])
+    free, zeros, low, high, f_low, f_high = _excess(free_force) > 0.0, 0, 0.0, 0.0, 0.0, 0.0
+    f_last, before = _excess(free_force), last
     for _ in range(FEW_SAMPLES):
-        f_last, f = _excess(last), _excess(F)
+        f = _excess(F)
         if not f * f_last > 0.0:
             zeros += 1
             low, high, f_low, f_high = s_last, s, f_last, f
-        elif _may_leave(last, F, BULGE * modulus(F - 2.0 * last + before)):
-            zeros += _zeros_within(machine, flow, work, omega, s_last, s, f)
+        elif _may_cross(before, last, here, f):
+            zeros += _zeros_within(machine, flow, work, omega, s_last, s, last, here)
         if zeros + free > 1:
             return math.nan
-        before, last, s_last, s = last, F, s, s + 1.0 / FEW_SAMPLES
+        before, last, f_last, s_last, s = last, here, f, s, s + 1.0 / FEW_SAMPLES
         if s < 1.0:
             F = required_force(machine, flow, work, omega, s)
+            here = _homogeneous(F, work.size[0])
     if free or zeros == 0:
         return 0.0 if free else math.nan
     share = root_between(machine, flow, work, omega, low, high, f_low, f_high, ON_ZERO)
@@ -288,29 +299,74 @@ def only_share(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float)
 
 @kernel
 def _zeros_within(
-    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float, f: float
-) -> int:
-    """Two where f has another sign somewhere between two shares than at both, else none."""
-    for k in range(1, CLOSER):
-        between = a + (b - a) * k / CLOSER
-        if not f * force_excess(machine, flow, work, omega, between) > 0.0:
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float,
+    start: Homogeneous, end: Homogeneous,
+) -> int:  # fmt: skip
+    """Two where |F| lies on the other side of 1 between two shares, else none.
+
+    It is sought where the straight way comes nearest to that, in the half that comes nearer.
+    """
+    side = 1.0 if _square(start) > 0.0 else -1.0
+    for _ in range(CLOSER):
+        share = min(max(_nearest(start, end, side), INNER[0]), INNER[1])
+        s = a + share * (b - a)
+        F = required_force(machine, flow, work, omega, s)
+        middle = _homogeneous(F, work.size[0])
+        if not side * _square(middle) > 0.0:
             return 2
+        if _distance(start, middle, side) < _distance(middle, end, side):
+            b, end = s, middle
+        else:
+            a, start = s, middle
     return 0
 
 
 @kernel
-def _may_leave(start: complex, end: complex, bulge: float) -> bool:
-    """Whether F may cross the unit circle, and again, between two values on one side of it.
+def _may_cross(before: Homogeneous, start: Homogeneous, end: Homogeneous, f: float) -> bool:
+    """Whether |F| may cross 1, and again, on the way between two values on one side of it."""
+    bend = 0.0
+    for k in range(3):
+        bend = max(bend, abs(end[k] - 2.0 * start[k] + before[k]))
+    size = max(_length(start), _length(end))
+    side = 1.0 if f > 0.0 else -1.0
+    return _distance(start, end, side) < 2.0 * BULGE * bend * size
 
-    ``bulge`` is how far its way may lie from the straight one.
-    """
-    if _excess(start) < 0.0:
-        return max(modulus(start), modulus(end)) + bulge > 1.0
-    step = end - start
-    share = -(start.real * step.real + start.imag * step.imag) / (
-        step.real * step.real + step.imag * step.imag
-    )
-    return modulus(start + min(max(share, 0.0), 1.0) * step) - bulge < 1.0
+
+@kernel(inline=True)
+def _homogeneous(F: complex, size: float) -> Homogeneous:
+    """F and 1, times the determinant of the equations for F: no value of s makes it infinite."""
+    return F.real * size, F.imag * size, size
+
+
+@kernel(inline=True)
+def _square(one: Homogeneous) -> float:
+    """|F|^2 - 1 times the square of the determinant."""
+    return one[0] * one[0] + one[1] * one[1] - one[2] * one[2]
+
+
+@kernel(inline=True)
+def _length(one: Homogeneous) -> float:
+    return math.sqrt(one[0] * one[0] + one[1] * one[1] + one[2] * one[2])
+
+
+@kernel
+def _nearest(start: Homogeneous, end: Homogeneous, side: float) -> float:
+    """Share of the straight way at which side (|F|^2 - 1) is least, times the determinant's."""
+    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    slope = side * (start[0] * x + start[1] * y - start[2] * z)
+    bend = side * (x * x + y * y - z * z)
+    if bend > 0.0:
+        return min(max(-slope / bend, 0.0), 1.0)
+    return 0.0 if side * _square(start) < side * _square(end) else 1.0
+
+
+@kernel
+def _distance(start: Homogeneous, end: Homogeneous, side: float) -> float:
+    """That least value."""
+    share = _nearest(start, end, side)
+    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    at = start[0] + share * x, start[1] + share * y, start[2] + share * z
+    return side * _square(at)
 
 
 @kernel
@@ -376,13 +432,14 @@ class TwoEventProblem:
             return False
         return system.symmetric and system.orders == (1,)
 
-    def only_state(self, omega: float) -> Real | None:
-        """State at t = 0, (2 N,), of the only motion at ``omega``; None where there may be more.
+    def only(self, omega: float) -> tuple[float, Real]:
+        """Share of contact of the only motion at ``omega``, and its state at t = 0, (2 N,).
 
-        None, too, where that motion has no contact.
+        The share is NaN where there may be more motions, and 0 where that one has no contact; the
+        state is neither's.
         """
         share = only_share(self._machine, self._flow, self._work, omega)
-        return self._work.z.copy() if share > 0.0 else None
+        return share, self._work.z.copy()
 
     def states(self, omega: float) -> tuple[Real, Real]:
         """States at t = 0, (k, 2 N), and contact shares, (k,), of the candidates at ``omega``."""
