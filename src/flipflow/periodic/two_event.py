@@ -38,6 +38,7 @@ OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop en
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
 FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
+LAST_SHARE = 0.999  # of the contact; F grows without bound towards 1
 BULGE = 0.25  # of a second difference of F: how far the way between samples lies from the chord
 CLOSER = 8  # values that are looked at where F may cross the unit circle between two samples
 INNER = 0.05, 0.95  # shares of a way within which the next value lies
@@ -270,7 +271,7 @@ def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float
     last = _homogeneous(free_force, work.size[0])
     free, zeros, low, high, f_low, f_high = _excess(free_force) > 0.0, 0, 0.0, 0.0, 0.0, 0.0
     f_last, before = _excess(free_force), last
-    for _ in range(FEW_SAMPLES):
+    for k in range(FEW_SAMPLES + 1):
         f = _excess(F)
         if not f * f_last > 0.0:
             zeros += 1
@@ -279,8 +280,9 @@ def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float
             zeros += _zeros_within(machine, flow, work, omega, s_last, s, last, here)
         if zeros + free > 1:
             return math.nan
-        before, last, f_last, s_last, s = last, here, f, s, s + 1.0 / FEW_SAMPLES
-        if s < 1.0:
+        before, last, f_last, s_last = last, here, f, s
+        if k < FEW_SAMPLES:
+            s = min((k + 1.5) / FEW_SAMPLES, LAST_SHARE)
             F = required_force(machine, flow, work, omega, s)
             here = _homogeneous(F, work.size[0])
     if free or zeros == 0:
@@ -304,21 +306,39 @@ def _zeros_within(
 ) -> int:  # fmt: skip
     """Two where |F| lies on the other side of 1 between two shares, else none.
 
-    It is sought where the straight way comes nearest to that, in the half that comes nearer.
+    It is sought where the straight way comes nearest to that, then where parabolas through the
+    last three values do. One that is least outside lies in the next pair of shares, if in any.
     """
     side = 1.0 if _square(start) > 0.0 else -1.0
+    f_a, f_b = side * _square(start), side * _square(end)
+    m, f_m = a, math.inf
+    x = a + min(max(_nearest(start, end, side), INNER[0]), INNER[1]) * (b - a)
     for _ in range(CLOSER):
-        share = min(max(_nearest(start, end, side), INNER[0]), INNER[1])
-        s = a + share * (b - a)
-        F = required_force(machine, flow, work, omega, s)
-        middle = _homogeneous(F, work.size[0])
-        if not side * _square(middle) > 0.0:
+        F = required_force(machine, flow, work, omega, x)
+        f = side * _square(_homogeneous(F, work.size[0]))
+        if not f > 0.0:
             return 2
-        if _distance(start, middle, side) < _distance(middle, end, side):
-            b, end = s, middle
+        if m == a:
+            m, f_m = x, f
+        elif (f < f_m) == (x < m):
+            b, f_b = (m, f_m) if f < f_m else (x, f)
         else:
-            a, start = s, middle
+            a, f_a = (m, f_m) if f < f_m else (x, f)
+        if f < f_m:
+            m, f_m = x, f
+        x = _least_of_parabola(a, f_a, m, f_m, b, f_b)
+        if not a < x < b or x == m:
+            return 0
     return 0
+
+
+@kernel(inline=True)
+def _least_of_parabola(a: float, f_a: float, m: float, f_m: float, b: float, f_b: float) -> float:
+    """Where the parabola through three values is least; NaN where it has no least."""
+    left, right = (m - a) * (f_m - f_b), (b - m) * (f_m - f_a)
+    if not left + right < 0.0:
+        return math.nan
+    return m - 0.5 * ((m - a) * left - (b - m) * right) / (left + right)
 
 
 @kernel
