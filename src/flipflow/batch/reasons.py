@@ -12,8 +12,8 @@ REASONS: Mapping[int, str] = {
     FOUND: "",
     REFUSED: "physics or the machine forbids these values",
     INCOMPLETE: "the branch of motions could not be followed to its end",
-    NO_MOTION: "no such motion was found at this speed",
-    UNSTABLE: "no motion of one period settles at this speed",
+    NO_MOTION: "what the machine is brought to was not found to repeat after one turn",
+    UNSTABLE: "the motion followed is unstable here, and no other of one turn was settled into",
     UNSETTLED: "the rubber does not settle at a temperature at this speed",
 }
 """Why a machine has no values at a speed; where there is no reason, a NaN says that the quantity

@@ -128,7 +128,8 @@ def _about(
         return value - wide, value + wide
     share = parse_quantity(text, "", field=f"{OPTION} {field.name}", example="5 %")
     if not 0.0 < share < 1.0:
-        raise InputError(OPTION, word, "give a share between 0 % and 100 %")
+        remedy = "give a share between 0 % and 100 % with its sign, such as 10 %"
+        raise InputError(OPTION, word, remedy)
     return value * (1.0 - share), value * (1.0 + share)
 
 

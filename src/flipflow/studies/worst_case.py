@@ -60,7 +60,8 @@ class WorstCase(Result):
     nominal
         The quantity of the machine itself, SI, (K,); NaN where its motion is unstable.
     least, greatest
-        Its least and greatest value in the box, SI, (K,); NaN where no machine has one.
+        Its least and greatest value in the box, SI, (K,); NaN where none of the machines looked at
+        has one: they are sought from the machine itself.
     least_at, greatest_at
         Parameters of the machines that have them, SI, (K, P).
     span
