@@ -34,7 +34,7 @@ from flipflow.paper.reproduce import Reproduction
 from flipflow.periodic.derivatives import MotionDerivatives
 from flipflow.periodic.orbit import Orbit
 from flipflow.report.blocks import FigureBlock, Heading
-from flipflow.report.html import KIND, footer_of, page, title_of
+from flipflow.report.html import head_of, page
 from flipflow.report.registry import blocks_of
 from flipflow.signals import SIGNALS
 from flipflow.studies import derivatives, start_and_blows
@@ -278,7 +278,7 @@ def printed_page(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path
             )  # fmt: skip
             rest = (one for one in blocks[late:] if not isinstance(one, FigureBlock))
             blocks = (*blocks[:late], *rest)
-        text = page(blocks, title=title_of(assessment), kind=KIND, footer=footer_of(assessment))
+        text = page(blocks, **head_of(assessment))
         if text not in known:
             folder = tmp_path_factory.mktemp("printed")
             (folder / "report.html").write_text(text, encoding="utf-8")

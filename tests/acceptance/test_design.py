@@ -406,10 +406,10 @@ def test_a_search_that_is_kept_is_said_when_it_is_stopped(command, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     assert command("new", "duty.toml", "--duty")[0] == 0
 
-    def pressed(_found):
+    def pressed(_found, _blocks):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("flipflow.report.html.proposal_html", pressed)
+    monkeypatch.setattr("flipflow.report.html.html", pressed)
     words = ("design", "duty.toml", "--generations", "1", "-o", "out")
     for more, said in (
         ((), "nothing is written"),

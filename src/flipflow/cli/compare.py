@@ -57,12 +57,12 @@ def _write(found: Comparison, target: Destination) -> None:
     from flipflow.io.results import document_of  # noqa: PLC0415  keeps --help quick
     from flipflow.plotting.compare import comparison_figure  # noqa: PLC0415
     from flipflow.report import summary  # noqa: PLC0415
-    from flipflow.report.html import comparison_html  # noqa: PLC0415
+    from flipflow.report.html import html  # noqa: PLC0415
 
     if target.folder is not None or target.json is not None:
         document = document_of(found)
         if target.folder is not None:
-            write_file(target.path(PAGE), comparison_html(found), OUTPUT)
+            write_file(target.path(PAGE), html(found), OUTPUT)
             target.wrote(PAGE)
             target.picture(CURVES, comparison_figure(found), subject_of(found))
             target.data(DATA, document)

@@ -109,15 +109,17 @@ def _write(found: Proposal, target: Destination, *, pdf: bool) -> None:
     from flipflow.io.results import document_of  # noqa: PLC0415
     from flipflow.plotting.dispatch import figure  # noqa: PLC0415
     from flipflow.report import summary  # noqa: PLC0415
-    from flipflow.report.html import proposal_html  # noqa: PLC0415
+    from flipflow.report.html import html  # noqa: PLC0415
+    from flipflow.report.registry import blocks_of  # noqa: PLC0415
 
-    target.content(REPORT, proposal_html(found))
+    blocks = blocks_of(found)
+    target.content(REPORT, html(found, blocks))
     target.content(MACHINE, found.machine_file)
     target.wrote(REPORT, MACHINE)
     if pdf:
-        from flipflow.report.pdf import proposal_pdf  # noqa: PLC0415
+        from flipflow.report.pdf import pdf as sheets  # noqa: PLC0415
 
-        target.content(PDF, proposal_pdf(found))
+        target.content(PDF, sheets(found, blocks=blocks))
         target.wrote(PDF)
     else:
         target.replaces([PDF])  # one of another duty would stay beside this report

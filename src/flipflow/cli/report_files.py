@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from flipflow.cli.destination import Destination
     from flipflow.model.duty import Duty
     from flipflow.model.project import Project
+    from flipflow.report.blocks import Block
     from flipflow.studies.assessment import Assessment
 
-    Format = Callable[[Assessment], Mapping[str, bytes | str]]
+    Format = Callable[[Assessment, Sequence[Block]], Mapping[str, bytes | str]]
 
 RESULTS, REPORT, PDF, KEY = "results.json", "report.html", "report.pdf", "report"
 PROPOSAL = "proposal.json"
@@ -56,7 +57,7 @@ class ReportFiles:
     options
         Options of the command that change what is found, as written.
     formats
-        What makes further files of an assessment, by name.
+        What makes further files of an assessment and its blocks, by name.
     overwrite
         Whether another report may be replaced.
     """
@@ -82,13 +83,17 @@ class ReportFiles:
         """Write the report, the numbers behind it and what else is asked for."""
         from flipflow.io.response import NAMES, write_response  # noqa: PLC0415  quick --help
         from flipflow.report.html import html  # noqa: PLC0415
+        from flipflow.report.registry import blocks_of  # noqa: PLC0415
 
-        more = {name: text for make in self.formats for name, text in make(assessment).items()}
+        blocks = blocks_of(assessment)
+        more = {
+            name: text for make in self.formats for name, text in make(assessment, blocks).items()
+        }
         key = _key_of(assessment.project, self.options)
         old = _read(Path(target.folder or "") / RESULTS)
         still = old.files if old is not None and _same(old, key) else ()
         kept = asdict(replace(key, files=_once(REPORT, RESULTS, *NAMES, *more, *still)))
-        target.content(REPORT, html(assessment))
+        target.content(REPORT, html(assessment, blocks))
         target.wrote(REPORT)
         target.data(RESULTS, {"schema": document["schema"], KEY: kept, **document})
         write_response(assessment, target.all_of(NAMES))
@@ -118,7 +123,7 @@ def formats_of(paper: str | None, *, tables: bool) -> tuple[Format, ...]:
 
         checked_paper(paper, "--paper")
         require_typst()
-        formats.append(lambda assessment: {PDF: pdf(assessment, paper)})
+        formats.append(lambda assessment, blocks: {PDF: pdf(assessment, paper, blocks)})
     if tables:
         from flipflow.io.spreadsheet import require_openpyxl  # noqa: PLC0415
         from flipflow.report.tables import table_files  # noqa: PLC0415

@@ -19,6 +19,7 @@ from flipflow.report.blocks import (
     Note,
     Table,
     Text,
+    TitleBlock,
     Values,
     Verdict,
     cells,
@@ -40,6 +41,14 @@ NOT_COVERED = (
     "has to do. Fatigue of rubber, its wear and its creep are not computed: bounds on gap and "
     "shear stiffness keep the search away from machines that hang on them."
 )
+
+
+@section(Proposal, Part.FIRST_PAGE, 0)
+def head_of_proposal(found: Proposal) -> Iterator[Block]:
+    """The duty by its name, and the machine it begins with."""
+    duty = found.duty
+    rows = (("Duty", duty.name), ("Machine to begin with", duty.project.name))
+    yield TitleBlock(duty.name, rows)
 
 
 @section(Proposal, Part.FIRST_PAGE, 10, brief=True)

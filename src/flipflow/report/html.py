@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 TEMPLATES = "templates"
-KIND = "vibration report"
 LONG = 15  # letters of a word from which on it can be broken anywhere in a table
 SHORT = 8  # rows of a table that is not cut across two pages
 NARROW = 360.0  # pixels for a figure on a telephone
+Reported = Assessment | Comparison | Proposal
 
 
 class Head(TypedDict):
@@ -68,25 +68,23 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def html(assessment: Assessment) -> str:
-    """The report as text."""
-    return page(
-        blocks_of(assessment),
-        title=title_of(assessment),
-        kind=KIND,
-        footer=footer_of(assessment),
-    )
+def html(result: Reported, blocks: Sequence[Block] = ()) -> str:
+    """The report of a result as text; ``blocks`` are those of the result, where they are made."""
+    return page(blocks or blocks_of(result), **head_of(result))
 
 
-def comparison_html(found: Comparison) -> str:
-    """The page of machines compared as text."""
-    inputs = ", ".join(one.input_hash for one in found.assessments)
-    return page(
-        blocks_of(found),
-        title=" and ".join(found.names),
-        kind="comparison",
-        footer=f"flipflow {found.version}, inputs {inputs}",
-    )
+def head_of(result: Reported) -> Head:
+    """What the report of a result is called, and what stands at its foot."""
+    if isinstance(result, Comparison):
+        inputs = ", ".join(one.input_hash for one in result.assessments)
+        title, kind, made_of = " and ".join(result.names), "comparison", f"inputs {inputs}"
+    elif isinstance(result, Proposal):
+        title, kind = result.duty.name, "design"
+        made_of = f"duty {title}, seed {result.duty.seed}"
+    else:
+        title = result.project.document.name or result.project.name
+        kind, made_of = "vibration report", f"input {result.input_hash}"
+    return {"title": title, "kind": kind, "footer": f"flipflow {result.version}, {made_of}"}
 
 
 def study_html(found: Study, blocks: Iterable[Block], title: str, name: str) -> str:
@@ -94,34 +92,6 @@ def study_html(found: Study, blocks: Iterable[Block], title: str, name: str) -> 
     head = TitleBlock(title, (("Study", name),))
     footer = f"flipflow {found.version}, study {name}"
     return page((head, *blocks), title=title, kind="study", footer=footer)
-
-
-def proposal_html(found: Proposal) -> str:
-    """The page of a design as text."""
-    return page(proposal_blocks(found), **proposal_head(found))
-
-
-def proposal_blocks(found: Proposal) -> tuple[Block, ...]:
-    """The blocks of a design's report, its head first."""
-    rows = (("Duty", found.duty.name), ("Machine to begin with", found.duty.project.name))
-    return (TitleBlock(found.duty.name, rows), *blocks_of(found))
-
-
-def proposal_head(found: Proposal) -> Head:
-    """What a design's report is called, and what stands at its foot."""
-    name = found.duty.name
-    footer = f"flipflow {found.version}, duty {name}, seed {found.duty.seed}"
-    return {"title": name, "kind": "design", "footer": footer}
-
-
-def title_of(assessment: Assessment) -> str:
-    """What the report is called."""
-    return assessment.project.document.name or assessment.project.name
-
-
-def footer_of(assessment: Assessment) -> str:
-    """What stands at the foot of every sheet."""
-    return f"flipflow {assessment.version}, input {assessment.input_hash}"
 
 
 def page(

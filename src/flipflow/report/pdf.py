@@ -16,18 +16,8 @@ from flipflow.plotting.panels import PAGE_WIDTH
 from flipflow.plotting.print import require_typst
 from flipflow.plotting.svg import searchable_svg
 from flipflow.report.blocks import Block, DrawingBlock, FigureBlock, Table
-from flipflow.report.html import (
-    KIND,
-    LONG,
-    SHORT,
-    footer_of,
-    proposal_blocks,
-    proposal_head,
-    title_of,
-)
+from flipflow.report.html import LONG, SHORT, Reported, head_of
 from flipflow.report.registry import blocks_of
-from flipflow.studies.assessment import Assessment
-from flipflow.studies.design import Proposal
 
 # The name that typst has for a paper, and the height in points that a figure may have on it.
 PAPERS: Mapping[str, tuple[str, float]] = MappingProxyType(
@@ -37,15 +27,17 @@ ROOM = 75  # characters beside the widest column of a table
 TEMPLATE = "report.typ"
 
 
-def pdf(assessment: Assessment, paper: str = "a4") -> bytes:
-    """The report of an assessment as a PDF.
+def pdf(result: Reported, paper: str = "a4", blocks: Sequence[Block] = ()) -> bytes:
+    """The report of a result as a PDF.
 
     Parameters
     ----------
-    assessment
-        What :func:`flipflow.assess` returns.
+    result
+        What :func:`flipflow.assess` or another analysis with a report returns.
     paper
         "a4" or "letter".
+    blocks
+        Those of the result, where they are made.
 
     Raises
     ------
@@ -54,18 +46,7 @@ def pdf(assessment: Assessment, paper: str = "a4") -> bytes:
     MissingExtra
         When typst or matplotlib is not installed.
     """
-    return sheets(
-        blocks_of(assessment),
-        title=title_of(assessment),
-        kind=KIND,
-        footer=footer_of(assessment),
-        paper=paper,
-    )
-
-
-def proposal_pdf(found: Proposal, paper: str = "a4") -> bytes:
-    """The report of a design as a PDF; arguments and errors are those of :func:`pdf`."""
-    return sheets(proposal_blocks(found), **proposal_head(found), paper=paper)
+    return sheets(blocks or blocks_of(result), **head_of(result), paper=paper)
 
 
 def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper: str) -> bytes:

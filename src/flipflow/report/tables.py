@@ -13,7 +13,7 @@ from flipflow.io.units import in_unit
 from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES
 from flipflow.report.blocks import Block, Cell, Column, Table, TitleBlock, Values, Verdict
-from flipflow.report.html import KIND, footer_of
+from flipflow.report.html import Head, head_of
 from flipflow.report.numbers import NOTHING
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
@@ -34,16 +34,19 @@ LISTED = (
 )  # fmt: skip
 
 
-def table_files(assessment: Assessment) -> dict[str, bytes | str]:
+def table_files(assessment: Assessment, blocks: Sequence[Block] = ()) -> dict[str, bytes | str]:
     """All tables of a report, and the response, by the name of the file: one XLSX, and CSV.
+
+    ``blocks`` are those of the assessment, where they are made.
 
     Raises
     ------
     MissingExtra
         When openpyxl is not installed.
     """
-    sheets = [*sheets_of(blocks_of(assessment)), response_sheet(assessment)]
-    sheets.insert(0, _report_sheet(assessment))
+    blocks = blocks or blocks_of(assessment)
+    head = _report_sheet(head_of(assessment), blocks)
+    sheets = [head, *sheets_of(blocks), response_sheet(assessment)]
     files: dict[str, bytes | str] = {BOOK: xlsx(sheets)}
     for sheet in sheets:
         name = _file_name(sheet.name, files)
@@ -88,10 +91,10 @@ def _listed(case: CaseAssessment) -> Real:
     return np.array(rows).reshape(-1, len(LISTED)).T
 
 
-def _report_sheet(assessment: Assessment) -> Sheet:
+def _report_sheet(head: Head, blocks: Sequence[Block]) -> Sheet:
     """What the report is of, and what it says in words beside a label."""
-    rows: list[tuple[Value, ...]] = [("Report", KIND), ("Made by", footer_of(assessment))]
-    for block in blocks_of(assessment):
+    rows: list[tuple[Value, ...]] = [("Report", head["kind"]), ("Made by", head["footer"])]
+    for block in blocks:
         if isinstance(block, TitleBlock):
             rows += [("Machine", block.title), *block.rows]
         elif isinstance(block, Verdict):
