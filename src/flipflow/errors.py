@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import numbers
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar, cast
 
 WIDTH = 60  # characters of a value that a sentence shows
@@ -60,6 +61,15 @@ class InputError(FlipflowError, ValueError):
         self.remedy = remedy
         name = field if len(field) <= 2 * WIDTH else f"{field[: 2 * WIDTH - 3]}..."
         super().__init__(f"{name} = {_shown(value)}: {remedy}.")
+
+
+@contextmanager
+def as_written(field: str, written: object, more: str = "") -> Iterator[None]:
+    """Let an input error name a field of the user and what was written there, then say ``more``."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(field, written, f"{error.remedy}{more}") from None
 
 
 class IncompleteError(FlipflowError):

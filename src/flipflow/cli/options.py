@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flipflow.cli.progress import progress
-from flipflow.errors import InputError
+from flipflow.errors import InputError, as_written
 from flipflow.model.constants import RPM
 from flipflow.model.numerals import case_words, rpm
 
@@ -85,15 +84,6 @@ def _read_whole(least: int, most: int) -> Callable[[typer.CallbackParam, Any], A
         return number
 
     return read
-
-
-@contextmanager
-def as_written(option: str, written: str) -> Iterator[None]:
-    """Let errors of what is made from an option name the option and what was written."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(option, written, error.remedy) from None
 
 
 def in_case(

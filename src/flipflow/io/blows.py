@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flipflow.errors import InputError
+from flipflow.errors import InputError, as_written
 from flipflow.io.units import parse_quantity
 from flipflow.model.disturbance import Impulse
 
@@ -28,7 +28,5 @@ def parse_blow(text: str, field: str) -> Impulse:
     except ValueError:
         raise InputError(field, text, f"give the impulse as a number, as {EXAMPLE}") from None
     t = parse_quantity(when.strip(), "s", field=field, example="2 s")
-    try:
+    with as_written(field, text):
         return Impulse(t, words[0], size)
-    except InputError as error:
-        raise InputError(field, text, error.remedy) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flipflow.errors import InputError
+from flipflow.errors import InputError, as_written
 from flipflow.io.layout import SPEED, START, TORQUE_TABLE, entry_of
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import (
@@ -133,7 +133,5 @@ def parse_profile(written: str, field: str) -> SpeedProfile:
             raise InputError(field, written, f"write points such as {EXAMPLE!r}")
         times.append(parse_quantity(parts[0], "s", field=field))
         speeds.append(parse_quantity(parts[1], "rad/s", field=field))
-    try:
+    with as_written(field, written, f", for example {EXAMPLE!r}"):
         return SpeedProfile(times, speeds)
-    except InputError as error:
-        raise InputError(field, written, f"{error.remedy}, for example {EXAMPLE!r}") from None

@@ -18,6 +18,7 @@ from flipflow.io.project import read_limits
 from flipflow.io.study_file import IN_FILE as RANGES
 from flipflow.io.study_file import (
     chosen_cases,
+    field_of,
     flat_keys,
     read_with_machine,
     section_of,
@@ -26,7 +27,7 @@ from flipflow.io.study_file import (
 )
 from flipflow.io.units import parse_quantity
 from flipflow.io.values import LEFT_OUT, Notes, Table, read_number
-from flipflow.io.vary import EACH, PLUS_MINUS, field_named
+from flipflow.io.vary import EACH, PLUS_MINUS
 from flipflow.model.duty import OBJECTIVES, Duty, SpringType
 from flipflow.model.fields import FIELD
 from flipflow.model.limits import LIMIT_FIELDS, Limits
@@ -170,18 +171,10 @@ def _scatter(table: Mapping[str, Any]) -> dict[str, float]:
     found = {}
     for key, written in flat_keys(table).items():
         label = f"scatter.{key}"
-        name = _field_of(key, label, written)
+        name = field_of(key, label, written)
         share = written.strip().removeprefix(PLUS_MINUS) if isinstance(written, str) else written
         found[name] = parse_quantity(share, "", field=label, example="15 %")
     return found
-
-
-def _field_of(key: str, label: str, written: object) -> str:
-    """Name of a field by one of its words."""
-    try:
-        return field_named(key, key).name
-    except InputError as error:
-        raise InputError(label, written, error.remedy) from None
 
 
 def _temperatures(table: Table) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from flipflow.compiled.arrays import Real
-from flipflow.errors import InputError
+from flipflow.errors import InputError, as_written
 from flipflow.io.layout import SPEED, refuse_unknown
 from flipflow.io.project import check_format, load_project, refuse_other_files
 from flipflow.io.source import Source, bundled_names, read_source
@@ -227,15 +227,13 @@ def _derivatives(table: Table) -> tuple[str, ...]:
     if not isinstance(written, list) or not all(isinstance(one, str) for one in written):
         remedy = 'give a list of fields, ["clearance", "shear_stiffness"]'
         raise InputError("study.derivatives", written, remedy)
-    return tuple(_field_of(one, "study.derivatives") for one in written)
+    return tuple(field_of(one, "study.derivatives", one) for one in written)
 
 
-def _field_of(written: str, label: str) -> str:
+def field_of(key: str, label: str, written: object) -> str:
     """Name of a field by one of its words."""
-    try:
-        return field_named(written, written).name
-    except InputError as error:
-        raise InputError(label, written, error.remedy) from None
+    with as_written(label, written):
+        return field_named(key, key).name
 
 
 def _speeds(table: Table, project: Project) -> Real:

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from flipflow.errors import InputError
+from flipflow.errors import InputError, as_written
 from flipflow.io.layout import Entry, each_of, entry_of
 from flipflow.io.units import as_toml, parse_quantity, shown
 from flipflow.model.fields import FIELD, Field
@@ -53,10 +53,8 @@ def read_number(written: object, of: Field, *, label: str | None = None) -> floa
         example=str(of.example),
         allow_infinite=of.infinite,
     )
-    try:
+    with as_written(name, written, f", for example {of.example!r}"):
         of.check(value)
-    except InputError as error:
-        raise InputError(name, written, f"{error.remedy}, for example {of.example!r}") from None
     return value
 
 
@@ -198,8 +196,6 @@ def _counted(written: object, of: Field, name: str) -> object:
 def _end(written: object, of: Field, index: int) -> float:
     example = of.example[index] if isinstance(of.example, tuple) else ""
     value = parse_quantity(written, of.unit, field=of.key, example=example)
-    try:
+    with as_written(of.key, written, f", for example {example!r}"):
         of.check(value)
-    except InputError as error:
-        raise InputError(of.key, written, f"{error.remedy}, for example {example!r}") from None
     return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping
 
-from flipflow.errors import InputError
+from flipflow.errors import InputError, as_written
 from flipflow.io.units import parse_quantity
 from flipflow.model.fields import FIELD, Field
 from flipflow.model.screen import FlipFlowScreen
@@ -88,10 +88,8 @@ def _checked(field: Field, text: str, word: str, screen: FlipFlowScreen, count: 
     given = _range(field, text, word, screen, count)
     if isinstance(given, tuple) and not given[0] < given[1]:
         raise InputError(OPTION, word, REVERSED)
-    try:
+    with as_written(OPTION, word):
         variations({field.name: given}, screen)
-    except InputError as error:
-        raise InputError(OPTION, word, error.remedy) from None
     return given
 
 
