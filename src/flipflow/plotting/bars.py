@@ -10,7 +10,7 @@ from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import NAME_LETTERS, short_names, within
 from flipflow.plotting.palette import CASES, HATCHES, case_colour
-from flipflow.plotting.panels import Axis, Band, Bar, Line, Note, Panel
+from flipflow.plotting.panels import Axis, Band, Bar, Line, Note, Panel, rows_axis
 from flipflow.plotting.scales import RPM
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.feasible import CaseWindow
@@ -67,7 +67,6 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
     few = len(region.cases) <= CASES
     if not few:
         bars = [replace(bar, legend=False) for bar in bars]
-    ticks = tuple((heights[name], _word(name)) for name in rows)
     lines = tuple(
         Line("x", at * RPM, text, "mark")
         for text, at in _landmarks(region)
@@ -77,7 +76,7 @@ def region_figure(region: OperatingRegion, omega: float | None = None) -> Figure
         lines += (Line("x", omega * RPM, f"{rpm(omega)} rpm", "speed", "dashdot"),)
     bands = tuple(Band("x", low * RPM, high * RPM) for low, high in region.feasible)
     panel = Panel(
-        Axis("shaft speed", "rpm", ends), Axis("", "", (-0.6, len(rows) - 0.4), ticks),
+        Axis("shaft speed", "rpm", ends), rows_axis([_word(name) for name in rows]),
         bars=tuple(bars), lines=lines, bands=bands, notes=tuple(words),
     )  # fmt: skip
     order = "" if few else ", one below the other in the order of their table"
@@ -103,10 +102,8 @@ def energy_figure(assessment: Assessment) -> Figure | None:
     totals = [sum(case.energy.get(name, 0.0) for name in takers) for case in cases]
     scale, unit = (1e-3, "kW") if max(totals) >= LEAST_KILOWATTS else (1.0, "W")
     bars: list[Bar] = []
-    ticks = []
     for k, case in enumerate(cases):
         y = float(len(cases) - 1 - k)
-        ticks.append((y, within(case.name, NAME_LETTERS, lines)))
         total = 0.0
         for name in takers:
             power = case.energy.get(name, 0.0) * scale
@@ -115,11 +112,11 @@ def energy_figure(assessment: Assessment) -> Figure | None:
                 Bar(TAKERS[name], y, total, total + power, 0.62, name, hatch, legend=k == 0)
             )
             total += power
-        bars[-1] = _labelled(bars[-1], f"{total:.3g} {unit}")
+        bars[-1] = replace(bars[-1], text=f"{total:.3g} {unit}")
     most = max(bar.high for bar in bars)
     panel = Panel(
         Axis("mean power", unit, (0.0, 1.15 * most)),
-        Axis("", "", (-0.55, len(cases) - 0.45), tuple(ticks)),
+        rows_axis([within(case.name, NAME_LETTERS, lines) for case in cases], 0.55),
         bars=tuple(bars),
     )
     caption = (
@@ -127,11 +124,6 @@ def energy_figure(assessment: Assessment) -> Figure | None:
         "exciter feeds in. The motor also needs what bearings, belt and material take."
     )
     return Figure("Energy balance", caption, (panel,), height=120 + pitch * len(cases))
-
-
-def _labelled(bar: Bar, text: str) -> Bar:
-    return Bar(bar.name, bar.y, bar.low, bar.high, bar.thickness, bar.colour, bar.hatch,
-               bar.legend, text)  # fmt: skip
 
 
 def _case_bars(

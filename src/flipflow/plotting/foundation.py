@@ -8,7 +8,7 @@ from flipflow.plotting.drawing import Drawing
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import NAME_LETTERS, within
 from flipflow.plotting.palette import COLOURS, INK
-from flipflow.plotting.panels import Axis, Bar, Panel
+from flipflow.plotting.panels import Axis, Bar, Panel, rows_axis
 from flipflow.plotting.scales import KN
 from flipflow.studies.foundation_loads import Components, FoundationLoads
 
@@ -182,12 +182,10 @@ def foundation_figure(loads: FoundationLoads) -> Figure:
             if force is not None:
                 at = float(len(rows) - 1 - k) + 0.2 - 0.4 * place
                 bars.append(Bar(way, at, 0.0, force * KN, 0.36, colour, legend=k == 0))
-    words = (within(name, NAME_LETTERS, 2) for name, _ in rows)
-    ticks = tuple((float(len(rows) - 1 - k), word) for k, word in enumerate(words))
     top = 1.1 * max((bar.high for bar in bars), default=1.0)
     panel = Panel(
         Axis("greatest dynamic force", "kN", (0.0, top)),
-        Axis("", "", (-0.6, len(rows) - 0.4), ticks), bars=tuple(bars),
+        rows_axis([within(name, NAME_LETTERS, 2) for name, _ in rows]), bars=tuple(bars),
     )  # fmt: skip
     caption = " ".join(["All supports together.", *loads.notes])
     return Figure("Loads on the foundation", caption, (panel,), 1, 80 + 44 * len(rows))

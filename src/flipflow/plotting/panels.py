@@ -7,6 +7,7 @@ draw them. Colours are named by what they mean;
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -39,6 +40,13 @@ class Axis:
     def title(self) -> str:
         """Label with the unit."""
         return f"{self.label}, {self.unit}" if self.unit else self.label
+
+
+def rows_axis(words: Sequence[str], beyond: float = 0.6) -> Axis:
+    """An axis of rows, the first on top and the last at 0, which ends ``beyond`` both."""
+    last = len(words) - 1
+    ticks = tuple((float(last - k), word) for k, word in enumerate(words))
+    return Axis("", "", (-beyond, last + beyond), ticks)
 
 
 def decade_ticks(low: int, high: int) -> tuple[tuple[float, str], ...]:

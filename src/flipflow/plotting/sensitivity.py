@@ -13,7 +13,7 @@ from flipflow.model.fields import symbol_of
 from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
-from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace, rows_axis
 from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
 from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
@@ -138,7 +138,7 @@ def _index_panel(result: Sensitivity) -> Panel:
                 bars.append(Bar(name, y + shift, low, high, 0.34, colour, hatch, rank == 0, text))
     return Panel(
         Axis("Sobol index", "", (min(INDEX_AXIS[0], *(bar.low for bar in bars), 0.0), 1.25)),
-        _rows(result, order), bars=tuple(bars),
+        rows_axis([_row(result, i) for i in order]), bars=tuple(bars),
     )  # fmt: skip
 
 
@@ -150,7 +150,7 @@ def _tornado_panel(result: Sensitivity | OneAtATime, at: int | None) -> Panel:
     reach = max((max(-bar.low, bar.high) for bar in bars), default=0.0) or 1.0
     return Panel(
         Axis(f"change of {quantity.label}", quantity.shown_unit, (-1.25 * reach, 1.25 * reach)),
-        _rows(result, order), bars=tuple(bars),
+        rows_axis([_row(result, i) for i in order]), bars=tuple(bars),
         lines=(Line("x", 0.0, "", "mark", "solid"),),
     )  # fmt: skip
 
@@ -164,12 +164,6 @@ def _tornado_bars(ends: Real, order: list[int]) -> Iterator[Bar]:
                 low, high = sorted((0.0, change))
                 yield Bar(words[k], y + 0.19 - 0.38 * k, low, high, 0.34, f"case {3 - k}",
                           HATCHES[k], rank == 0)  # fmt: skip
-
-
-def _rows(result: Sensitivity | OneAtATime, order: list[int]) -> Axis:
-    last = len(order) - 1
-    ticks = tuple((float(last - rank), _row(result, i)) for rank, i in enumerate(order))
-    return Axis("", "", (-0.6, last + 0.6), ticks)
 
 
 def _row(result: Sensitivity | OneAtATime, i: int) -> str:

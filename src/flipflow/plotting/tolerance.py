@@ -7,7 +7,7 @@ import numpy as np
 from flipflow.model.arguments import checked_index
 from flipflow.model.fields import symbol_of
 from flipflow.plotting.figure import Figure
-from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace, rows_axis
 from flipflow.plotting.study import speed_in_words
 from flipflow.studies.tolerance import Tolerance, limits_in_words, stands_out
 
@@ -67,15 +67,12 @@ def tolerance_figure(found: Tolerance, at: int = 0) -> Figure:
 def _halved_panel(found: Tolerance, at: int, order: list[int]) -> Panel:
     """The share with the tolerance of one field halved, a bar for each field."""
     bars = tuple(_bar(found, i, at, float(len(order) - 1 - k)) for k, i in enumerate(order))
-    ticks = tuple(
-        (float(len(order) - 1 - k), symbol_of(found.names[i])) for k, i in enumerate(order)
-    )
     reach = [bar.low for bar in bars] + [bar.high for bar in bars]
     margin = max(0.25 * (max(reach) - min(reach)), 2.0)
     return Panel(
         Axis("machines that pass with one tolerance halved", "%",
              (max(min(reach) - margin, 0.0), max(reach) + margin)),
-        Axis("", "", (-0.6, len(order) - 0.4), ticks), bars=bars,
+        rows_axis([symbol_of(found.names[i]) for i in order]), bars=bars,
         lines=(Line("x", 100.0 * found.share[at], "as given", "mark", "solid"),),
     )  # fmt: skip
 

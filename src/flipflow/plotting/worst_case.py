@@ -10,7 +10,7 @@ from flipflow.model.fields import symbol_of
 from flipflow.model.quantities import Quantity, quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
-from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace
+from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace, rows_axis
 from flipflow.plotting.scales import HZ, RPM
 from flipflow.plotting.sensitivity import SHOWN
 from flipflow.plotting.units import speed_of
@@ -67,9 +67,9 @@ def _over_frequency(found: WorstCase) -> Figure:
 def _at_one(found: WorstCase) -> Figure:
     one = quantity_named(found.quantity, found.machine)
     last = len(found.names) - 1
-    ticks = tuple((float(last - j), symbol_of(name)) for j, name in enumerate(found.names))
     place = Axis("place in the interval (0: low end, 1: high end)", "", WHOLE)
-    places = Panel(place, Axis("", "", (-0.6, last + 0.6), ticks), tuple(_marks(found, last)))
+    names = rows_axis([symbol_of(name) for name in found.names])
+    places = Panel(place, names, tuple(_marks(found, last)))
     speed = "" if np.isnan(found.omega[0]) else f" at {speed_of(found, found.omega[0])}"
     caption = (
         "Above: what the quantity can be while every parameter may lie anywhere in its interval. "
@@ -91,7 +91,7 @@ def _span(found: WorstCase, one: Quantity) -> Panel:
     bar = Bar("least to greatest", 0.0, low, high, 0.5, "case 1", ends=True)
     return Panel(
         Axis(one.label, one.shown_unit, (min(known) - margin, max(known) + margin)),
-        Axis("", "", (-0.6, 0.6), ((0.0, "range"),)),
+        rows_axis(["range"]),
         bars=(bar,) if np.isfinite([low, high]).all() else (),
         lines=(Line("x", own, "the machine itself", "mark"),) if np.isfinite(own) else (),
     )
