@@ -9,8 +9,7 @@ from flipflow.model.fields import FIELD
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Band, Line, Panel, Trace
-from flipflow.plotting.scales import MM
-from flipflow.plotting.sensitivity import SHOWN
+from flipflow.plotting.scales import MM, SHOWN
 from flipflow.plotting.study import FIELD_SCALES, field_unit
 from flipflow.studies.candidates import quantity_of
 from flipflow.studies.design import Proposal

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from flipflow.model import constants
 
@@ -13,4 +14,9 @@ KN = 1e-3
 DEGREES = 180.0 / math.pi
 MINUS = "\N{MINUS SIGN}"  # as matplotlib writes it
 
+# What one of the SI unit of a quantity is in the unit that it is shown in.
+SHOWN: Mapping[str, float] = {
+    "mm": MM, "rpm": RPM, "kN": KN, "kW": 1e-3, "deg": DEGREES, "g": 1.0 / constants.GRAVITY,
+    "%": 100.0, "h": 1.0 / 3600.0, **dict.fromkeys(("", "N", "W", "K", "m/s", "rad"), 1.0),
+}  # fmt: skip
 SPEEDS = {"rpm": RPM, "Hz": HZ, "rad/s": 1.0}

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from flipflow.compiled.arrays import Real
 from flipflow.errors import InputError
-from flipflow.model.constants import GRAVITY
 from flipflow.model.fields import symbol_of
 from flipflow.model.quantities import quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, HATCHES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace, rows_axis
-from flipflow.plotting.scales import DEGREES, HZ, KN, MINUS, MM, RPM
+from flipflow.plotting.scales import HZ, MINUS, RPM, SHOWN
 from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime, Sensitivity
 
-SHOWN: Mapping[str, float] = {
-    "mm": MM, "rpm": RPM, "kN": KN, "kW": 1e-3, "deg": DEGREES, "g": 1.0 / GRAVITY, "%": 100.0,
-    "h": 1.0 / 3600.0, **dict.fromkeys(("", "N", "W", "K", "m/s", "rad"), 1.0),
-}  # fmt: skip
 INDEX_AXIS = (-0.05, 1.05)
 ROUNDING = 1e-12  # of a value
 

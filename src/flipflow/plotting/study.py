@@ -27,8 +27,8 @@ from flipflow.plotting.figure import Figure
 from flipflow.plotting.layout import LEGEND_LETTERS, within
 from flipflow.plotting.palette import case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Cells, Line, Note, Panel, Trace, cell_edges
-from flipflow.plotting.scales import MM
-from flipflow.plotting.sensitivity import SHOWN, tornado_figure
+from flipflow.plotting.scales import MM, SHOWN
+from flipflow.plotting.sensitivity import tornado_figure
 from flipflow.plotting.units import speed_of
 from flipflow.studies.sensitivity import OneAtATime
 from flipflow.studies.study import Study

@@ -11,8 +11,7 @@ from flipflow.model.quantities import Quantity, quantity_named
 from flipflow.plotting.figure import Figure
 from flipflow.plotting.palette import CASES, case_colour, case_symbol
 from flipflow.plotting.panels import Axis, Bar, Line, Panel, Trace, rows_axis
-from flipflow.plotting.scales import HZ, RPM
-from flipflow.plotting.sensitivity import SHOWN
+from flipflow.plotting.scales import HZ, RPM, SHOWN
 from flipflow.plotting.units import speed_of
 from flipflow.studies.worst_case import End, WorstCase
 
