@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from flipflow.model.fields import FIELD
-from flipflow.model.limits import LIMIT_FIELDS, limit_bounds
+from flipflow.model.limits import LIMIT_FIELDS
 from flipflow.model.numerals import capitalized, rpm
-from flipflow.model.quantities import QUANTITIES
 from flipflow.plotting.design import band_figure, proposal_figure
 from flipflow.report.blocks import (
     Block,
@@ -25,7 +24,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.first_page import cases, limits
-from flipflow.report.numbers import NOTHING, bounds, number, quantity
+from flipflow.report.numbers import NOTHING, allowed, number, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, FAIL, PASS
 from flipflow.studies.candidates import ALONE, BUILT, EVEN, MET, MOTION, label_of
@@ -66,13 +65,14 @@ def duty_of_proposal(found: Proposal) -> Iterator[Block]:
     """What was asked."""
     duty = found.duty
     speeds = " to ".join(dict.fromkeys(rpm(one) for one in duty.speed))
+    target, within = (quantity(one, "mm", "m") for one in (duty.target, duty.tolerance))
     scatter = ", ".join(
         f"{FIELD[name].key} +-{100.0 * one:.3g} %" for name, one in duty.scatter.items()
     )
     yield Heading("The duty", 1, new_page=False)
     yield Values(
         (
-            ("Relative amplitude", f"{_mm(duty.target)} within {_mm(duty.tolerance)} either way"),
+            ("Relative amplitude", f"{target} within {within} either way"),
             ("Speed", f"{speeds} rpm"),
             ("Combinations", _combinations(found)),
             ("Loads", "; ".join(load.name or "empty" for load in duty.loads)),
@@ -217,10 +217,6 @@ def _combinations(found: Proposal) -> str:
     return f"{loads} of load and temperature, each at {corners} points of the scatter"
 
 
-def _mm(value: float) -> str:
-    return quantity(value, "mm", "m")
-
-
 def _field(name: str, value: float | None) -> str:
     one = FIELD[name]
     return quantity(value, one.file_unit, one.unit)
@@ -249,10 +245,8 @@ def _ends(one: Trial) -> list[str]:
 
 
 def _allowed(found: Proposal, name: str) -> str:
-    if name not in {field.name for field in LIMIT_FIELDS}:
-        return NOTHING
-    one = QUANTITIES[name]
-    return bounds(*limit_bounds(found.duty.bounds, name), one.shown_unit, one.unit)
+    limited = name in {field.name for field in LIMIT_FIELDS}
+    return allowed(found.duty.bounds, name) if limited else NOTHING
 
 
 def _price(found: Proposal, name: str) -> str:

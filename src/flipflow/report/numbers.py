@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from flipflow.io.units import in_unit
+from flipflow.model.limits import Limits, limit_bounds
 from flipflow.model.numerals import digits, rpm
-from flipflow.model.quantities import QUANTITIES
+from flipflow.model.quantities import QUANTITIES, Quantity
 
 NOTHING, NO_JUMP = "-", "no jump"
 LEAST_KILO = 100.0  # N or W; what is less is shown without kilo
@@ -39,11 +40,11 @@ def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool
     return f"{text} {shown_unit}".strip() if with_unit else text
 
 
-def named(name: str, value: float | None, *, with_unit: bool = True) -> str:
-    """The value of a registered quantity; a margin to a jump that does not exist says so."""
-    if name == "jump_margin" and value is not None and math.isinf(value):
+def named(one: str | Quantity, value: float | None, *, with_unit: bool = True) -> str:
+    """The value of a quantity; a margin to a jump that does not exist says so."""
+    one = QUANTITIES[one] if isinstance(one, str) else one
+    if one.name == "jump_margin" and value is not None and math.isinf(value):
         return NO_JUMP
-    one = QUANTITIES[name]
     return quantity(value, one.shown_unit, one.unit, with_unit=with_unit)
 
 
@@ -63,6 +64,12 @@ def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:
     if math.isfinite(high):
         return f"at most {end(high)} {shown_unit}".strip()
     return f"at least {end(low)} {shown_unit}".strip() if math.isfinite(low) else NOTHING
+
+
+def allowed(limits: Limits, name: str) -> str:
+    """What limits allow of a registered quantity, in words."""
+    one = QUANTITIES[name]
+    return bounds(*limit_bounds(limits, name), one.shown_unit, one.unit)
 
 
 def percent(share: float | None) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from flipflow.batch.reasons import FOUND
 from flipflow.compiled.arrays import Real
 from flipflow.model.fields import FIELD
-from flipflow.model.limits import Limits, limit_bounds
+from flipflow.model.limits import Limits
 from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES, Quantity, quantity_named
 from flipflow.model.screen import FlipFlowScreen
@@ -35,7 +35,7 @@ from flipflow.report.blocks import (
     Values,
     cells,
 )
-from flipflow.report.numbers import NOTHING, bounds, quantity
+from flipflow.report.numbers import NOTHING, allowed, named, quantity
 from flipflow.report.registry import Part, section
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import (
@@ -180,7 +180,7 @@ def yield_of_machines(found: Tolerance) -> Iterator[Block]:
         ),
     )  # fmt: skip
     rows = [
-        cells(QUANTITIES[name].label, _bounds(found, name), *_percents(found.by_limit[b]))
+        cells(QUANTITIES[name].label, allowed(found.limits, name), *_percents(found.by_limit[b]))
         for b, name in enumerate(found.checked)
     ]
     every = "all looked at" if left_out else "all"
@@ -217,7 +217,7 @@ def spread_table(found: Study) -> Table:
         for c, case in enumerate(found.cases):
             for words, values in _groups(found, one, c):
                 numbers = [_nominal(found, one, c, jumped=bool(words)), *_quantiles(values)]
-                texts = [_value(one, float(x)) for x in numbers]
+                texts = [named(one, float(x)) for x in numbers]
                 rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
     title = f"What the machines do{speed_in_words(found, found.omega[0])}"
     return Table(title, columns, tuple(rows), " ".join(_spread_words(found)))
@@ -265,13 +265,6 @@ def _groups(found: Study, one: Quantity, case: int) -> Iterator[tuple[str, Real]
     for words, side in (("", ~beyond), (", jumped", beyond)):
         if (known & side).any() or not words:
             yield words, values[known & side]
-
-
-def _value(one: Quantity, value: float) -> str:
-    """A value with its unit; a margin to a jump that does not exist says so."""
-    if one.name == "jump_margin" and np.isinf(value):
-        return "no jump"
-    return quantity(value, one.shown_unit, one.unit)
 
 
 def _quantiles(values: Real) -> list[float]:
@@ -327,11 +320,6 @@ def _cost_words(found: Tolerance, j: int) -> str:
         f" The tolerance of {name} costs most: half of it would bring the share to "
         f"{_share(found.halved[i, j])}."
     )
-
-
-def _bounds(found: Tolerance, name: str) -> str:
-    one = QUANTITIES[name]
-    return bounds(*limit_bounds(found.limits, name), one.shown_unit, one.unit)
 
 
 def _percents(shares: Real) -> list[str]:

@@ -90,8 +90,8 @@ def _table(cases: list[CaseAssessment]) -> Table:
             _millimetres(case.gaps.minus),
             contact(case.gaps.contact_plus, case.gaps.plus),
             contact(case.gaps.contact_minus, case.gaps.minus),
-            _kilo(case.gaps.force_plus),
-            _kilo(case.gaps.force_minus),
+            quantity(case.gaps.force_plus, "kN", "N", with_unit=False),
+            quantity(case.gaps.force_minus, "kN", "N", with_unit=False),
         )
         for case in cases
     )
@@ -112,7 +112,3 @@ def contact(omega: float | None, gap: float) -> str:
     if gap <= 0.0:
         return AT_REST
     return NOTHING if omega is None else rpm(omega)
-
-
-def _kilo(force: float | None) -> str:
-    return quantity(force, "kN", "N", with_unit=False)
