@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import html
-import os
 from dataclasses import dataclass
-from pathlib import Path
+from typing import ClassVar
 
-from flipflow.plotting.files import write_rendered
+from flipflow.plotting.files import Written
 from flipflow.plotting.palette import INK
 from flipflow.plotting.print import typeset
 
-FORMATS = (".html", ".svg", ".pdf")
 MARGIN = 6.0  # points; of a PDF
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
@@ -22,7 +20,7 @@ margin: 24px auto }} p {{ font-size: 13px }}</style></head>
 
 
 @dataclass(frozen=True)
-class Drawing:
+class Drawing(Written):
     """A drawing.
 
     Parameters
@@ -33,33 +31,11 @@ class Drawing:
         An SVG element.
     """
 
+    _FORMATS: ClassVar = (".html", ".svg", ".pdf")
+
     title: str
     caption: str
     svg: str
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the drawing to a file, in the format its ending names.
-
-        Parameters
-        ----------
-        path
-            ``.html``, ``.svg`` or ``.pdf``.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        InputError
-            For another ending.
-        StoreError
-            When the file cannot be written.
-        MissingExtra
-            When typst or matplotlib, which a PDF needs, is not installed.
-        """
-        return write_rendered(path, FORMATS, self._rendered)
 
     def _rendered(self, ending: str) -> bytes:
         if ending == ".svg":

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import ClassVar
 
-from flipflow.plotting.files import write_rendered
+from flipflow.plotting.files import Written
 from flipflow.plotting.layout import arrange, beside_panels
 from flipflow.plotting.panels import PanelGrid
 from flipflow.plotting.print import printed
@@ -14,12 +13,13 @@ from flipflow.plotting.print import printed
 COLUMN = 250.0  # pixels that a column of panels needs at least
 ASPECT, LOWEST = 0.66, 70.0  # height of a panel over its width, and its least height in pixels
 PAGE_HEIGHT = 870.0  # pixels, 230 mm: a figure and its caption on a page
-FORMATS = (".html", ".svg", ".pdf", ".png")
 
 
 @dataclass(frozen=True)
-class Figure(PanelGrid):
+class Figure(Written, PanelGrid):
     """A grid of panels that can be written to a file; its fields are those of the grid."""
+
+    _FORMATS: ClassVar = (".html", ".svg", ".pdf", ".png")
 
     def narrowed(self, width: float) -> Figure:
         """The same figure at another width in pixels, panels below each other where it is narrow.
@@ -34,31 +34,6 @@ class Figure(PanelGrid):
         was = arrange(self, even=False).rects[0].height
         each = min(was, ASPECT * widest, (PAGE_HEIGHT - beside) / rows)
         return replace(figure, height=round(beside + rows * max(each, LOWEST)))
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the figure to a file, in the format its ending names.
-
-        Parameters
-        ----------
-        path
-            ``.html`` is one interactive page that opens offline; ``.svg``, ``.pdf`` and ``.png``
-            are for print.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        InputError
-            For another ending.
-        StoreError
-            When the file cannot be written.
-        MissingExtra
-            When matplotlib, or typst for PDF and PNG, is needed and not installed.
-        """
-        return write_rendered(path, FORMATS, self._rendered)
 
     def _repr_svg_(self) -> str:
         """What a notebook shows."""

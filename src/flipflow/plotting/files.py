@@ -1,31 +1,51 @@
-"""A rendered figure or drawing as a file, in the format that the name's ending tells."""
+"""What is rendered as a file, in the format that the name's ending tells."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import ClassVar
 
 from flipflow.errors import InputError
 from flipflow.model.arguments import checked_path
 from flipflow.results.store import write_file
 
 
-def write_rendered(
-    path: str | os.PathLike[str], formats: Sequence[str], rendered: Callable[[str], bytes]
-) -> Path:
-    """Write what ``rendered`` makes for the path's ending, one of ``formats``; the file.
+class Written:
+    """Base of what can be written to a file; ``_FORMATS`` are the endings that it takes."""
 
-    Raises
-    ------
-    InputError
-        For another ending.
-    StoreError
-        When the file cannot be written.
-    """
-    target = checked_path("path", path)
-    ending = target.suffix.lower()
-    if ending not in formats:
-        raise InputError("path", str(path), f"give a name that ends in {', '.join(formats)}")
-    write_file(target, rendered(ending))
-    return target
+    _FORMATS: ClassVar[tuple[str, ...]]
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to a file, in the format its ending names.
+
+        Parameters
+        ----------
+        path
+            ``.html`` is one page that opens offline, interactive where it is a figure; ``.svg``,
+            ``.pdf`` and, of a figure, ``.png`` are for print.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            For another ending.
+        StoreError
+            When the file cannot be written.
+        MissingExtra
+            When matplotlib, or typst for PDF and PNG, is needed and not installed.
+        """
+        target = checked_path("path", path)
+        ending = target.suffix.lower()
+        if ending not in self._FORMATS:
+            remedy = f"give a name that ends in {', '.join(self._FORMATS)}"
+            raise InputError("path", str(path), remedy)
+        write_file(target, self._rendered(ending))
+        return target
+
+    def _rendered(self, ending: str) -> bytes:
+        raise NotImplementedError
