@@ -137,3 +137,8 @@ def test_shown_and_measured():
     assert measured("60 kg") == "kg"
     assert measured("60") is None
     assert measured("soft") is None
+
+
+def test_a_unit_that_no_file_has_is_its_own():
+    """As that of a least blow, which the report of a comparison tells."""
+    assert in_unit(12.5, "kg m/s", "kg m/s") == 12.5

@@ -182,13 +182,15 @@ def in_unit(value: float, unit: str, si_unit: str) -> float:
     value
         Value in ``si_unit``.
     unit, si_unit
-        A unit of the table, and the SI unit it belongs to.
+        A unit of the table, and the SI unit it belongs to; or twice an SI unit that no file has.
 
     Returns
     -------
     float
         The value in ``unit``.
     """
+    if unit == si_unit:
+        return value
     return (value - _OFFSET.get((si_unit, unit), 0.0)) / _UNITS[si_unit][2][unit]
 
 
