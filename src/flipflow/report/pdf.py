@@ -46,28 +46,13 @@ def pdf(result: Reported, paper: str = "a4", blocks: Sequence[Block] = ()) -> by
     MissingExtra
         When typst or matplotlib is not installed.
     """
-    return sheets(blocks or blocks_of(result), **head_of(result), paper=paper)
-
-
-def sheets(blocks: Sequence[Block], *, title: str, kind: str, footer: str, paper: str) -> bytes:
-    """Blocks as a PDF; the arguments are those of :func:`flipflow.report.html.page`.
-
-    Raises
-    ------
-    InputError
-        For a paper that is not known.
-    MissingExtra
-        When typst or matplotlib is not installed.
-    """
     name, height = PAPERS[checked_paper(paper)]
     report = {
-        "title": title,
-        "kind": kind,
-        "footer": footer,
+        **head_of(result),
         "paper": name,
         "longest": LONG,
         "short": SHORT,
-        "blocks": [_shown(block, height) for block in blocks],
+        "blocks": [_shown(block, height) for block in blocks or blocks_of(result)],
     }
     source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()
     compiled = require_typst()

@@ -45,20 +45,13 @@ def table_files(assessment: Assessment, blocks: Sequence[Block] = ()) -> dict[st
         When openpyxl is not installed.
     """
     blocks = blocks or blocks_of(assessment)
-    head = _report_sheet(head_of(assessment), blocks)
-    sheets = [head, *sheets_of(blocks), response_sheet(assessment)]
+    tables = (_sheet(block) for block in blocks if isinstance(block, Table))
+    sheets = [_report_sheet(head_of(assessment), blocks), *tables, response_sheet(assessment)]
     files: dict[str, bytes | str] = {BOOK: xlsx(sheets)}
     for sheet in sheets:
         name = _file_name(sheet.name, files)
         files[name] = csv_text(sheet.head, sheet.rows)
     return files
-
-
-def sheets_of(blocks: Sequence[Block]) -> Iterator[Sheet]:
-    """Every table among the blocks."""
-    for block in blocks:
-        if isinstance(block, Table):
-            yield _sheet(block)
 
 
 def response_sheet(assessment: Assessment) -> Sheet:
