@@ -10,6 +10,10 @@ the machine are the zeros of
     f(s) = |F(s, omega)| - 1,
 
 a fold is f_s = 0, a cusp f_s = f_ss = 0. Shooting must confirm each zero.
+
+F has poles, beside each of which two zeros may lie close together. With the determinant D of all
+those equations for z and F the numbers (F D, D) have none, so that whether |F| crosses 1 between
+two shares is asked of these: there |F D|^2 - D^2 changes its sign.
 """
 
 from __future__ import annotations
@@ -32,15 +36,15 @@ from flipflow.model.contact_law import NUMBER
 if TYPE_CHECKING:
     from flipflow.model.system import MechanicalSystem
 
-Homogeneous = tuple[float, float, float]  # F and 1 times a common factor
+Homogeneous = tuple[float, float, float]  # real and imaginary part of F D, and D
 PAPER = NUMBER["paper"]
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
 FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
 LAST_SHARE = 0.999  # of the contact; F grows without bound towards 1
-BULGE = 0.25  # of a second difference of F: how far the way between samples lies from the chord
-CLOSER = 8  # values that are looked at where F may cross the unit circle between two samples
+BULGE = 0.25  # of a second difference: how far the way between samples lies from the straight one
+CLOSER = 8  # values that are looked at where |F| may cross 1 between two samples
 INNER = 0.05, 0.95  # shares of a way within which the next value lies
 SHARP = 1e-14  # |f| of a zero, and the share within which it is
 ON_ZERO = 1e-10  # |f| from which a state is so near to the motion's that Newton confirms it at once
@@ -59,7 +63,7 @@ class TwoEvent(NamedTuple):
     begin: Real  # (2 N, 3) state at contact: constant, per real and per imaginary part of F
     end: Real  # (2 N, 3) the same at release
     z: Real  # (2 N,) state at contact, and at last at phase 0
-    size: Real  # (1,) determinant of the equations for z and F, which is smooth in s
+    size: Real  # (1,) D of the last F
 
 
 def new_two_event(machine: MachineArrays) -> TwoEvent:
@@ -276,7 +280,7 @@ def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float
         if not f * f_last > 0.0:
             zeros += 1
             low, high, f_low, f_high = s_last, s, f_last, f
-        elif _may_cross(before, last, here, f):
+        elif _may_cross(before, last, here):
             zeros += _zeros_within(machine, flow, work, omega, s_last, s, last, here)
         if zeros + free > 1:
             return math.nan
@@ -342,25 +346,25 @@ def _least_of_parabola(a: float, f_a: float, m: float, f_m: float, b: float, f_b
 
 
 @kernel
-def _may_cross(before: Homogeneous, start: Homogeneous, end: Homogeneous, f: float) -> bool:
+def _may_cross(before: Homogeneous, start: Homogeneous, end: Homogeneous) -> bool:
     """Whether |F| may cross 1, and again, on the way between two values on one side of it."""
     bend = 0.0
     for k in range(3):
         bend = max(bend, abs(end[k] - 2.0 * start[k] + before[k]))
     size = max(_length(start), _length(end))
-    side = 1.0 if f > 0.0 else -1.0
+    side = 1.0 if _square(end) > 0.0 else -1.0
     return _distance(start, end, side) < 2.0 * BULGE * bend * size
 
 
 @kernel(inline=True)
 def _homogeneous(F: complex, size: float) -> Homogeneous:
-    """F and 1, times the determinant of the equations for F: no value of s makes it infinite."""
+    """(F D, D) of F and D."""
     return F.real * size, F.imag * size, size
 
 
 @kernel(inline=True)
 def _square(one: Homogeneous) -> float:
-    """|F|^2 - 1 times the square of the determinant."""
+    """|F D|^2 - D^2."""
     return one[0] * one[0] + one[1] * one[1] - one[2] * one[2]
 
 
@@ -371,7 +375,7 @@ def _length(one: Homogeneous) -> float:
 
 @kernel
 def _nearest(start: Homogeneous, end: Homogeneous, side: float) -> float:
-    """Share of the straight way at which side (|F|^2 - 1) is least, times the determinant's."""
+    """Share of the straight way at which side (|F D|^2 - D^2) is least."""
     x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     slope = side * (start[0] * x + start[1] * y - start[2] * z)
     bend = side * (x * x + y * y - z * z)
