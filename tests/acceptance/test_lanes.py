@@ -401,3 +401,29 @@ def hard_screen(rng):
         clearance=10.0 ** rng.uniform(-3.5, -1.9),
     )  # fmt: skip
     return screen, speed
+
+
+def test_two_motions_close_to_each_other_beside_a_motion_without_contact_are_seen():
+    """A stop four hundred times as hard as the shear springs: D falls by decades on the way."""
+    screen = ff.FlipFlowScreen(
+        main_mass=2030.62267406446, floating_mass=652.8599114944125,
+        eccentric_moment=2.7243591371577893, isolation_stiffness=1361427.5380569184,
+        isolation_damping=6044.308967844074, shear_stiffness=7761829.187271713,
+        shear_damping=583.512508981107, stop_stiffness=3077249436.842557,
+        stop_damping=1674303.4615687293, clearance=0.007752872571855751,
+    )  # fmt: skip
+    omega = 152.989320707397
+    found = ff.study(screen, {"clearance": [screen.clearance] * 2}, "relative_amplitude", omega)
+    branch = ff.frequency_response(screen, (0.3 * omega, 1.001 * omega))
+    wanted = branch.orbit_from_below(omega).amplitude("relative")
+    close("from below", found.values["relative_amplitude"][0, 0, 0], wanted, rel=1e-8)
+
+
+@pytest.mark.parametrize("share", [1e-6, 1e-5, 1e-3])
+def test_just_below_its_fold_a_lane_has_not_jumped(screen, share):
+    fold = ff.frequency_response(screen, SPAN).folds[0]
+    orbit = ff.frequency_response(screen, SPAN).orbit_from_below((1.0 - share) * fold.omega)
+    asked = {"clearance": [screen.clearance] * 2}
+    found = ff.study(screen, asked, "relative_amplitude", orbit.omega, sampling="list")
+    amplitude = found.values["relative_amplitude"][0, 0, 0]
+    close("from below", amplitude, orbit.amplitude("relative"), rel=1e-6)

@@ -15,7 +15,7 @@ from rich.console import Console
 
 import flipflow as ff
 from flipflow.errors import MissingExtra, StoreError
-from flipflow.model.quantities import quantities_of
+from flipflow.model.quantities import QUANTITIES, quantities_of
 from flipflow.plotting.plotly import library
 from flipflow.report import first_page, summary, write_html
 from flipflow.report.blocks import Heading, Note, Table, Text, TitleBlock, Values, Verdict
@@ -88,7 +88,7 @@ def test_quantities_come_with_their_unit():
     assert [four_digits(value) for value in (12.9, 713.0, 1971.2, 25000.0)] == [
         "12.90", "713.0", "1971", "25000",
     ]  # fmt: skip
-    assert named("jump_margin", math.inf) == "no jump"
+    assert named(QUANTITIES["jump_margin"], math.inf) == "no jump"
     assert rpm(850.0 * math.pi / 30.0) == "850"
     assert speed(850.0 * math.pi / 30.0) == "850 rpm (14.17 Hz, 89.01 rad/s)"
 

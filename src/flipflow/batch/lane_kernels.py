@@ -82,7 +82,7 @@ def run_lanes(
     batch: MachineArrays, first: int, last: int, omega: Real, length: float, work: LaneWork,
     reading: ReadingWork, asked: Asked, found: Found, readings: Readings,
 ) -> None:  # fmt: skip
-    """Lanes ``first`` to ``last`` - 1 at frequencies (F,) in the order given.
+    """Lanes ``first`` to ``last`` - 1 at frequencies (F,), one or more, rising or falling.
 
     Rising frequencies are reached from below, falling ones from above.
     """

@@ -78,6 +78,15 @@ def lu_sign(A: NDArray[np.float64], pivot: NDArray[np.int64]) -> float:
 
 
 @kernel
+def lu_determinant(A: NDArray[np.float64], pivot: NDArray[np.int64]) -> float:
+    """Determinant of the factored matrix."""
+    determinant = lu_sign(A, pivot)
+    for k in range(A.shape[0]):
+        determinant *= abs(A[k, k])
+    return determinant
+
+
+@kernel
 def lu_spread(A: NDArray[np.float64], pivot: NDArray[np.int64], b: NDArray[np.float64]) -> float:
     """Size of the factored matrix's smallest eigenvalue, as a share of its largest pivot.
 

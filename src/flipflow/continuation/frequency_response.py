@@ -202,7 +202,8 @@ def first_unknowns(solver: Solver, omega: float) -> Real:
     """Unknowns of the motion at ``omega`` that is reached from below.
 
     Where no lower frequency touches a stop, it is the contact-free motion. Otherwise the branch is
-    followed up from the last motion without contact. Where there is none, the motion is that into
+    followed up from the last motion without contact, but where the scalar problem of one stop tells
+    that there is only one motion. Where no lower one is without contact, the motion is that into
     which the machine settles from rest; failing that, that on the branch which has no contact at
     some higher frequency; failing that, any.
     """
@@ -266,17 +267,19 @@ def _followed_up(solver: Solver, free: float, omega: float) -> Real | None:
 
 
 def _only_unknowns(solver: Solver, omega: float) -> Real | None:
-    """The only motion by half turns at ``omega``, at which every way up ends; None: not known."""
+    """The only motion at ``omega`` that touches once a half turn; None where there may be more."""
     if not isinstance(solver, ExactSolver) or not solver.half_turn:
         return None
     if not TwoEventProblem.applies(solver.system):
         return None
     share, only = TwoEventProblem(solver.machine, solver.flow).only(omega)
     found = solver.residual(only, omega) if share > 0.0 else None
-    # It does not repeat where there are other events than those assumed.
-    if found is None or np.abs(found[0]).max() > REPEATS * np.abs(only).max():
+    if found is None:
         return None
-    return only
+    lengths = np.repeat([1.0, 1.0 / omega], solver.system.size)
+    # It does not repeat where there are other events than those assumed.
+    same = np.abs(lengths * found[0]).max() <= REPEATS * np.abs(lengths * only).max()
+    return only if same else None
 
 
 def _led(solver: Solver, start: Real, begin: float, omega: float) -> Real | None:

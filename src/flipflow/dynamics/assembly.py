@@ -104,7 +104,7 @@ def stops_of(springs: Sequence[ClearanceSpring]) -> Stops:
     )
 
 
-def with_springs(system: MechanicalSystem, kept: list[int]) -> MechanicalSystem:
+def with_springs(system: MechanicalSystem, kept: Sequence[int]) -> MechanicalSystem:
     """A system with these springs, whatever their gaps; of the others those that always act."""
     others = [spring for j, spring in enumerate(system.springs) if j not in kept]
     rest = replace(system, springs=tuple(others)).with_bonded()

@@ -139,7 +139,7 @@ def stop_columns(system: MechanicalSystem, parameters: Sequence[Named]) -> dict[
 
 
 def _slopes(
-    system: MechanicalSystem, kept: list[int], own: dict[str, Real], one: Named
+    system: MechanicalSystem, kept: Sequence[int], own: dict[str, Real], one: Named
 ) -> dict[str, Real]:
     """Derivatives of all parts with respect to one parameter; ``own`` are the machine's own."""
     width = WIDTH * abs(one.value) or 1.0
@@ -196,7 +196,7 @@ def _quadratic_slope(
 
 
 def _parts_at(
-    system: MechanicalSystem, kept: list[int], one: Named, value: float
+    system: MechanicalSystem, kept: Sequence[int], one: Named, value: float
 ) -> dict[str, Real]:
     found = one.at(value)
     if _kind(found) != _kind(system):

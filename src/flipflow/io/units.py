@@ -182,7 +182,8 @@ def in_unit(value: float, unit: str, si_unit: str) -> float:
     value
         Value in ``si_unit``.
     unit, si_unit
-        A unit of the table, and the SI unit it belongs to; or twice an SI unit that no file has.
+        A unit of the table, and the SI unit it belongs to; or the same unit twice, which the table
+        need not have.
 
     Returns
     -------

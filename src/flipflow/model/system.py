@@ -222,9 +222,9 @@ class MechanicalSystem:
             )
 
     @property
-    def opening(self) -> list[int]:
+    def opening(self) -> tuple[int, ...]:
         """Numbers of the springs that open and close; motions know no others."""
-        return [j for j, spring in enumerate(self.springs) if spring.opens]
+        return tuple(j for j, spring in enumerate(self.springs) if spring.opens)
 
     def with_bonded(self) -> MechanicalSystem:
         """Return the same machine with springs that always act moved into C and K."""

@@ -311,9 +311,9 @@ class Solver(ABC):
         record = frequency_loop.new_branch(
             self.unknowns, len(self.springs), points, with_jacobian=False, to_follow=True
         )
-        code, points, _ = self._follow(record, u, omega, course)
+        code, count, _ = self._follow(record, u, omega, course)
         ahead = status.REACHED_UPPER if course.direction > 0.0 else status.REACHED_LOWER
-        return record.u[points - 1].copy() if code == ahead else None
+        return record.u[count - 1].copy() if code == ahead else None
 
     def new_branch(self, points: int, *, to_follow: bool = False) -> frequency_loop.Record:
         """An empty record for up to ``points`` points."""

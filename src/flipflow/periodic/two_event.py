@@ -26,7 +26,7 @@ import numpy as np
 from flipflow.compiled.arrays import Int, Real
 from flipflow.compiled.by_reference import by_reference
 from flipflow.compiled.compile import kernel
-from flipflow.compiled.dense import lu_factor, lu_sign, lu_solve
+from flipflow.compiled.dense import lu_determinant, lu_factor, lu_solve
 from flipflow.dynamics.contact_search import exponential
 from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow, new_flow, prepare_drive
@@ -36,19 +36,25 @@ from flipflow.model.contact_law import NUMBER
 if TYPE_CHECKING:
     from flipflow.model.system import MechanicalSystem
 
-Homogeneous = tuple[float, float, float]  # real and imaginary part of F D, and D
 PAPER = NUMBER["paper"]
 OPEN_SLOT, PLUS_SLOT = 0, 1  # numbers of the contact states: stop open, stop engaged
 MOST_ROOT_STEPS = 60  # steps of the search for one zero of f; twenty are usual
 SAMPLES = 48  # of the contact share, between which a zero of f is sought
-FEW_SAMPLES = 16  # of the contact share, where it is only asked how many zeros there are
-LAST_SHARE = 0.999  # of the contact; F grows without bound towards 1
-BULGE = 0.25  # of a second difference: how far the way between samples lies from the straight one
-CLOSER = 8  # values that are looked at where |F| may cross 1 between two samples
-INNER = 0.05, 0.95  # shares of a way within which the next value lies
+# Of the contact share, between which motions are counted. F grows without bound towards 1.
+FIRST_SHARE, LAST_SHARE = 1e-6, 0.999
+NARROWEST, NARROW, WIDEST = 1.0 / 512.0, 1.0 / 32.0, 1.0 / 16.0  # steps: least, first, greatest
+MOST_LOOKED = 64  # values of F on the way, beyond which no step is made shorter
 SHARP = 1e-14  # |f| of a zero, and the share within which it is
 ON_ZERO = 1e-10  # |f| from which a state is so near to the motion's that Newton confirms it at once
 MOST_MOTIONS = 8  # zeros of f that are kept at one frequency
+
+
+class Homogeneous(NamedTuple):
+    """F as homogeneous coordinates: real and imaginary part of F D, and D."""
+
+    x: float
+    y: float
+    w: float
 
 
 @by_reference
@@ -63,7 +69,7 @@ class TwoEvent(NamedTuple):
     begin: Real  # (2 N, 3) state at contact: constant, per real and per imaginary part of F
     end: Real  # (2 N, 3) the same at release
     z: Real  # (2 N,) state at contact, and at last at phase 0
-    size: Real  # (1,) D of the last F
+    determinant: Real  # (1,) D of the last F
 
 
 def new_two_event(machine: MachineArrays) -> TwoEvent:
@@ -79,7 +85,7 @@ def new_two_event(machine: MachineArrays) -> TwoEvent:
         begin=np.zeros((size, 3)),
         end=np.zeros((size, 3)),
         z=np.zeros(size),
-        size=np.zeros(1),
+        determinant=np.zeros(1),
     )
 
 
@@ -125,9 +131,7 @@ def required_force(
             work.A[r, c] = total
     if not lu_factor(work.A, work.pivot):
         return complex(math.nan, math.nan)
-    work.size[0] = lu_sign(work.A, work.pivot)
-    for r in range(size):
-        work.size[0] *= abs(work.A[r, r])
+    work.determinant[0] = lu_determinant(work.A, work.pivot)
     for part in range(3):
         _solve_begin(flow, work, turn, part)
     return _solve_force(machine, work, s * half)
@@ -189,7 +193,7 @@ def _solve_force(machine: MachineArrays, work: TwoEvent, touch: float) -> comple
         next1 += d * (work.end[k, 1] - work.begin[k, 1]) / touch
         next2 += d * (work.end[k, 2] - work.begin[k, 2]) / touch
     det = first1 * next2 - first2 * next1
-    work.size[0] *= det
+    work.determinant[0] *= det
     a = (first2 * next0 - first0 * next2) / det
     b = (first0 * next1 - first1 * next0) / det
     for k in range(work.z.shape[0]):
@@ -259,37 +263,36 @@ def two_event_states(
 def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float) -> float:
     """Share of contact of the only motion at omega, its state at phase 0 into work.z.
 
-    0 stands for the motion without contact, the limit of these motions. NaN where there are more.
-    Where |F| comes so near to 1 between samples that two zeros may be missed, it is looked at more
-    closely.
+    0 stands for the motion without contact, the limit of these motions. NaN where there are more,
+    or may be.
     """
     if not has_two_events(machine):
         return math.nan
-    s, s_last = 0.5 / FEW_SAMPLES, 0.0
-    F = required_force(machine, flow, work, omega, s)
-    here = _homogeneous(F, work.size[0])
-    without_contact = 0j
-    for k in range(machine.direction.shape[1]):
-        without_contact += machine.direction[0, k] * flow.drive[OPEN_SLOT, 0, k]
-    free_force = machine.stops.gap[0, 0] / without_contact
-    last = _homogeneous(free_force, work.size[0])
-    free, zeros, low, high, f_low, f_high = _excess(free_force) > 0.0, 0, 0.0, 0.0, 0.0, 0.0
-    f_last, before = _excess(free_force), last
-    for k in range(FEW_SAMPLES + 1):
-        f = _excess(F)
-        if not f * f_last > 0.0:
-            zeros += 1
-            low, high, f_low, f_high = s_last, s, f_last, f
-        elif _may_cross(before, last, here):
-            zeros += _zeros_within(machine, flow, work, omega, s_last, s, last, here)
-        if zeros + free > 1:
+    s, s_before, step = FIRST_SHARE, 0.5 * NARROW, NARROW
+    here = _homogeneous(machine, flow, work, omega, s)
+    before = _homogeneous(machine, flow, work, omega, s_before)
+    free = _square(here) > 0.0
+    count, low, high, f_low, f_high = 1 if free else 0, 0.0, 0.0, 0.0, 0.0
+    looked = 0
+    while s < LAST_SHARE:
+        looked += 1
+        end = min(s + step, LAST_SHARE)
+        ahead = _homogeneous(machine, flow, work, omega, end)
+        bulge = _bend(before, here, ahead, s - s_before, end - s) * (end - s) ** 2
+        changes = (_square(here) > 0.0) != (_square(ahead) > 0.0)
+        if not _is_told(here, ahead, changes, bulge):
+            if end - s > NARROWEST and looked < MOST_LOOKED:
+                step = 0.5 * (end - s)
+                continue
+            if not changes:
+                return math.nan
+        if changes:
+            count += 1
+            low, high, f_low, f_high = s, end, _excess_of(here), _excess_of(ahead)
+        if count > 1:
             return math.nan
-        before, last, f_last, s_last = last, here, f, s
-        if k < FEW_SAMPLES:
-            s = min((k + 1.5) / FEW_SAMPLES, LAST_SHARE)
-            F = required_force(machine, flow, work, omega, s)
-            here = _homogeneous(F, work.size[0])
-    if free or zeros == 0:
+        before, s_before, here, s, step = here, s, ahead, end, min(2.0 * step, WIDEST)
+    if free or count == 0:
         return 0.0 if free else math.nan
     share = root_between(machine, flow, work, omega, low, high, f_low, f_high, ON_ZERO)
     F = required_force(machine, flow, work, omega, share)
@@ -303,94 +306,59 @@ def only_share(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float)
     return only_motion(machine, flow, work, omega)
 
 
-@kernel
-def _zeros_within(
-    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, a: float, b: float,
-    start: Homogeneous, end: Homogeneous,
-) -> int:  # fmt: skip
-    """Two where |F| lies on the other side of 1 between two shares, else none.
-
-    It is sought where the straight way comes nearest to that, then where parabolas through the
-    last three values do. One that is least outside lies in the next pair of shares, if in any.
-    """
-    side = 1.0 if _square(start) > 0.0 else -1.0
-    f_a, f_b = side * _square(start), side * _square(end)
-    m, f_m = a, math.inf
-    x = a + min(max(_nearest(start, end, side), INNER[0]), INNER[1]) * (b - a)
-    for _ in range(CLOSER):
-        F = required_force(machine, flow, work, omega, x)
-        f = side * _square(_homogeneous(F, work.size[0]))
-        if not f > 0.0:
-            return 2
-        if m == a:
-            m, f_m = x, f
-        elif (f < f_m) == (x < m):
-            b, f_b = (m, f_m) if f < f_m else (x, f)
-        else:
-            a, f_a = (m, f_m) if f < f_m else (x, f)
-        if f < f_m:
-            m, f_m = x, f
-        x = _least_of_parabola(a, f_a, m, f_m, b, f_b)
-        if not a < x < b or x == m:
-            return 0
-    return 0
-
-
 @kernel(inline=True)
-def _least_of_parabola(a: float, f_a: float, m: float, f_m: float, b: float, f_b: float) -> float:
-    """Where the parabola through three values is least; NaN where it has no least."""
-    left, right = (m - a) * (f_m - f_b), (b - m) * (f_m - f_a)
-    if not left + right < 0.0:
-        return math.nan
-    return m - 0.5 * ((m - a) * left - (b - m) * right) / (left + right)
-
-
-@kernel
-def _may_cross(before: Homogeneous, start: Homogeneous, end: Homogeneous) -> bool:
-    """Whether |F| may cross 1, and again, on the way between two values on one side of it."""
-    bend = 0.0
-    for k in range(3):
-        bend = max(bend, abs(end[k] - 2.0 * start[k] + before[k]))
-    size = max(_length(start), _length(end))
-    side = 1.0 if _square(end) > 0.0 else -1.0
-    return _distance(start, end, side) < 2.0 * BULGE * bend * size
-
-
-@kernel(inline=True)
-def _homogeneous(F: complex, size: float) -> Homogeneous:
-    """(F D, D) of F and D."""
-    return F.real * size, F.imag * size, size
+def _homogeneous(
+    machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float, s: float
+) -> Homogeneous:
+    F = required_force(machine, flow, work, omega, s)
+    D = work.determinant[0]
+    return Homogeneous(F.real * D, F.imag * D, D)
 
 
 @kernel(inline=True)
 def _square(one: Homogeneous) -> float:
     """|F D|^2 - D^2."""
-    return one[0] * one[0] + one[1] * one[1] - one[2] * one[2]
+    return one.x * one.x + one.y * one.y - one.w * one.w
 
 
 @kernel(inline=True)
-def _length(one: Homogeneous) -> float:
-    return math.sqrt(one[0] * one[0] + one[1] * one[1] + one[2] * one[2])
+def _excess_of(one: Homogeneous) -> float:
+    """|F| - 1."""
+    return math.hypot(one.x, one.y) / abs(one.w) - 1.0
+
+
+@kernel(inline=True)
+def _bend(
+    before: Homogeneous, here: Homogeneous, ahead: Homogeneous, back: float, on: float
+) -> float:
+    """Half the size of the second derivative through three values."""
+    x = (ahead.x - here.x) / on - (here.x - before.x) / back
+    y = (ahead.y - here.y) / on - (here.y - before.y) / back
+    w = (ahead.w - here.w) / on - (here.w - before.w) / back
+    return math.sqrt(x * x + y * y + w * w) / abs(on + back)
 
 
 @kernel
-def _nearest(start: Homogeneous, end: Homogeneous, side: float) -> float:
-    """Share of the straight way at which side (|F D|^2 - D^2) is least."""
-    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-    slope = side * (start[0] * x + start[1] * y - start[2] * z)
-    bend = side * (x * x + y * y - z * z)
-    if bend > 0.0:
-        return min(max(-slope / bend, 0.0), 1.0)
-    return 0.0 if side * _square(start) < side * _square(end) else 1.0
+def _is_told(start: Homogeneous, end: Homogeneous, changes: bool, bulge: float) -> bool:
+    """Whether |F| crosses 1 between two values once where their sides differ, else never.
 
-
-@kernel
-def _distance(start: Homogeneous, end: Homogeneous, side: float) -> float:
-    """That least value."""
-    share = _nearest(start, end, side)
-    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-    at = start[0] + share * x, start[1] + share * y, start[2] + share * z
-    return side * _square(at)
+    The straight way between them, which (F D, D) leaves by no more than the bulge, has to keep
+    its distance from |F| = 1, or to cross it more steeply than a way of that bulge turns.
+    """
+    x, y, w = end.x - start.x, end.y - start.y, end.w - start.w
+    slope = 2.0 * (start.x * x + start.y * y - start.w * w)
+    curve = x * x + y * y - w * w  # |F D|^2 - D^2 is its value at the start + slope t + curve t^2
+    largest = max(start.x**2 + start.y**2 + start.w**2, end.x**2 + end.y**2 + end.w**2)
+    margin = 2.0 * bulge * math.sqrt(2.0 * largest)
+    if changes:
+        steepest = slope if abs(slope) < abs(slope + 2.0 * curve) else slope + 2.0 * curve
+        return slope * (slope + 2.0 * curve) > 0.0 and abs(steepest) > 4.0 * margin
+    side = 1.0 if _square(start) > 0.0 else -1.0
+    least = min(side * _square(start), side * _square(end))
+    down, up = -side * slope, side * curve
+    if 0.0 < down < 2.0 * up:
+        least = side * _square(start) - 0.25 * down * down / up
+    return least > margin
 
 
 @kernel
@@ -459,8 +427,8 @@ class TwoEventProblem:
     def only(self, omega: float) -> tuple[float, Real]:
         """Share of contact of the only motion at ``omega``, and its state at t = 0, (2 N,).
 
-        The share is NaN where there may be more motions, and 0 where that one has no contact; the
-        state is neither's.
+        The share is NaN where there are more motions, or may be, and 0 where that one has no
+        contact; the state has no meaning then.
         """
         share = only_share(self._machine, self._flow, self._work, omega)
         return share, self._work.z.copy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import ClassVar
 
@@ -11,13 +12,13 @@ from flipflow.model.arguments import checked_path
 from flipflow.results.store import write_file
 
 
-class Written:
+class Written(ABC):
     """Base of what can be written to a file; ``_FORMATS`` are the endings that it takes."""
 
     _FORMATS: ClassVar[tuple[str, ...]]
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write it to a file, in the format its ending names.
+        """Write the picture to a file, in the format that the file's ending names.
 
         Parameters
         ----------
@@ -47,5 +48,5 @@ class Written:
         write_file(target, self._rendered(ending))
         return target
 
-    def _rendered(self, ending: str) -> bytes:
-        raise NotImplementedError
+    @abstractmethod
+    def _rendered(self, ending: str) -> bytes: ...

@@ -132,7 +132,7 @@ def cell_edges(middles: Real) -> Real:
 class Bar:
     """A horizontal bar from ``low`` to ``high`` at height ``y``; ``thickness`` in units of y.
 
-    Beside it stands ``text``, or the numbers of its ``ends``.
+    Beside it stands ``text``; the numbers of its ends, in the unit of the axis, where ``ends``.
     """
 
     name: str

@@ -175,7 +175,7 @@ def _quantities(title: str, cases: Sequence[CaseAssessment], *, explained: bool)
     columns = (Column("Quantity"), Column("Symbol"), *(Column(c.name, numeric=True) for c in cases))
     rows = []
     for one in quantities_of("motion"):
-        values = [named(one.name, case.values.get(one.name)) for case in cases]
+        values = [named(one, case.values.get(one.name)) for case in cases]
         label = capitalized(one.label)
         sentence = one.sentence if explained else ""
         rows.append((Cell(label, sentence), Cell(one.symbol), *cells(*values)))

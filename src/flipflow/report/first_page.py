@@ -335,7 +335,7 @@ def limit_cells(row: LimitRow) -> tuple[Cell, ...]:
     if row.name == "speed" and row.worst is not None:
         worst = f"{rpm(row.worst)} rpm"
     if row.name == "jump_margin":
-        worst = named(row.name, row.worst)
+        worst = named(QUANTITIES[row.name], row.worst)
     case = row.reason if row.worst is None else row.case
     if row.name == "speed" and row.worst is not None:
         case = "all"
@@ -355,7 +355,7 @@ def _case_row(case: CaseAssessment) -> tuple[Cell, ...]:
     word = "" if case.orbit.stable else f"the motion {RETURNS[case.orbit.stability]}"
     row = [Cell(case.name, word)]
     for name, _ in CASE_COLUMNS:
-        text = named(name, case.values.get(name), with_unit=False)
+        text = named(QUANTITIES[name], case.values.get(name), with_unit=False)
         if name == "stop_force" and not case.stop_reached:
             text = "not reached" if case.screen.has_stop else "no stop"
         row.append(Cell(text))
@@ -375,7 +375,7 @@ def _line(assessment: Assessment, *names: str, lowest: bool = False) -> str:
     if first == "stop_force" and not case.stop_reached:
         return "stop not reached" if case.screen.has_stop else "no stops fitted"
     parts = [
-        f"{QUANTITIES[name].label} {named(name, case.values[name])}"
+        f"{QUANTITIES[name].label} {named(QUANTITIES[name], case.values[name])}"
         for name in names
         if case.values.get(name) is not None
     ]

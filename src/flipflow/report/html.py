@@ -68,9 +68,9 @@ def write_html(assessment: Assessment, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def html(result: Reported, blocks: Sequence[Block] = ()) -> str:
+def html(result: Reported, blocks: Sequence[Block] | None = None) -> str:
     """The report of a result as text; ``blocks`` are those of the result, where they are made."""
-    return page(blocks or blocks_of(result), **head_of(result))
+    return page(blocks_of(result) if blocks is None else blocks, **head_of(result))
 
 
 def head_of(result: Reported) -> Head:

@@ -40,9 +40,8 @@ def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool
     return f"{text} {shown_unit}".strip() if with_unit else text
 
 
-def named(one: str | Quantity, value: float | None, *, with_unit: bool = True) -> str:
+def named(one: Quantity, value: float | None, *, with_unit: bool = True) -> str:
     """The value of a quantity; a margin to a jump that does not exist says so."""
-    one = QUANTITIES[one] if isinstance(one, str) else one
     if one.name == "jump_margin" and value is not None and math.isinf(value):
         return NO_JUMP
     return quantity(value, one.shown_unit, one.unit, with_unit=with_unit)

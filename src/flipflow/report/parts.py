@@ -93,7 +93,7 @@ def _row(assessment: Assessment, cases: list[CaseAssessment], one: PartRow) -> t
         missing = missing_words(quantity.missing(assessment.project.screen))
         return Cell(one.part), Cell(label), Cell(NOTHING), Cell(missing), formula
     value, case = worst
-    return Cell(one.part), Cell(label), Cell(named(one.name, value)), Cell(case.name), formula
+    return Cell(one.part), Cell(label), Cell(named(quantity, value)), Cell(case.name), formula
 
 
 def worst_of(

@@ -27,7 +27,7 @@ ROOM = 75  # characters beside the widest column of a table
 TEMPLATE = "report.typ"
 
 
-def pdf(result: Reported, paper: str = "a4", blocks: Sequence[Block] = ()) -> bytes:
+def pdf(result: Reported, paper: str = "a4", blocks: Sequence[Block] | None = None) -> bytes:
     """The report of a result as a PDF.
 
     Parameters
@@ -47,12 +47,13 @@ def pdf(result: Reported, paper: str = "a4", blocks: Sequence[Block] = ()) -> by
         When typst or matplotlib is not installed.
     """
     name, height = PAPERS[checked_paper(paper)]
+    shown = blocks_of(result) if blocks is None else blocks
     report = {
         **head_of(result),
         "paper": name,
         "longest": LONG,
         "short": SHORT,
-        "blocks": [_shown(block, height) for block in blocks or blocks_of(result)],
+        "blocks": [_shown(block, height) for block in shown],
     }
     source = (resources.files("flipflow.report") / "templates" / TEMPLATE).read_bytes()
     compiled = require_typst()

@@ -34,7 +34,9 @@ LISTED = (
 )  # fmt: skip
 
 
-def table_files(assessment: Assessment, blocks: Sequence[Block] = ()) -> dict[str, bytes | str]:
+def table_files(
+    assessment: Assessment, blocks: Sequence[Block] | None = None
+) -> dict[str, bytes | str]:
     """All tables of a report, and the response, by the name of the file: one XLSX, and CSV.
 
     ``blocks`` are those of the assessment, where they are made.
@@ -44,7 +46,7 @@ def table_files(assessment: Assessment, blocks: Sequence[Block] = ()) -> dict[st
     MissingExtra
         When openpyxl is not installed.
     """
-    blocks = blocks or blocks_of(assessment)
+    blocks = blocks_of(assessment) if blocks is None else blocks
     tables = (_sheet(block) for block in blocks if isinstance(block, Table))
     sheets = [_report_sheet(head_of(assessment), blocks), *tables, response_sheet(assessment)]
     files: dict[str, bytes | str] = {BOOK: xlsx(sheets)}

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flipflow import __version__
+from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
 from flipflow.continuation.correction import QUICK, Course
 from flipflow.continuation.field_solver import FieldSolver
@@ -339,13 +340,16 @@ class _OverField(_Passing):
         if start == end:
             return point
         periods = point.formulation.turns
-        solver: FieldSolver | None = self._solver(periods)
-        u: Real | None = point.u
+        solver, u = self._solver(periods), point.u
         if solver is not None:
             low, high = sorted((start, end))
             course = Course(low, high, high - low, STEP_SHARE, np.sign(end - start), QUICK)
-            u = solver.end_of_branch(point.u, start, course)
-        return None if u is None else settling.solver_of(periods).solve(u, self.speed)
+            traced = solver.trace(u, start, course)
+            reached = traced.code in (status.REACHED_UPPER, status.REACHED_LOWER)
+            if not reached or traced.omega[-1] != end:
+                return None
+            u = traced.u[-1]
+        return settling.solver_of(periods).solve(u, self.speed)
 
     def _solver(self, periods: int) -> FieldSolver | None:
         """The solver that follows motions over the parameter; None where it has a kink."""

@@ -164,9 +164,12 @@ class TiltedMotion:
 
     def peak(self, vector: Vector) -> Complex:
         """Greatest length of a vector in SI, both directions together."""
-        forces = {"foundation": self._on_foundation, "shear": self._shear, "bearing": self._bearing}
-        if vector in forces:
-            return self._peak(forces[vector]())
+        if vector == "foundation":
+            return self._peak(self._on_foundation())
+        if vector == "shear":
+            return self._peak(self._shear())
+        if vector == "bearing":
+            return self._peak(self._bearing())
         degree, normal = FRAMES.index(vector), self._normal
         return self._peak(lambda path: _length(path.a[:, degree], normal.acceleration(path)))
 
