@@ -268,7 +268,7 @@ def only_motion(machine: MachineArrays, flow: Flow, work: TwoEvent, omega: float
     """
     if not has_two_events(machine):
         return math.nan
-    s, s_before, step = FIRST_SHARE, 0.5 * NARROW, NARROW
+    s, s_before, step = FIRST_SHARE, 0.75 * NARROW, NARROW  # no half of a step ends there
     here = _homogeneous(machine, flow, work, omega, s)
     before = _homogeneous(machine, flow, work, omega, s_before)
     free = _square(here) > 0.0
