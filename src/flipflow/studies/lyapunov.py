@@ -145,7 +145,7 @@ def lyapunov_exponents(
     order = np.argsort(-found.exponents, kind="stable")
     # The flow knows only springs that can open and close.
     share = np.array([1.0 if spring.bonded else 0.0 for spring in system.springs])
-    share[system.opening] = found.contact_share
+    share[list(system.opening)] = found.contact_share
     return LyapunovExponents(
         machine, speed, found.exponents[order], found.standard_error[order], share,
         found.word(settling), periods, skip, found.batches[:, order], found.recent[-1].copy(),
