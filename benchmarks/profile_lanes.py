@@ -39,15 +39,15 @@ from flipflow.dynamics.modes import prepare
 from flipflow.dynamics.multiplier_slopes import multiplier_slopes
 from flipflow.dynamics.parameter_tangent import carry_starts
 from flipflow.periodic.shooting import shoot
-from flipflow.periodic.solver import characteristic_length
+from flipflow.periodic.two_event import only_motion
 
 ROUNDS = 7
 SPEEDS = 28  # that a lane has behind it, as close as in lanes.py
 STAGES = (
     "modes of two contact states", "flow over half a turn, with tangent", "Newton's step: that",
-    "multipliers", "guess through the last motions", "readings",
+    "multipliers", "guess through the last motions", "readings", "whether there is one motion",
 )  # fmt: skip
-MODES, FLOW, STEP, MULTIPLIERS, GUESS, READINGS = range(len(STAGES))
+MODES, FLOW, STEP, MULTIPLIERS, GUESS, READINGS, ONLY = range(len(STAGES))
 OF_SLOPES = (
     "flow alone", "derivatives over its segments", "derivatives of states: those, and the rest",
     "of readings", "of multipliers",
@@ -70,6 +70,8 @@ def repeated(stage, repeats, machine, length, omega, work, reading, asked, readi
             largest_multiplier(work, omega)
         elif stage == GUESS:
             predict(work, 1.01 * omega)
+        elif stage == ONLY:
+            only_motion(machine, flow, work.touch, omega)
         elif stage == READINGS:
             read_lane(machine, flow, reading, asked, omega, turn, half, readings, 0, 0)
         else:
@@ -125,7 +127,6 @@ def main():
     screen = ff.load("ffs0827")
     system = screen.system().with_bonded()
     machine = machine_arrays(system)
-    length = characteristic_length(system, machine)
     omega = np.linspace(given.omega - SPEEDS, given.omega, SPEEDS)
     asked = nothing_asked(2, omega.size)._replace(coordinate=np.array([[1.0, -1.0]]))
     (batch,), _ = batches(screen, {"clearance": np.array([screen.clearance])})
@@ -134,7 +135,7 @@ def main():
     found = new_found(1, omega.size, system.size, NOT_COMPUTED)
     readings = new_readings(1, omega.size, machine, asked)
     run_lanes(
-        batch.arrays, 0, 1, omega, length, work, reading, asked, found, readings,
+        batch.arrays, 0, 1, omega, batch.length, work, reading, asked, found, readings,
     )  # fmt: skip
     assert (found.reason == FOUND).all()
     assert readings.share[0, -1, 0] > 0.0
@@ -144,7 +145,7 @@ def main():
             stage,
             given.repeats,
             lambda stage, repeats: repeated(
-                stage, repeats, machine, length, given.omega, work, reading, asked, readings
+                stage, repeats, machine, batch.length, given.omega, work, reading, asked, readings
             ),
         )
     columns = {name: np.array([getattr(screen, name)]) for name in FIELDS}
@@ -162,7 +163,7 @@ def main():
                 stage,
                 repeats,
                 machine,
-                length,
+                batch.length,
                 given.omega,
                 z,
                 mu,

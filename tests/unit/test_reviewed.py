@@ -520,3 +520,23 @@ def test_a_spring_without_stiffness_and_gap_never_has_a_force():
     assert orbit.contact_share(0) == 0.0 < orbit.contact_share(1)
     assert orbit.stop_force_peak(0) == 0.0
     assert ff.lyapunov_exponents(machine, 1.2, periods=100).contact_share[0] == 0.0
+
+
+def test_variants_have_the_damping_that_the_machine_itself_lacks():
+    """The length of what is short was read off arrays, which need damping."""
+    bare = replace(plain_machine(), C=np.zeros((1, 1)))
+    (batch,), allowed = batches(Damped(bare), {"damping": np.array([0.1, 0.2])})
+    assert allowed.all()
+    assert batch.length == 0.4
+
+
+@dataclass(frozen=True)
+class Damped:
+    """A machine whose damping varies, from none."""
+
+    bare: ff.MechanicalSystem
+    damping: float = 0.0
+
+    def system(self):
+        """The machine with its damping."""
+        return replace(self.bare, C=np.full((1, 1), self.damping))

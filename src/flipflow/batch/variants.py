@@ -89,8 +89,7 @@ def batches(machine: Machine, columns: Columns) -> tuple[list[Batch], Bool]:
     for name, column in columns.items():
         if column.dtype.kind == "f" and name in FIELD and isinstance(machine, FlipFlowScreen):
             allowed &= FIELD[name].allows(column)
-    system = machine.system().with_bonded()
-    length = characteristic_length(system, machine_arrays(system))
+    length = characteristic_length(machine.system().with_bonded())
     found, left = [], allowed.copy()
     # What a user's own class refuses only its ``system()`` tells.
     if isinstance(machine, Own):

@@ -19,7 +19,6 @@ from flipflow.compiled.interruptible import interruptible
 from flipflow.continuation import correction, frequency_loop
 from flipflow.continuation.refinement import FOLD, TRACE_ALL, follow
 from flipflow.dynamics.assembly import machine_arrays
-from flipflow.dynamics.equation_of_motion import MachineArrays
 from flipflow.dynamics.flow import Flow
 from flipflow.dynamics.motion import Motion
 from flipflow.errors import IncompleteError, InputError
@@ -225,7 +224,7 @@ class Solver(ABC):
         self.half_turn, self.turns = half_turn, turns
         self.machine = machine_arrays(self.system)
         self.rest = resting_position(self.system)
-        length = characteristic_length(self.system, self.machine)
+        length = characteristic_length(self.system)
         self.length = min([length, *pressed_depths(self.system, self.rest)])
 
     @property
@@ -513,15 +512,16 @@ def pressed_depths(system: MechanicalSystem, rest: Real) -> Iterator[float]:
             yield depth
 
 
-def characteristic_length(system: MechanicalSystem, machine: MachineArrays) -> float:
+def characteristic_length(system: MechanicalSystem) -> float:
     """The smallest gap in m that is not zero, else the stroke that the force alone would give."""
     gaps = [abs(gap) for spring in system.springs for gap in spring.gaps]
     known = [gap for gap in gaps if 0.0 < gap < math.inf]
     if known:
         return min(known)
-    unbalances = machine.push[machine.power == 2]
-    if unbalances.size:
-        return float(np.abs(unbalances).max()) or 1.0
+    terms = [term for one in system.excitations for term in one.terms]
+    unbalances = [vector for power, vector in terms if power == 2]
+    if unbalances:
+        return float(np.abs(np.linalg.solve(system.M, np.transpose(unbalances))).max()) or 1.0
     forces = [np.abs(one.vector) for one in system.excitations]
     held = np.linalg.lstsq(system.K, np.sum([*forces, np.abs(system.constant_force)], axis=0))[0]
     return float(np.abs(held).max()) or 1.0
