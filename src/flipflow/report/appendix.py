@@ -12,7 +12,15 @@ from flipflow.model.numerals import rpm
 from flipflow.plotting.curves import Curve, is_jump
 from flipflow.plotting.palette import STABILITY_WORDS
 from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Values, cells
-from flipflow.report.numbers import four_digits, multiplier, number, quantity
+from flipflow.report.numbers import (
+    NOTHING,
+    four_digits,
+    multiplier,
+    number,
+    quantity,
+    rpm_range,
+    written,
+)
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
 
@@ -116,14 +124,14 @@ def method(assessment: Assessment) -> Iterator[Block]:
 def _branch_row(name: str, branch: Branch) -> tuple[Cell, ...]:
     omega = branch.omega
     if omega.size == 0:
-        return cells(name, "-", "0", "-", "-", branch.status.value)
+        return cells(name, NOTHING, written(0, "d"), NOTHING, NOTHING, branch.status.value)
     unstable = int((branch.stability == "unstable").sum())
     median = float(np.median(branch.error))
     return cells(
         name,
-        f"{rpm(float(omega.min()))} to {rpm(float(omega.max()))}",
-        str(omega.size),
-        str(unstable),
+        rpm_range(float(omega.min()), float(omega.max())),
+        written(omega.size, "d"),
+        written(unstable, "d"),
         _error(median),
         branch.status.value,
     )
@@ -171,4 +179,4 @@ def _motion_rows(case: CaseAssessment) -> Iterator[tuple[Cell, ...]]:
 
 
 def _error(error: float) -> str:
-    return f"{1e3 * error:.1e}" if np.isfinite(error) else "no promise"
+    return written(1e3 * error, ".1e") if np.isfinite(error) else "no promise"

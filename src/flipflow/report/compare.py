@@ -23,7 +23,16 @@ from flipflow.report.blocks import (
     Verdict,
     cells,
 )
-from flipflow.report.numbers import NO_JUMP, NOTHING, number, percent, quantity
+from flipflow.report.numbers import (
+    NO_JUMP,
+    NOTHING,
+    Measured,
+    in_rpm,
+    number,
+    percent,
+    quantity,
+    signed,
+)
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
 from flipflow.studies.assessment import Assessment
@@ -155,7 +164,7 @@ def _value(row: ResultChange, value: float | None) -> str:
     if row.name.startswith(MARGIN):
         return "no end" if math.isinf(value) else percent(value)
     if row.shown_unit == "rpm":
-        return f"{rpm(value)} rpm"
+        return in_rpm(value, with_unit=True)
     return quantity(value, row.shown_unit, row.unit)
 
 
@@ -164,15 +173,15 @@ def _change(row: ResultChange, k: int) -> str:
     if change is None or math.isnan(change):
         return NOTHING
     if not row.changes or change == 0.0:
-        return "0"
-    sign = "+" if change > 0.0 else "-"
+        return number(0.0)
     if math.isinf(change):
-        return NOTHING if row.name.endswith(JUMP) else f"{sign}infinite"
-    unit = row.shown_unit
+        return NOTHING if row.name.endswith(JUMP) else f"{'+' if change > 0.0 else '-'}infinite"
     if row.name.startswith(MARGIN):
-        return f"{sign}{number(100.0 * abs(change))} %"
+        return percent(change)
+    unit = row.shown_unit
     zero = in_unit(0.0, unit, row.unit)  # a difference of temperatures has no offset
-    return f"{sign}{number(in_unit(abs(change), unit, row.unit) - zero)} {unit}".strip()
+    difference = in_unit(change, unit, row.unit) - zero
+    return Measured(f"{signed(difference)} {unit}".strip(), difference, unit=unit)
 
 
 def _given(one: InputDifference, value: Given) -> str:
@@ -182,7 +191,8 @@ def _given(one: InputDifference, value: Given) -> str:
         return value
     if math.isinf(value):
         return "infinite"
-    return shown(value, one.shown_unit, one.unit)
+    text, unit = shown(value, one.shown_unit, one.unit), one.shown_unit
+    return Measured(text, in_unit(value, unit, one.unit), unit=unit)
 
 
 def summary_table(names: Sequence[str], found: Sequence[Assessment]) -> Table:
@@ -199,12 +209,12 @@ def _summary_row(name: str, one: Assessment) -> tuple[Cell, ...]:
     allowed = "; ".join(f"{rpm(low)} to {rpm(high)}" for low, high in one.region.feasible)
     judged = [row for row in one.limits_table if row.margin is not None]
     tightest = min(judged, key=lambda row: row.margin or 0.0, default=None)
-    speed = NOTHING if one.omega is None else rpm(one.omega)
     label, case, margin = NOTHING, "", NOTHING
     if tightest is not None:
         label, margin = QUANTITIES[tightest.name].label, percent(tightest.margin)
         case = "" if tightest.name == "speed" else case_words(tightest.case)
     return (
-        Cell(name), Cell(one.state, state=one.state), Cell(speed), Cell(allowed or "none"),
+        Cell(name), Cell(one.state, state=one.state), Cell(in_rpm(one.omega)),
+        Cell(allowed or "none"),
         Cell(label, case), Cell(margin),
     )  # fmt: skip

@@ -24,7 +24,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.first_page import cases, limits
-from flipflow.report.numbers import NOTHING, allowed, number, quantity
+from flipflow.report.numbers import NOTHING, allowed, number, quantity, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, FAIL, PASS
 from flipflow.studies.candidates import ALONE, BUILT, EVEN, MET, MOTION, label_of
@@ -137,7 +137,7 @@ def constraints_of_proposal(found: Proposal) -> Iterator[Block]:
         for name, share in found.excess.items()
     ]  # fmt: skip
     rows += [
-        cells(label_of(name), "end of what is free", "0.00", _price(found, name))
+        cells(label_of(name), "end of what is free", written(0.0, ".2f"), _price(found, name))
         for name in found.prices
         if name not in found.excess
     ]
@@ -200,7 +200,7 @@ def _margin(name: str, excess: float) -> str:
     if name in (MOTION, EVEN, ALONE):
         return "met" if excess <= MET else "not met"
     # Rounded before its sign is turned: what is used up to the last digits has a margin of 0.00.
-    return f"{0.0 - round(100.0 * excess, 2):.2f}"
+    return written(0.0 - round(100.0 * excess, 2), ".2f")
 
 
 def _failing(found: Proposal) -> str:

@@ -30,7 +30,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.first_page import OVERLEAF_TITLE, overleaf, packed
-from flipflow.report.numbers import four_digits, named
+from flipflow.report.numbers import NOTHING, four_digits, named, written
 from flipflow.report.parts import warmed_loads
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
@@ -224,9 +224,10 @@ def _derived(check: Check) -> Table:
 def _temperature(case: Case) -> str:
     """Temperature as the file gives it, and that of the rubber at work where it is another."""
     if case.temperature is None:
-        return "-"
+        return NOTHING
+    own = written(case.temperature, ".4g")
     rubber = "" if case.rubber is None else f", rubber {case.rubber:.3g}"
-    return f"{case.temperature:.4g}" + (f" (air){rubber}" if case.temperature_of == "air" else "")
+    return f"{own} (air){rubber}" if case.temperature_of == "air" else own
 
 
 def _load_cases(cases: tuple[Case, ...]) -> Table:
@@ -244,9 +245,9 @@ def _load_cases(cases: tuple[Case, ...]) -> Table:
     rows = tuple(
         cells(
             case.name,
-            *(f"{x:.4g}" for x in (case.stiffness_factor, case.damping_factor)),
-            *(f"{x:.4g}" for x in (case.stop_stiffness_factor, case.stop_damping_factor)),
-            *(f"{x:.4g}" for x in (case.main_mass, case.floating_mass)),
+            *(written(x, ".4g") for x in (case.stiffness_factor, case.damping_factor)),
+            *(written(x, ".4g") for x in (case.stop_stiffness_factor, case.stop_damping_factor)),
+            *(written(x, ".4g") for x in (case.main_mass, case.floating_mass)),
             _temperature(case),
             case.source,
         )

@@ -26,7 +26,7 @@ from flipflow.report.blocks import (
     Values,
     Verdict,
 )
-from flipflow.report.numbers import NOTHING, bounds, named, percent, quantity, speed
+from flipflow.report.numbers import NOTHING, bounds, in_rpm, named, percent, quantity, speed
 from flipflow.report.parts import worst_of
 from flipflow.report.registry import Part, section
 from flipflow.report.weight import AT_REST, contact
@@ -333,7 +333,7 @@ def limit_cells(row: LimitRow) -> tuple[Cell, ...]:
     allowed = bounds(*row.limit, row.shown_unit, row.unit)
     worst = quantity(row.worst, row.shown_unit, row.unit)
     if row.name == "speed" and row.worst is not None:
-        worst = f"{rpm(row.worst)} rpm"
+        worst = in_rpm(row.worst, with_unit=True)
     if row.name == "jump_margin":
         worst = named(QUANTITIES[row.name], row.worst)
     case = row.reason if row.worst is None else row.case

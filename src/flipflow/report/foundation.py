@@ -19,7 +19,7 @@ from flipflow.report.blocks import (
     Text,
     cells,
 )
-from flipflow.report.numbers import NOTHING, quantity
+from flipflow.report.numbers import NOTHING, number, quantity, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, PASS, Assessment
 from flipflow.studies.foundation_loads import (
@@ -141,11 +141,12 @@ def _orders_table(loads: FoundationLoads, case: CaseLoads) -> Table:
         ]
     rows = []
     for one in case.orders:
-        row = [f"{one.order:g}", f"{in_unit(one.order * case.omega, 'Hz', 'rad/s'):.4g}"]
+        hertz = in_unit(one.order * case.omega, "Hz", "rad/s")
+        row = [written(one.order, "g"), written(hertz, ".4g")]
         for name in LOADS:
             (amplitude,), angle = _kilo(loads, one.amplitude, (name,)), getattr(one.phase, name)
             zero = _is_nothing(getattr(one.amplitude, name), case)
-            row += ["0", NOTHING] if zero else [amplitude, _degrees(angle)]
+            row += [number(0.0), NOTHING] if zero else [amplitude, _degrees(angle)]
         rows.append(cells(*row))
     caption = (
         "Amplitude, and phase to the unbalance force along the surface (negative: it lags), of the "
@@ -161,7 +162,7 @@ def _is_nothing(amplitude: float | None, case: CaseLoads) -> bool:
 
 
 def _degrees(angle: float | None) -> str:
-    return NOTHING if angle is None else f"{math.degrees(angle):.0f}"
+    return NOTHING if angle is None else written(math.degrees(angle), ".0f")
 
 
 def _runs_table(loads: FoundationLoads) -> Table:
@@ -192,7 +193,7 @@ def _peaks(loads: FoundationLoads, run: RunLoads) -> Iterator[str]:
     for name in LOADS:
         yield from _kilo(loads, run.peaks, (name,))
         speed = getattr(run.at, name)
-        yield NOTHING if speed is None else f"{in_unit(speed, 'rpm', 'rad/s'):.0f}"
+        yield NOTHING if speed is None else written(in_unit(speed, "rpm", "rad/s"), ".0f")
 
 
 def _excited(run: RunLoads) -> str:

@@ -1,10 +1,15 @@
-"""Numbers as a report shows them: three to four significant digits, with their unit."""
+"""Numbers as a report shows them: three to four significant digits, with their unit.
+
+What is shown knows the number that it shows: a table for other programs takes it with all digits.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Self
 
 from flipflow.io.units import in_unit
+from flipflow.model.constants import RPM
 from flipflow.model.limits import Limits, limit_bounds
 from flipflow.model.numerals import digits, rpm
 from flipflow.model.quantities import QUANTITIES, Quantity
@@ -13,31 +18,64 @@ NOTHING, NO_JUMP = "-", "no jump"
 LEAST_KILO = 100.0  # N or W; what is less is shown without kilo
 
 
+class Measured(str):
+    """A text that shows one number, or the two ends of a range, and knows them."""
+
+    __slots__ = ("numbers", "unit")
+
+    numbers: tuple[float | None, ...]  # in ``unit``; None: a range without that end
+    unit: str
+
+    def __new__(cls, text: str, *numbers: float | None, unit: str = "") -> Self:
+        """The text, and what it shows."""
+        made = super().__new__(cls, text)
+        made.numbers, made.unit = numbers, unit
+        return made
+
+
 def number(value: float) -> str:
     """Three significant digits; from 1000 on whole numbers."""
     if not math.isfinite(value):
         return "infinite" if value > 0.0 else NOTHING
     if value == 0.0 or abs(value) >= 99.95:
-        return f"{value:.0f}"
+        return Measured(f"{value:.0f}", value)
     text = f"{value:#.3g}"
-    return text if "e" in text else text.rstrip(".")
+    return Measured(text if "e" in text else text.rstrip("."), value)
+
+
+def written(value: float, form: str) -> str:
+    """A number in a format of Python; nothing where it is not one."""
+    return Measured(format(value, form), value) if math.isfinite(value) else NOTHING
 
 
 def four_digits(value: float) -> str:
     """Four significant digits, zeros at the end too, so that a column of numbers is even."""
-    return f"{value:.0f}" if abs(value) >= 999.95 else f"{value:#.4g}"
+    return written(value, ".0f" if abs(value) >= 999.95 else "#.4g")
+
+
+def in_rpm(omega: float | None, *, with_unit: bool = False) -> str:
+    """A speed in rpm."""
+    if omega is None:
+        return NOTHING
+    return Measured(f"{rpm(omega)}{' rpm' * with_unit}", omega * RPM, unit="rpm")
+
+
+def rpm_range(low: float, high: float) -> str:
+    """Two speeds in rpm."""
+    return Measured(f"{rpm(low)} to {rpm(high)}", low * RPM, high * RPM, unit="rpm")
 
 
 def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool = True) -> str:
     """An SI value in the unit to show."""
     if value is None or math.isnan(value):
         return NOTHING
-    if with_unit and shown_unit == f"k{unit}" and 0.0 < abs(value) < LEAST_KILO:
-        shown_unit = unit
     if math.isinf(value):
         return number(value)
-    text = number(in_unit(value, shown_unit, unit))
-    return f"{text} {shown_unit}".strip() if with_unit else text
+    small = with_unit and shown_unit == f"k{unit}" and 0.0 < abs(value) < LEAST_KILO
+    told = unit if small else shown_unit
+    text = number(in_unit(value, told, unit))
+    text = f"{text} {told}".strip() if with_unit else text
+    return Measured(text, in_unit(value, shown_unit, unit), unit=shown_unit)
 
 
 def named(one: Quantity, value: float | None, *, with_unit: bool = True) -> str:
@@ -54,15 +92,12 @@ def speed(omega: float) -> str:
 
 def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:
     """A limit in words: "5 to 8 mm", "at most 3 g", "at least 20 %"."""
-
-    def end(value: float) -> str:
-        return digits(in_unit(value, shown_unit, unit), 4)
-
-    if math.isfinite(low) and math.isfinite(high):
-        return f"{end(low)} to {end(high)} {shown_unit}".strip()
-    if math.isfinite(high):
-        return f"at most {end(high)} {shown_unit}".strip()
-    return f"at least {end(low)} {shown_unit}".strip() if math.isfinite(low) else NOTHING
+    ends = [in_unit(end, shown_unit, unit) if math.isfinite(end) else None for end in (low, high)]
+    told = [digits(end, 4) for end in ends if end is not None]
+    if not told:
+        return NOTHING
+    word = "at least " if ends[1] is None else "at most " if ends[0] is None else ""
+    return Measured(f"{word}{' to '.join(told)} {shown_unit}".strip(), *ends, unit=shown_unit)
 
 
 def allowed(limits: Limits, name: str) -> str:
@@ -73,11 +108,14 @@ def allowed(limits: Limits, name: str) -> str:
 
 def percent(share: float | None) -> str:
     """A margin with its sign; where there is no end to be near to, nothing."""
-    if share is None:
+    if share is None or not math.isfinite(share):
         return NOTHING
-    if not math.isfinite(share):
-        return NOTHING
-    return f"{'+' if share > 0.0 else ''}{number(100.0 * share)} %"
+    return Measured(f"{signed(100.0 * share)} %", 100.0 * share, unit="%")
+
+
+def signed(value: float) -> str:
+    """Three significant digits with a sign."""
+    return Measured(f"{'+' * (value > 0.0)}{number(value)}", value)
 
 
 def multiplier(value: complex) -> str:

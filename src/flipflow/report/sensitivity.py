@@ -21,7 +21,7 @@ from flipflow.report.blocks import (
     Values,
     cells,
 )
-from flipflow.report.numbers import NOTHING, number, quantity
+from flipflow.report.numbers import NOTHING, quantity, signed, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment
 from flipflow.studies.sensitivity import Sensitivity
@@ -75,7 +75,7 @@ def _at_one(result: Sensitivity) -> Table:
             result.names[i], _symbol(result.names[i]),
             _index(result.first_order[i]), _index(result.first_order_confidence[i]),
             _index(result.total[i]), _index(result.total_confidence[i]),
-            _signed(low[i]), _signed(high[i]),
+            *(signed(float(change[i])) for change in (low, high)),
         )
         for i in index_order(result)
     )  # fmt: skip
@@ -112,8 +112,4 @@ def _symbol(field: str) -> str:
 
 
 def _index(value: float) -> str:
-    return f"{value:.3f}" if np.isfinite(value) else NOTHING
-
-
-def _signed(value: float) -> str:
-    return ("+" if value > 0.0 else "") + number(float(value)) if np.isfinite(value) else NOTHING
+    return written(float(value), ".3f")

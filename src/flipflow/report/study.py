@@ -35,7 +35,7 @@ from flipflow.report.blocks import (
     Values,
     cells,
 )
-from flipflow.report.numbers import NOTHING, allowed, named, quantity
+from flipflow.report.numbers import NOTHING, allowed, named, quantity, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.study import Study
 from flipflow.studies.tolerance import (
@@ -218,7 +218,8 @@ def spread_table(found: Study) -> Table:
             for words, values in _groups(found, one, c):
                 numbers = [_nominal(found, one, c, jumped=bool(words)), *_quantiles(values)]
                 texts = [named(one, float(x)) for x in numbers]
-                rows.append(cells(one.label, f"{case}{words}", *texts, str(values.size)))
+                count = written(values.size, "d")
+                rows.append(cells(one.label, f"{case}{words}", *texts, count))
     title = f"What the machines do{speed_in_words(found, found.omega[0])}"
     return Table(title, columns, tuple(rows), " ".join(_spread_words(found)))
 
@@ -323,7 +324,7 @@ def _cost_words(found: Tolerance, j: int) -> str:
 
 
 def _percents(shares: Real) -> list[str]:
-    return [f"{100.0 * one:.1f}" for one in shares[:MOST_COLUMNS]]
+    return [written(100.0 * float(one), ".1f") for one in shares[:MOST_COLUMNS]]
 
 
 def _share(share: float) -> str:

@@ -12,19 +12,16 @@ from flipflow.io.spreadsheet import Sheet, Value, csv_text, xlsx
 from flipflow.io.units import in_unit
 from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES
-from flipflow.report.blocks import Block, Cell, Column, Table, TitleBlock, Values, Verdict
+from flipflow.report.blocks import Block, Table, TitleBlock, Values, Verdict
 from flipflow.report.html import Head, head_of
-from flipflow.report.numbers import NOTHING
+from flipflow.report.numbers import NOTHING, Measured
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
 from flipflow.studies.quantity_values import Working, number_or_nan
 
 BOOK, PREFIX = "tables.xlsx", "table-"
-FIGURE = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
-MEASURE = re.compile(rf"({FIGURE})(?: ([A-Za-z%/^][A-Za-z0-9%/^ ]*))?")
-ENDS = re.compile(rf"(?:at least )?({FIGURE})?(?: to |at most )?({FIGURE})?(?: (\S+))?")
 UNIT, REMARK = "Unit", "remark"
-KILO = "k"
+DIGITS = 12  # behind them stands what is left of a change of units
 RESPONSE = "Response over speed"
 # What the response lists beside speed, in the units of the machine file.
 LISTED = (
@@ -100,86 +97,66 @@ def _report_sheet(head: Head, blocks: Sequence[Block]) -> Sheet:
 
 
 def _sheet(table: Table) -> Sheet:
-    """A table with numbers where its columns are numeric."""
-    parsed = [_column(table, k) for k in range(len(table.columns))]
-    flat = [one for group in parsed for one in group]
-    mixed = [one for one in flat if one.mixed]
+    """A table with the numbers that its cells show; their units stand in its head, or beside."""
+    every = [one for k in range(len(table.columns)) for one in _columns(table, k)]
+    mixed = [one for one in every if one.mixed]
     units = _row_units(mixed, len(table.rows))
     head: list[str] = []
     columns: list[list[Value]] = []
-    for one in flat:
+    for one in every:
         if mixed and one is mixed[0]:
             head.append(UNIT)
             columns.append([unit or None for unit in units])
-        head.append(one.title if one.mixed or not one.unit else f"{one.title} [{one.unit}]")
-        columns.append([one.value(k, units[k] if one.mixed else one.unit) for k in range(one.size)])
+        head.append(f"{one.title} [{one.unit}]" if one.unit else one.title)
+        columns.append(one.values(units if one.mixed else [one.unit] * len(units)))
     rows = tuple(zip(*columns, strict=True))
     return Sheet(table.title or table.columns[0].title, tuple(head), rows)
 
 
-class _Parsed:
+class _Column:
     """One column: of each cell its number and unit, or its text."""
 
     def __init__(self, title: str, unit: str, cells: Sequence[tuple[Value, str]]) -> None:
-        self.title, self.cells, self.size = title, cells, len(cells)
-        found = {own for value, own in cells if own and not isinstance(value, str)}
-        self.mixed = len(found) > 1
+        self.title, self.cells = title, cells
+        found = {own for _, own in cells if own}
+        self.mixed = not unit and len(found) > 1
         self.unit = unit or (found.pop() if len(found) == 1 else "")
 
-    def value(self, row: int, unit: str) -> Value:
-        """The value of a row in a unit; as text with its own unit where that is another."""
-        value, own = self.cells[row]
-        if value is None or isinstance(value, str) or not own or own == unit:
-            return value
-        if unit == f"{KILO}{own}":
-            return value / 1000.0
-        return f"{value:g} {own}"
+    def values(self, units: Sequence[str]) -> list[Value]:
+        """What stands in each row; with its own unit where that is another than the row's."""
+        return [
+            value if own in ("", unit) else f"{value} {own}"
+            for (value, own), unit in zip(self.cells, units, strict=True)
+        ]
 
 
-def _column(table: Table, k: int) -> list[_Parsed]:
+def _columns(table: Table, k: int) -> list[_Column]:
     """The columns that a column of a report becomes."""
     column, cells = table.columns[k], [row[k] for row in table.rows]
-    if column.ends:
-        ends = [_two_ends(cell) for cell in cells]
-        return [
-            _Parsed(f"{column.title}, {word}", column.unit, [(end[i], end[2]) for end in ends])
-            for i, word in enumerate(("least", "most"))
-        ]
-    found = [_Parsed(column.title, column.unit, [_measure(column, cell) for cell in cells])]
+    words = ("least", "most") if column.ends else ("",)
+    found = [
+        _Column(f"{column.title}, {word}" if word else column.title, column.unit,
+                [_measure(cell.text, end) for cell in cells])
+        for end, word in enumerate(words)
+    ]  # fmt: skip
     if any(cell.small for cell in cells):
         title = f"{column.title}, {REMARK}"
-        found.append(_Parsed(title, "", [(cell.small or None, "") for cell in cells]))
+        found.append(_Column(title, "", [(cell.small or None, "") for cell in cells]))
     return found
 
 
-def _measure(column: Column, cell: Cell) -> tuple[Value, str]:
-    """The number of a cell in a numeric column and its unit; else its text."""
-    if cell.text == NOTHING:
-        return None, ""
-    match = MEASURE.fullmatch(cell.text) if column.numeric else None
-    return (_number(match[1]), match[2] or "") if match else (cell.text, "")
+def _measure(text: str, end: int) -> tuple[Value, str]:
+    """The number that a cell shows, of a range one end, and its unit; else its text."""
+    if isinstance(text, Measured):
+        number = text.numbers[end]
+        return (None, "") if number is None else (float(f"{number:.{DIGITS}g}"), text.unit)
+    return (None if text == NOTHING or end else text), ""
 
 
-def _number(written: str) -> float | int:
-    return int(written) if written.lstrip("+-").isdigit() else float(written)
-
-
-def _two_ends(cell: Cell) -> tuple[Value, Value, str]:
-    """Least and most of "5 to 8 mm", "at most 3 g", "at least 20 %"."""
-    match = ENDS.fullmatch(cell.text)
-    if cell.text == NOTHING or not match:
-        return (None if cell.text == NOTHING else cell.text), None, ""
-    least, most = (None if end is None else _number(end) for end in match.groups()[:2])
-    return least, most, match[3] or ""
-
-
-def _row_units(columns: Sequence[_Parsed], rows: int) -> list[str]:
+def _row_units(columns: Sequence[_Column], rows: int) -> list[str]:
     """The unit of each row, over the columns whose unit differs from row to row."""
-    units = []
-    for k in range(rows):
-        own = {column.cells[k][1] for column in columns} - {""}
-        units.append(max(own, key=lambda unit: (unit.startswith(KILO), unit), default=""))
-    return units
+    units = [{column.cells[k][1] for column in columns} - {""} for k in range(rows)]
+    return [next(iter(own), "") for own in units]
 
 
 def _file_name(sheet: str, taken: dict[str, bytes | str]) -> str:

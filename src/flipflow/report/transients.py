@@ -19,7 +19,7 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.first_page import limit_cells
 from flipflow.report.jump_risk import millimetres, moment_words
-from flipflow.report.numbers import NOTHING, number, quantity
+from flipflow.report.numbers import NOTHING, in_rpm, number, quantity, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_limit
 from flipflow.studies.jump_risk import JumpRisk
@@ -196,7 +196,7 @@ def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
     run = case.start
     if run is None:
         return cells(case.case, "not checked", *[NOTHING] * 6)
-    time = NOTHING if run.time_to_speed is None else f"{run.time_to_speed:.3g}"
+    time = NOTHING if run.time_to_speed is None else written(run.time_to_speed, ".3g")
     peaks = [
         quantity(peak.value, shown, unit, with_unit=False)
         if (peak := values.get(name)) is not None
@@ -205,7 +205,7 @@ def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
         for name, _, shown, unit in GREATEST
     ]
     # A shaft that is not turned over swings out: what is left of its speed means nothing.
-    settled = NOTHING if run.outcome == "not started" else rpm(run.final_speed)
+    settled = NOTHING if run.outcome == "not started" else in_rpm(run.final_speed)
     return cells(case.case, run.outcome, time, settled, *peaks)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from flipflow.model.numerals import rpm
 from flipflow.report.blocks import Block, Column, Note, Table, Text, cells
-from flipflow.report.numbers import NOTHING, quantity
+from flipflow.report.numbers import in_rpm, quantity, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import Assessment, CaseAssessment
 from flipflow.studies.gaps_under_weight import GapsUnderWeight
@@ -104,11 +104,11 @@ def _table(cases: list[CaseAssessment]) -> Table:
 
 def _millimetres(value: float) -> str:
     """Two decimals: a shift is small beside the gap it takes from."""
-    return "no stop" if math.isinf(value) else f"{1e3 * value:.2f}"
+    return "no stop" if math.isinf(value) else written(1e3 * value, ".2f")
 
 
 def contact(omega: float | None, gap: float) -> str:
     """Where a side is first touched: the speed in rpm, "at rest", or nothing."""
     if gap <= 0.0:
         return AT_REST
-    return NOTHING if omega is None else rpm(omega)
+    return in_rpm(omega)
