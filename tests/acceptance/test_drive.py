@@ -38,17 +38,20 @@ def given(power=5500.0, **changes):
     return ff.Drive(motor=ff.Motor(**motor), **shaft)
 
 
+def half_peak_to_peak(angle, x):
+    """Of the turn of the shaft that ends at each row, by every row of it."""
+    first = np.searchsorted(angle, angle - 2.0 * math.pi)
+    return np.array([np.ptp(x[begin : k + 1]) for k, begin in enumerate(first)]) / 2.0
+
+
 def peaks_of(screen, rows):
     """The peaks on the way, of an own integration."""
     s, x2 = rows.s, rows.s[:, 0] - rows.s[:, 1]
-    v2 = s[:, 4] - s[:, 5]
-    turns = np.flatnonzero(v2[:-1] * v2[1:] < 0.0) + 1
     along = screen.isolation_stiffness * s[:, 0] + screen.isolation_damping * s[:, 4]
     across = screen.normal_stiffness * s[:, 2] + screen.normal_damping * s[:, 6]
-    ends = [x2[0], *x2[turns]] if v2[0] == 0.0 else x2[turns]
     return {
         "main_amplitude": np.hypot(s[:, 0], s[:, 2]).max(),
-        "relative_amplitude": np.abs(np.diff(ends)).max() / 2.0,
+        "relative_amplitude": half_peak_to_peak(s[:, 3], x2).max(),
         "foundation_force": np.hypot(along, across).max(),
         "stop_force": np.abs(rows.H).max(),
     }

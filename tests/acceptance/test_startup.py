@@ -120,6 +120,53 @@ def test_coast_down_begins_with_the_settled_motion(screen):
         assert run.history.x[0, k] == pytest.approx(float(orbit.displacement(k, 0.0)), abs=1e-8)
 
 
+def greatest_half_turn(history):
+    """The greatest half way from peak to peak of the relative motion in one turn, row by row."""
+    x, turned = history.displacement("relative"), np.maximum.accumulate(history.angle)
+    first = np.searchsorted(turned, turned - 2.0 * math.pi)
+    return max(np.ptp(x[begin : k + 1]) for k, begin in enumerate(first)) / 2.0
+
+
+@pytest.mark.parametrize(
+    "drawn", [(91020, 28), (91021, 226), (91021, 298), (91020, 226), (91021, 85)]
+)
+@pytest.mark.parametrize("way", ["start_up", "coast_down"])
+def test_amplitude_on_the_way_is_from_peak_to_peak_of_a_turn(script, drawn, way):
+    """With more than two turning points a turn it was the way between neighbours, .58 of it."""
+    _, machine, speed = script("plausible_draw").draw(*drawn)
+    found = getattr(ff, way)(machine, speed=speed)
+    told = found.peaks["relative_amplitude"].value
+    assert told == pytest.approx(greatest_half_turn(found.history), rel=1e-3)
+
+
+def test_a_start_that_ends_on_a_motion_reaches_its_amplitude(script):
+    """Limits on the start said pass where the motion that it ends on broke them."""
+    _, machine, speed = script("plausible_draw").draw(91020, 28)
+    start = ff.start_up(machine, speed=speed, duration=30.0)
+    orbit = next(o for o in ff.periodic_orbits(machine, start.final_speed) if o.stable)
+    told = start.peaks["relative_amplitude"].value
+    assert told == pytest.approx(orbit.amplitude("relative"), rel=1e-3)
+    glide = ff.ramp(machine, (50.0, 55.0), 0.2)
+    below = glide.branch.orbit_from_below(52.0)
+    reached = np.interp(52.0, *glide.amplitude("relative"))
+    assert reached == pytest.approx(below.amplitude("relative"), rel=1e-3)
+
+
+def test_coast_down_counts_the_way_from_its_start():
+    """The first half swing, the greatest, was none; the value by an own integration."""
+    machine = ff.FlipFlowScreen(
+        main_mass=353.58361918365875, floating_mass=50.20006900374477,
+        eccentric_moment=1.6659727980465884, isolation_stiffness=137699.1979060428,
+        isolation_damping=4087.516266708944, shear_stiffness=235367.9446878344,
+        shear_damping=67.64688904604856, stop_stiffness=311179.2778111227,
+        stop_damping=248.15009118323897, clearance=0.0022816167225466434,
+        normal_stiffness=194248.4943917849, normal_damping=2821.752840414696,
+    )  # fmt: skip
+    drive = ff.Drive(inertia=0.12 * machine.eccentric_moment, friction=1.0)
+    run = ff.coast_down(machine, 73.61798784912081, drive, duration=120.0)
+    assert run.peaks["relative_amplitude"].value == pytest.approx(6.741e-3, abs=1e-6)
+
+
 def test_gravity_is_left_out_and_said(screen):
     """m0r g = 40.9 N m; with J = 0.9 kg m^2 the shaft swings below 2 sqrt(40.9 / 0.9) = 13.5."""
     drive = replace(drive_of(screen, 5500.0), inertia=0.9)
@@ -291,6 +338,13 @@ def test_command_line(monkeypatch, capsys, tmp_path):
     document = json.loads((tmp_path / "a.json").read_text())
     assert document["schema"] == "flipflow/startup/1"
     assert set(document) == {"schema", "name", "start", "coast_down"}
+
+
+def test_command_line_tells_a_stop_that_is_not_met(monkeypatch, capsys):
+    code, out, _ = run(monkeypatch, capsys, "ffs0827", "--case", "full, stiffening")
+    assert code == 0
+    stops = [line.split() for line in out.splitlines() if "on the stops" in line]
+    assert [line[-2:] == ["not", "reached"] for line in stops] == [True, True]
 
 
 def test_command_line_motor_too_weak_is_an_answer(monkeypatch, capsys):

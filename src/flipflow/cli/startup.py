@@ -233,6 +233,9 @@ def _run(run: RunUp, title: str, out: Console) -> None:
     out.print(f"{title:<30}{'greatest':>12}{'at rpm':>10}{'at s':>9}")
     for key, peak in run.peaks.items():
         word, scale, unit = WORDS[key]
+        if key == "stop_force" and peak.value == 0.0:
+            out.print(f"  {word:<28}{'not reached':>12}")
+            continue
         value = f"{digits(peak.value * scale)} {unit}"
         out.print(f"  {word:<28}{value:>12}{peak.omega * RPM:>10.0f}{peak.t:>9.2f}")
     first = f"w01 = {run.first_frequency * RPM:.0f} rpm"

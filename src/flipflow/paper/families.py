@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flipflow.io.units import shown
+from flipflow.io.units import in_unit, shown
 from flipflow.model.fields import FIELD
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.paper.trends import FamilyPair
@@ -12,7 +12,7 @@ from flipflow.periodic.options import HarmonicBalance
 from flipflow.plotting.family import family_figure
 from flipflow.plotting.figure import Figure
 from flipflow.report.blocks import Column, Table, cells
-from flipflow.report.numbers import NOTHING, quantity
+from flipflow.report.numbers import NOTHING, number
 from flipflow.studies.response_family import ResponseFamily, response_family
 
 HARMONICS = 3
@@ -112,4 +112,4 @@ def _chosen(family: ResponseFamily, pair: FamilyPair) -> ResponseFamily:
 def _shown(value: float | str | None, unit: str) -> str:
     if not isinstance(value, float):
         return NOTHING
-    return f"{value:.2f}" if unit == "rad/s" else quantity(value, unit, "m", with_unit=False)
+    return f"{value:.2f}" if unit == "rad/s" else number(in_unit(value, unit, "m"))

@@ -114,7 +114,7 @@ def ramp_figure(ramp: Ramp, which: Coordinate | None = None) -> Figure:
         tuple(traces), lines=lines,
     )  # fmt: skip
     caption = (
-        f"Half the way from one turning point to the next while the speed glides at "
+        f"Half the way from peak to peak in one turn while the speed glides at "
         f"{ramp.rate:.3g} rad/s^2. Dashed: motions that do not return after a disturbance."
     )
     return Figure("Motion at gliding speed", caption, (panel,), height=380)

@@ -21,7 +21,7 @@ from flipflow.transient.speed_run import swings
 
 MOST_POINTS = 1500
 READING = (
-    "Amplitude is half the way from one turning point of the motion to the next; w01 is the first "
+    "Amplitude is half the way from peak to peak in one turn of the shaft; w01 is the first "
     "natural frequency."
 )
 HEADROOM = 1.08
@@ -107,9 +107,7 @@ def _speed(run: RunUp, time: Axis) -> Panel:
 def _amplitudes(run: RunUp, time: Axis) -> Panel:
     traces = []
     for index, which in enumerate(_shown(run)):
-        t, size = swings(
-            run.history.t, run.history.displacement(which), run.history.velocity(which)
-        )
+        t, size = swings(run.history, which)
         t, size = _envelope(t, size * MM)
         known = isinstance(which, str) and which in LABELS
         traces.append(

@@ -16,9 +16,9 @@ from flipflow.report.numbers import (
     NOTHING,
     four_digits,
     multiplier,
-    number,
     quantity,
     rpm_range,
+    three_digits,
     written,
 )
 from flipflow.report.registry import Part, section
@@ -172,7 +172,7 @@ def _motion_rows(case: CaseAssessment) -> Iterator[tuple[Cell, ...]]:
             case.name,
             quantity(orbit.amplitude("relative"), "mm", "m", with_unit=False),
             "; ".join(multiplier(complex(m)) for m in shown),
-            number(float(abs(orbit.multipliers[0]))),
+            three_digits(float(abs(orbit.multipliers[0]))),
             _error(orbit.error),
             STABILITY_WORDS[orbit.stability],
         )

@@ -28,10 +28,10 @@ from flipflow.report.numbers import (
     NOTHING,
     Measured,
     in_rpm,
-    number,
     percent,
     quantity,
     signed,
+    three_digits,
 )
 from flipflow.report.registry import Part, section
 from flipflow.studies.allowed_range import allowed_range
@@ -173,7 +173,7 @@ def _change(row: ResultChange, k: int) -> str:
     if change is None or math.isnan(change):
         return NOTHING
     if not row.changes or change == 0.0:
-        return number(0.0)
+        return three_digits(0.0)
     if math.isinf(change):
         return NOTHING if row.name.endswith(JUMP) else f"{'+' if change > 0.0 else '-'}infinite"
     if row.name.startswith(MARGIN):

@@ -24,7 +24,7 @@ from flipflow.report.blocks import (
     cells,
 )
 from flipflow.report.first_page import cases, limits
-from flipflow.report.numbers import NOTHING, allowed, number, quantity, written
+from flipflow.report.numbers import NOTHING, allowed, number, quantity, three_digits, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, FAIL, PASS
 from flipflow.studies.candidates import ALONE, BUILT, EVEN, MET, MOTION, label_of
@@ -250,4 +250,4 @@ def _allowed(found: Proposal, name: str) -> str:
 
 
 def _price(found: Proposal, name: str) -> str:
-    return number(1e4 * found.prices[name]) if name in found.prices else NOTHING
+    return three_digits(1e4 * found.prices[name]) if name in found.prices else NOTHING

@@ -19,7 +19,7 @@ from flipflow.report.blocks import (
     Text,
     cells,
 )
-from flipflow.report.numbers import NOTHING, number, quantity, written
+from flipflow.report.numbers import NOTHING, quantity, three_digits, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, PASS, Assessment
 from flipflow.studies.foundation_loads import (
@@ -146,7 +146,7 @@ def _orders_table(loads: FoundationLoads, case: CaseLoads) -> Table:
         for name in LOADS:
             (amplitude,), angle = _kilo(loads, one.amplitude, (name,)), getattr(one.phase, name)
             zero = _is_nothing(getattr(one.amplitude, name), case)
-            row += [number(0.0), NOTHING] if zero else [amplitude, _degrees(angle)]
+            row += [three_digits(0.0), NOTHING] if zero else [amplitude, _degrees(angle)]
         rows.append(cells(*row))
     caption = (
         "Amplitude, and phase to the unbalance force along the surface (negative: it lags), of the "

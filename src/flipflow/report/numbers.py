@@ -34,13 +34,18 @@ class Measured(str):
 
 
 def number(value: float) -> str:
-    """Three significant digits; from 1000 on whole numbers."""
+    """Three significant digits in words; from 1000 on whole numbers."""
     if not math.isfinite(value):
         return "infinite" if value > 0.0 else NOTHING
     if value == 0.0 or abs(value) >= 99.95:
-        return Measured(f"{value:.0f}", value)
+        return f"{value:.0f}"
     text = f"{value:#.3g}"
-    return Measured(text if "e" in text else text.rstrip("."), value)
+    return text if "e" in text else text.rstrip(".")
+
+
+def three_digits(value: float) -> str:
+    """A :func:`number` that is known."""
+    return Measured(number(value), value) if math.isfinite(value) else number(value)
 
 
 def written(value: float, form: str) -> str:

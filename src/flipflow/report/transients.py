@@ -220,7 +220,7 @@ def _limits_table(assessment: Assessment) -> Table:
     )
     rows = tuple(_limit_row(assessment, row) for row in assessment.passing_table)
     caption = (
-        "Amplitude: half the way from one turning point of the motion to the next; main frame: "
+        "Amplitude: half the way from peak to peak in one turn of the shaft; main frame: "
         "distance from rest, in any direction where the normal direction is known."
     )
     return Table("Limits on start and stop", columns, rows, caption)

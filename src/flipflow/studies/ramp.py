@@ -29,7 +29,7 @@ from flipflow.transient.startup import MOST_SECONDS
 
 BEYOND = 1e-4  # relative distance past the end of a motion at which the next one is looked for
 SOON = 0.05  # share of a fold's speed over which irregular motion beyond is looked at
-SMALL = 0.05  # share by which its amplitude differs at most where there is no jump
+SMALL = 0.1  # share by which its amplitude, which scatters, differs at most where there is no jump
 WIDER = 0.15  # share by which the branch reaches beyond the speeds of the ramp
 SHORTEST = 1e-6  # s, shortest ramp, far less than any machine's turn
 LOWER_SHARES = (1.0 - WIDER, 0.6, 0.3, 0.1)  # starts of the branch over the lowest speed, in turn
@@ -45,10 +45,9 @@ class LateJump:
         Speed in rad/s at which the motion ceases to exist, at a fold, or to be stable beside
         another stable one of one turn.
     omega
-        Speed in rad/s at which the amplitude, the greatest swing of each turn, has gone half the
-        way to that of the other motion. Where none of one turn is stable beyond a fold, it is that
-        to the median of what follows within 5 % of the speed; one that differs by less than 5 % is
-        no jump.
+        Speed in rad/s at which the amplitude has gone half the way to that of the other motion.
+        Where none of one turn is stable beyond a fold, it is that to the median of what follows
+        within 5 % of the speed; one that differs by less than 10 % is no jump.
     """
 
     fold: float
@@ -91,10 +90,12 @@ class Ramp(Result):
         return f"Ramp({ends} at {rate}, {len(self.jumps)} jumps)"
 
     def amplitude(self, which: Coordinate) -> tuple[Real, Real]:
-        """Speed in rad/s and amplitude in m at every turning point of a coordinate."""
-        h = self.history
-        t, size = swings(h.t, h.displacement(which), h.velocity(which))
-        return np.interp(t, h.t, h.omega), size
+        """Speed in rad/s at every turning point of a coordinate, and its amplitude there in m.
+
+        Amplitude is half the way from peak to peak in the turn that ends there, from the second
+        turn on.
+        """
+        return _amplitudes(self.history, which)
 
 
 def ramp(
@@ -190,7 +191,7 @@ def _jumps(
     branch: Branch, history: History, begun: Orbit, which: Coordinate, *, rising: bool
 ) -> tuple[LateJump, ...]:
     """Jumps in the order of the glide, which began with a periodic motion."""
-    speed, size = _greatest_swings(history, which)
+    speed, size = _amplitudes(history, which)
     speed, size = np.append(history.omega[0], speed), np.append(begun.amplitude(which), size)
     found: list[LateJump] = []
     for point in branch.special_points:
@@ -220,15 +221,12 @@ def _irregular(point: SpecialPoint, before: float, swings_beyond: Real) -> float
     return after if abs(after - before) >= SMALL * before else None
 
 
-def _greatest_swings(history: History, which: Coordinate) -> tuple[Real, Real]:
-    """Speed and greatest swing of the turn that ends there, at each turning point."""
-    t, swing = swings(history.t, history.displacement(which), history.velocity(which))
-    speed = np.interp(t, history.t, history.omega)
-    size, back = swing.copy(), 1
-    while (within := t[back:] - t[:-back] < 2.0 * math.pi / speed[back:]).any():
-        size[back:] = np.where(within, np.maximum(size[back:], swing[:-back]), size[back:])
-        back += 1
-    return speed, size
+def _amplitudes(history: History, which: Coordinate) -> tuple[Real, Real]:
+    """Speed and amplitude of the turn that ends there, at each turning point behind the first."""
+    t, size = swings(history, which)
+    speed, angle = (np.interp(t, history.t, one) for one in (history.omega, history.angle))
+    whole = angle - history.angle[0] >= 2.0 * math.pi
+    return speed[whole], size[whole]
 
 
 def _again(jump: LateJump, found: list[LateJump]) -> bool:

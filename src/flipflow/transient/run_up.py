@@ -99,8 +99,8 @@ class RunUp(Result):
         Time in s between 0.8 and 1.25 times w01; None where it is not passed.
     peaks
         ``"main_amplitude"`` (m; the greatest distance from rest in any direction, or along the
-        surface half the way from one turning point to the next, where that direction alone is
-        known), ``"relative_amplitude"`` (m; half that way), ``"shear_strain"``,
+        surface half the way from peak to peak in one turn of the shaft, where that direction alone
+        is known), ``"relative_amplitude"`` (m; half that way), ``"shear_strain"``,
         ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has them.
     power
         Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
@@ -300,7 +300,7 @@ def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
     found = {}
     screen = machine if isinstance(machine, FlipFlowScreen) else None
     for which in ("main", "relative") if screen else history.system.named:
-        times, sizes = swings(history.t, history.displacement(which), history.velocity(which))
+        times, sizes = swings(history, which)
         if sizes.size:
             found[f"{which}_amplitude"] = _greatest(history, times, sizes)
     if screen is not None:

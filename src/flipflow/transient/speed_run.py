@@ -18,7 +18,7 @@ from flipflow.model.drive import Drive, SpeedProfile
 from flipflow.model.monitor import Monitor
 from flipflow.model.screen import FlipFlowScreen
 from flipflow.model.starter import STAR_TORQUE, Converter, StarDelta
-from flipflow.model.system import Machine, MechanicalSystem, system_of
+from flipflow.model.system import Coordinate, Machine, MechanicalSystem, system_of
 from flipflow.transient.history import ContactChange, History, stop_forces
 from flipflow.transient.time_stepping import (
     WEIGHTLESS,
@@ -195,10 +195,23 @@ def steady_power(
     return run.energy["dissipated"] / duration, start.settled
 
 
-def swings(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
-    """Times of the turning points of x(t), and half the way from each to the one before."""
-    times, ends = turning_points(t, x, v)
-    return times[1:], np.abs(np.diff(ends)) / 2.0
+def swings(history: History, which: Coordinate) -> tuple[Real, Real]:
+    """Times of a coordinate's turning points, and half its way from peak to peak in one turn.
+
+    It is the shaft's turn that ends there, or what lies behind the turning point before where the
+    coordinate has not turned since. The start counts as a turning point.
+    """
+    t, x = history.t, history.displacement(which)
+    times, ends = turning_points(t, x, history.velocity(which))
+    if times.size == 0 or times[0] > t[0]:
+        times, ends = np.append(t[0], times), np.append(x[0], ends)
+    turned = np.interp(times, t, np.append(0.0, np.cumsum(np.abs(np.diff(history.angle)))))
+    rows = np.arange(times.size)
+    first = np.minimum(np.searchsorted(turned, turned - 2.0 * np.pi, "right"), rows - 1)[1:]
+    spans = np.column_stack([first, rows[1:] + 1]).ravel()
+    ends = np.append(ends, 0.0)  # that of the last span lies behind the last turning point
+    most, least = (of.reduceat(ends, spans)[::2] for of in (np.maximum, np.minimum))
+    return times[1:], (most - least) / 2.0
 
 
 def turning_points(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
