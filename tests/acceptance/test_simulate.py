@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from importlib import resources
 from typing import get_args
 
 import numpy as np
@@ -105,6 +106,25 @@ def test_not_settled_says_how_far(screen) -> None:
     gap = np.concatenate([history.x[-1], history.v[-1] / 120.0])
     gap -= np.concatenate([exact.state[:2], exact.state[2:] / 120.0])
     assert history.distance == pytest.approx(np.abs(gap).max(), rel=1e-9)
+
+
+def test_a_motion_of_two_turns_is_read_over_both(screen, command, tmp_path) -> None:
+    """Read over the last turn it was told 2.495 mm where the list of motions has 2.698 mm."""
+    uneven, speed = screen.replace(clearance=0.0, clearance_minus=6e-3), 110.849
+    history = ff.simulate(uneven, speed, 400)
+    assert (history.settled, history.repeats_after) == (True, 2)
+    orbit = next(o for o in ff.periodic_orbits(uneven, speed, 2) if o.stable)
+    text = (resources.files("flipflow") / "io" / "machines" / "ffs0827.toml").read_text()
+    file = tmp_path / "uneven.toml"
+    gaps = 'clearance = "0 mm"\nclearance_minus = "6 mm"'
+    file.write_text(text.replace('clearance = "6 mm"', gaps))
+    code, out, _ = command("simulate", file, "--speed", f"{speed} rad/s", "--periods", 400)
+    assert code == 0
+    assert "which repeats after 2 turns" in out
+    assert "last 2 turns" in out
+    line = next(line for line in out.splitlines() if line.split()[:1] == ["relative"])
+    assert float(line.split()[1]) == pytest.approx(1e3 * orbit.amplitude("relative"), abs=1e-3)
+    assert ff.simulate(screen, 120.0, 20).repeats_after == 1
 
 
 def test_times_asked_for_do_not_change_the_motion(screen) -> None:

@@ -113,18 +113,22 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
     from flipflow.transient.speed_run import turning_points  # noqa: PLC0415
 
     omega = float(history.omega[-1])
-    begin = history.t[-1] - 2.0 * math.pi / omega
+    turns = history.repeats_after or 1
+    begin = history.t[-1] - turns * 2.0 * math.pi / omega
     head = f"{printable(title)} at {rpm(omega)} rpm"
     say(out, f"{head}, {history.t[-1]:.4g} s from rest", "bold")
     if history.distance is None:
         out.print("No periodic motion lies near the end: the motion has not settled.")
     else:
         word = "Settled" if history.settled else "Not settled yet"
-        out.print(f"{word}: {history.distance * 1e3:.2g} mm from the periodic motion ahead.")
+        again = f", which repeats after {turns} turns" if turns > 1 else ""
+        away = f"{word}: {history.distance * 1e3:.2g} mm from the periodic motion ahead"
+        say(out, f"{away}{again}.")
     spans = _spans(history, blows)
     parts = [history.t[rows] for rows in spans.values()]
     heads = "".join(f"{f'{name}, greatest':>20}" for name in spans)
-    out.print(f"{'':<18}{'last turn':>14}{heads}")
+    last = "last turn" if turns == 1 else f"last {turns} turns"
+    out.print(f"{'':<18}{last:>14}{heads}")
     for which in history.system.named:
         x = history.displacement(which)
         x = x - x[0]
@@ -140,7 +144,8 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
         most = "".join(f"{force[rows].max():>17.3f} kN" for rows in spans.values())
         # A row's peak is that since the row before.
         out.print(f"  {'stop force':<16}{force[history.t > begin].max():>11.3f} kN{most}")
-    out.print("Last turn: half the way from end to end; greatest: farthest from where it began.")
+    said = "half the way from end to end; greatest: farthest from where it began."
+    say(out, f"{last.capitalize()}: {said}")
     e = history.energy
     names = ("input", "impulses", "loads", "dissipated", "stored")
     say(out, "Energy: " + ", ".join(f"{n} {e[n] / 1e3:.4g} kJ" for n in names if e[n]))

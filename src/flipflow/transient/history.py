@@ -76,6 +76,8 @@ class History(Result):
     peak
         Greatest size of each stop's force since the row before in N, (n, m), where it was sought;
         in the first row that of its own force.
+    repeats_after
+        Turns after which the settled motion repeats; None where none is near.
     """
 
     system: MechanicalSystem
@@ -99,6 +101,7 @@ class History(Result):
     version: str = __version__
     works: Mapping[str, Real] = field(default_factory=dict)
     peak: Real | None = None
+    repeats_after: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("t", "x", "v", "a", "force", "omega", "angle", "torque", "normal", "peak"):

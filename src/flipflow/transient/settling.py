@@ -184,13 +184,10 @@ class Settling:
             return point
         return self.solver_of(periods).solve(point.u, point.omega) or point
 
-    def distance_ahead(self, z: Real, omega: float) -> float | None:
-        """Distance in m of the state z from the periodic motion ahead; None where none is near."""
+    def ahead_of(self, z: Real, omega: float) -> Point | None:
+        """The periodic motion ahead of the state z; None where none is near."""
         ahead = self._run(z, omega, 2 * self.max_periods)
-        if ahead is None:
-            return None
-        point = self.ended_on(np.concatenate([z[None], ahead]), omega)
-        return None if point is None else self.distance_from(point, z)
+        return None if ahead is None else self.ended_on(np.concatenate([z[None], ahead]), omega)
 
     def steps_from(self, z: Real, omega: float) -> Real:
         """Distances in m between the state z and those 1, 2, ... max_periods turns later."""

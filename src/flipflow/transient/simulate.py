@@ -107,7 +107,7 @@ def simulate(
     z = initial_state(system, initial)
     run = _Run(machine, system_of, speed, end, say)
     run.carry(Recording(times, system.size, len(system.springs)), z, blows)
-    distance, near = _settled(run.system(), run.z, speed)
+    distance, near, repeats = _settled(run.system(), run.z, speed)
     table = run.recording.table
     return History(
         system=system,
@@ -127,6 +127,7 @@ def simulate(
         status="The motion was carried to its end.",
         method="exact flow",
         counters={"events": len(run.recording.changes)},
+        repeats_after=repeats,
     )
 
 
@@ -141,14 +142,19 @@ def _require_time_for(system: MechanicalSystem, omega: float, periods: int) -> N
         )  # fmt: skip
 
 
-def _settled(system: MechanicalSystem, z: Real, omega: float) -> tuple[float | None, bool]:
-    """Distance of z from the motion that is approached, and whether it is next to none."""
+def _settled(
+    system: MechanicalSystem, z: Real, omega: float
+) -> tuple[float | None, bool, int | None]:
+    """Distance of z from the motion ahead, whether it is next to none, turns of that motion."""
     if not np.count_nonzero(system.with_bonded().C):
-        return None, False  # without damping no motion is approached
+        return None, False, None  # without damping no motion is approached
     settling = Settling(system, MAX_PERIODS)
-    distance = settling.distance_ahead(z, omega)
-    near = distance is not None and distance <= SETTLED * settling.size(z[None], omega)
-    return distance, near
+    point = settling.ahead_of(z, omega)
+    if point is None:
+        return None, False, None
+    distance = settling.distance_from(point, z)
+    near = distance <= SETTLED * settling.size(z[None], omega)
+    return distance, near, point.formulation.turns
 
 
 def _checked_blows(disturbances: object) -> tuple[Disturbance, ...]:
