@@ -223,6 +223,14 @@ def test_chaos_of_the_same_amplitude_is_no_jump(screen, rate, end):
     assert ff.ramp(hard, (120.0, end), rate).jumps == ()
 
 
+def test_a_glide_of_less_than_a_turn_has_no_amplitude_and_is_drawn(screen):
+    glide = ff.ramp(screen, (100.0, 100.01), 1000.0)
+    speed, size = glide.amplitude("relative")
+    assert speed.size == size.size == 0
+    assert glide.jumps == ()
+    assert ff.figure(glide).panels
+
+
 def test_a_glide_that_goes_over_into_two_turns_does_not_jump():
     stop = ff.ClearanceSpring([1.0], 40.0, 0.06, 0.23, math.inf)
     system = ff.MechanicalSystem([[1.0]], [[0.2357]], [[1.0]], [stop], ff.HarmonicForce([0.5]))

@@ -107,7 +107,7 @@ def ramp_figure(ramp: Ramp, which: Coordinate | None = None) -> Figure:
     traces = [Trace("gliding speed", omega * RPM, size * MM, colour="main", bold=True)]
     if ramp.branch.omega.size:
         traces += underlay(ramp.branch, chosen)
-    top = 1.08 * max(float(trace.y.max()) for trace in traces)
+    top = 1.08 * max((float(trace.y.max()) for trace in traces if trace.y.size), default=1.0)
     lines = tuple(Line("x", jump.omega * RPM, "jumps", "jump", "dash") for jump in ramp.jumps)
     panel = Panel(
         speed_axis(ramp.history.omega), Axis(f"{label(chosen)} amplitude", "mm", (0.0, top)),
