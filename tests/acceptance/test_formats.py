@@ -23,7 +23,7 @@ from flipflow.io.results import document_of
 from flipflow.plotting.svg import searchable_svg
 from flipflow.report import summary
 from flipflow.report.blocks import FigureBlock, Table
-from flipflow.report.numbers import NOTHING, Measured
+from flipflow.report.numbers import Numeral
 from flipflow.report.pdf import pdf
 from flipflow.report.registry import blocks_of
 from flipflow.report.tables import table_files
@@ -53,6 +53,13 @@ def _project(kind):
     if kind == "no allowed speed":
         narrow = dataclasses.replace(project.limits, relative_amplitude=(7.8e-3, 8e-3))
         return dataclasses.replace(project, limits=narrow)
+    if kind == "air, supports and limits on the way":
+        hot = ff.Load(name="hot air", temperature=50.0, temperature_of="air")
+        way = ff.PassingLimits(relative_amplitude=9e-3)
+        return dataclasses.replace(
+            project, load_cases=(hot,), limits=dataclasses.replace(project.limits, start=way),
+            screen=project.screen.replace(load_centre=0.58),
+        )  # fmt: skip
     if kind == "long german names":
         loads = tuple(
             dataclasses.replace(load, name=name)
@@ -347,11 +354,32 @@ def test_every_table_is_a_sheet_and_numbers_are_numbers(assessed, sheets):
             for title, value in zip(rows[0], row, strict=True):
                 if "[" in title and isinstance(value, str):
                     assert not re.fullmatch(r"[-+\d. e]+( \S+)?", value), (name, title, value)
-    for table in tables:
-        numeric = [k for k, column in enumerate(table.columns) if column.numeric]
-        shown = {row[k].text for row in table.rows for k in numeric} - {NOTHING}
-        left = [text for text in shown if not isinstance(text, Measured)]
-        assert [text for text in left if re.fullmatch(r"[-+\d.e]+( \S+)?", text)] == []
+    assert sheets["Branches"][1][3] == found.cases[0].branch.omega.size
+
+
+@pytest.mark.parametrize("kind", ["bundled", "air, supports and limits on the way"])
+def test_every_number_of_a_column_of_numbers_is_known(assessed, kind):
+    """What a table shows under a number is a number to other programs, a range its two ends."""
+    found = assessed(kind)
+    for table in (block for block in blocks_of(found) if isinstance(block, Table)):
+        told = [k for k, column in enumerate(table.columns) if column.numeric or column.ends]
+        texts = {row[k].text for row in table.rows for k in told}
+        left = {text for text in texts if not isinstance(text, Numeral)}
+        assert {text for text in left if re.search(r"\d", text)} == set(), table.title
+
+
+def test_limits_on_the_way_and_ranges_have_their_ends(assessed):
+    files = opened(table_files(assessed("air, supports and limits on the way"))["tables.xlsx"])
+    head, *rows = files["Limits on start and stop"]
+    allowed = [head.index(title) for title in ("Unit", "Allowed, most", "Allowed, remark")]
+    limits = {row[0]: [row[k] for k in allowed] for row in rows}
+    assert limits["Relative amplitude, start"] == ["mm", 9, None]
+    assert limits["Stop force, start"] == ["kN", 15, "while running"]
+    cases = files["Load cases"]
+    assert [cases[1][0], cases[1][cases[0].index("Temperature [degC]")]] == ["hot air", 50]
+    support = next(rows for name, rows in files.items() if name.startswith("One support, running"))
+    least, most = (support[0].index(f"Static, vertical, {end} [kN]") for end in ("least", "most"))
+    assert 0.0 < support[1][least] < support[1][most]
 
 
 def test_the_response_has_g_and_forces_in_the_units_of_the_file(assessed, sheets):

@@ -152,6 +152,14 @@ def test_a_start_that_ends_on_a_motion_reaches_its_amplitude(script):
     assert reached == pytest.approx(below.amplitude("relative"), rel=1e-3)
 
 
+def test_a_steady_end_that_repeats_after_two_turns_is_read_over_both(screen):
+    uneven = screen.replace(clearance=0.0, clearance_minus=6e-3)
+    run = ff.start_up(uneven, drive_of(screen, 5500.0), speed=110.849, duration=10.0)
+    (orbit,) = (o for o in ff.periodic_orbits(uneven, run.final_speed, 2) if o.stable)
+    assert (run.outcome, orbit.periods) == ("reached", 2)
+    assert run.peaks["relative_amplitude"].value > 0.998 * orbit.amplitude("relative")
+
+
 def test_coast_down_counts_the_way_from_its_start():
     """The first half swing, the greatest, was none; the value by an own integration."""
     machine = ff.FlipFlowScreen(

@@ -296,3 +296,28 @@ def test_a_list_has_a_share_and_no_tolerance(linear):
     )
     assert np.isnan(result.halved).all()
     assert result.costliest() is None
+
+
+@pytest.mark.parametrize(("asked", "share", "words"), [
+    (("jump_margin",), 1.0, "8 of 8 machines jump at other folds than omega_lb and omega_ub"),
+    ((), 0.0, "8 of 8 machines may jump, as jump_margin would tell, at other folds"),
+])  # fmt: skip
+def test_folds_of_another_resonance_are_told(asked, share, words):
+    """Two stable motions, .460 and .373 mm, between folds at 49.9 and 58.5 rad/s, far below."""
+    machine = ff.FlipFlowScreen(
+        main_mass=3149.1830805158397, floating_mass=1108.5368420018617,
+        eccentric_moment=5.396972025220704, isolation_stiffness=467523.86470786564,
+        isolation_damping=3841.665711034478, shear_stiffness=5066615.69832155,
+        shear_damping=2558.2072349656282, stop_stiffness=36333156.38700062,
+        stop_damping=26558.491314624025, clearance=0.00019443730600225996,
+    )  # fmt: skip
+    gap = machine.clearance
+    study = ff.study(
+        machine, {"clearance": (0.995 * gap, 1.005 * gap)},
+        ("relative_amplitude", "omega_lb", "omega_ub", *asked), 52.65522,
+        sampling=ff.Sample(n=8, seed=0),
+    )  # fmt: skip
+    found = ff.tolerance(study, ff.Limits(relative_amplitude=(0.0, 1.0)))
+    assert found.coexisting == pytest.approx([share])
+    assert len(found.notes) == 1
+    assert found.notes[0].startswith(words)

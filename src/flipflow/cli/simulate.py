@@ -113,7 +113,8 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
     from flipflow.transient.speed_run import turning_points  # noqa: PLC0415
 
     omega = float(history.omega[-1])
-    turns = history.repeats_after or 1
+    run = round(history.angle[-1] / (2.0 * math.pi))
+    turns = min(history.repeats_after or 1, max(run, 1))
     begin = history.t[-1] - turns * 2.0 * math.pi / omega
     head = f"{printable(title)} at {rpm(omega)} rpm"
     say(out, f"{head}, {history.t[-1]:.4g} s from rest", "bold")
@@ -121,7 +122,8 @@ def _show(title: str, history: History, blows: Sequence[Impulse], out: Console) 
         out.print("No periodic motion lies near the end: the motion has not settled.")
     else:
         word = "Settled" if history.settled else "Not settled yet"
-        again = f", which repeats after {turns} turns" if turns > 1 else ""
+        periods = history.repeats_after or 1
+        again = f", which repeats after {periods} turns" if periods > 1 else ""
         away = f"{word}: {history.distance * 1e3:.2g} mm from the periodic motion ahead"
         say(out, f"{away}{again}.")
     spans = _spans(history, blows)

@@ -17,7 +17,7 @@ from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, SYMBOLS, coordinates, label
 from flipflow.plotting.scales import KN, MM, RPM
 from flipflow.transient.run_up import RunUp, foundation_force
-from flipflow.transient.speed_run import swings
+from flipflow.transient.speed_run import turn_amplitudes
 
 MOST_POINTS = 1500
 READING = (
@@ -107,7 +107,7 @@ def _speed(run: RunUp, time: Axis) -> Panel:
 def _amplitudes(run: RunUp, time: Axis) -> Panel:
     traces = []
     for index, which in enumerate(_shown(run)):
-        t, size = swings(run.history, which)
+        t, size = turn_amplitudes(run.history, which)
         t, size = _envelope(t, size * MM)
         known = isinstance(which, str) and which in LABELS
         traces.append(

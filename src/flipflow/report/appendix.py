@@ -15,9 +15,10 @@ from flipflow.report.blocks import Block, Cell, Column, Heading, Note, Table, Va
 from flipflow.report.numbers import (
     NOTHING,
     four_digits,
+    in_rpm,
     multiplier,
     quantity,
-    rpm_range,
+    span_of,
     three_digits,
     written,
 )
@@ -129,7 +130,7 @@ def _branch_row(name: str, branch: Branch) -> tuple[Cell, ...]:
     median = float(np.median(branch.error))
     return cells(
         name,
-        rpm_range(float(omega.min()), float(omega.max())),
+        span_of(in_rpm(float(omega.min())), in_rpm(float(omega.max()))),
         written(omega.size, "d"),
         written(unstable, "d"),
         _error(median),

@@ -26,7 +26,7 @@ from flipflow.report.blocks import (
 from flipflow.report.numbers import (
     NO_JUMP,
     NOTHING,
-    Measured,
+    Numeral,
     in_rpm,
     percent,
     quantity,
@@ -181,7 +181,7 @@ def _change(row: ResultChange, k: int) -> str:
     unit = row.shown_unit
     zero = in_unit(0.0, unit, row.unit)  # a difference of temperatures has no offset
     difference = in_unit(change, unit, row.unit) - zero
-    return Measured(f"{signed(difference)} {unit}".strip(), difference, unit=unit)
+    return Numeral(f"{signed(difference)} {unit}".strip(), difference, unit=unit)
 
 
 def _given(one: InputDifference, value: Given) -> str:
@@ -192,7 +192,7 @@ def _given(one: InputDifference, value: Given) -> str:
     if math.isinf(value):
         return "infinite"
     text, unit = shown(value, one.shown_unit, one.unit), one.shown_unit
-    return Measured(text, in_unit(value, unit, one.unit), unit=unit)
+    return Numeral(text, in_unit(value, unit, one.unit), unit=unit)
 
 
 def summary_table(names: Sequence[str], found: Sequence[Assessment]) -> Table:

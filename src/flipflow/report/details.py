@@ -221,13 +221,13 @@ def _derived(check: Check) -> Table:
     return Table("Speeds that follow", columns, rows, "Empty machine, no stop touched.")
 
 
-def _temperature(case: Case) -> str:
+def _temperature(case: Case) -> Cell:
     """Temperature as the file gives it, and that of the rubber at work where it is another."""
     if case.temperature is None:
-        return NOTHING
-    own = written(case.temperature, ".4g")
+        return Cell(NOTHING)
     rubber = "" if case.rubber is None else f", rubber {case.rubber:.3g}"
-    return f"{own} (air){rubber}" if case.temperature_of == "air" else own
+    of_air = f"air{rubber}" if case.temperature_of == "air" else ""
+    return Cell(written(case.temperature, ".4g"), of_air)
 
 
 def _load_cases(cases: tuple[Case, ...]) -> Table:
@@ -243,13 +243,18 @@ def _load_cases(cases: tuple[Case, ...]) -> Table:
         Column("Source"),
     )
     rows = tuple(
-        cells(
-            case.name,
-            *(written(x, ".4g") for x in (case.stiffness_factor, case.damping_factor)),
-            *(written(x, ".4g") for x in (case.stop_stiffness_factor, case.stop_damping_factor)),
-            *(written(x, ".4g") for x in (case.main_mass, case.floating_mass)),
+        (
+            *cells(
+                case.name,
+                *(written(x, ".4g") for x in (case.stiffness_factor, case.damping_factor)),
+                *(
+                    written(x, ".4g")
+                    for x in (case.stop_stiffness_factor, case.stop_damping_factor)
+                ),
+                *(written(x, ".4g") for x in (case.main_mass, case.floating_mass)),
+            ),
             _temperature(case),
-            case.source,
+            Cell(case.source),
         )
         for case in cases
     )

@@ -19,7 +19,7 @@ from flipflow.report.blocks import (
     Text,
     cells,
 )
-from flipflow.report.numbers import NOTHING, quantity, three_digits, written
+from flipflow.report.numbers import NOTHING, quantity, span_of, three_digits, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import ATTENTION, PASS, Assessment
 from flipflow.studies.foundation_loads import (
@@ -89,7 +89,7 @@ def _static(loads: FoundationLoads, case: CaseLoads) -> str:
         return even
     every = sorted(loads.static_on(one, case).vertical or 0.0 for one in loads.supports)
     low, high = (quantity(force, "kN", "N", with_unit=False) for force in (every[0], every[-1]))
-    return f"{low} to {high}"
+    return span_of(low, high)
 
 
 def _state(least: Components) -> Cell:
@@ -102,7 +102,7 @@ def _state(least: Components) -> Cell:
 def _running_table(loads: FoundationLoads, shown: Sequence[CaseLoads]) -> Table:
     columns = (
         Column("Load case"),
-        Column("Static, vertical", "kN", numeric=True),
+        Column("Static, vertical", "kN", numeric=True, ends=len(set(loads.static_shares)) > 1),
         *(Column(name.capitalize(), "kN", numeric=True) for name in LOADS),
         Column("Least, vertical", "kN", numeric=True),
         Column("Least, normal", "kN", numeric=True),
@@ -173,7 +173,7 @@ def _runs_table(loads: FoundationLoads) -> Table:
             Column("at", "rpm", numeric=True),
         ]
     least = ("vertical", "normal")
-    columns.append(Column("Excited", "rpm"))
+    columns.append(Column("Excited", "rpm", ends=True))
     columns += [Column(f"Least, {name}", "kN", numeric=True) for name in least]
     columns.append(Column("Spring"))
     rows = tuple(
@@ -197,8 +197,8 @@ def _peaks(loads: FoundationLoads, run: RunLoads) -> Iterator[str]:
 
 
 def _excited(run: RunLoads) -> str:
-    low, high = (f"{in_unit(omega, 'rpm', 'rad/s'):.0f}" for omega in run.excited)
-    return f"{low} to {high}"
+    low, high = (written(in_unit(omega, "rpm", "rad/s"), ".0f") for omega in run.excited)
+    return span_of(low, high)
 
 
 def _travel_table(loads: FoundationLoads, shown: Sequence[CaseLoads]) -> Table:

@@ -1,6 +1,6 @@
 """Numbers as a report shows them: three to four significant digits, with their unit.
 
-What is shown knows the number that it shows: a table for other programs takes it with all digits.
+What is shown knows the number that it shows, which a table for other programs takes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ NOTHING, NO_JUMP = "-", "no jump"
 LEAST_KILO = 100.0  # N or W; what is less is shown without kilo
 
 
-class Measured(str):
+class Numeral(str):
     """A text that shows one number, or the two ends of a range, and knows them."""
 
     __slots__ = ("numbers", "unit")
@@ -34,7 +34,7 @@ class Measured(str):
 
 
 def number(value: float) -> str:
-    """Three significant digits in words; from 1000 on whole numbers."""
+    """Three significant digits for a sentence; from 1000 on whole numbers."""
     if not math.isfinite(value):
         return "infinite" if value > 0.0 else NOTHING
     if value == 0.0 or abs(value) >= 99.95:
@@ -44,13 +44,13 @@ def number(value: float) -> str:
 
 
 def three_digits(value: float) -> str:
-    """A :func:`number` that is known."""
-    return Measured(number(value), value) if math.isfinite(value) else number(value)
+    """The digits of :func:`number` for a table."""
+    return Numeral(number(value), value) if math.isfinite(value) else number(value)
 
 
 def written(value: float, form: str) -> str:
     """A number in a format of Python; nothing where it is not one."""
-    return Measured(format(value, form), value) if math.isfinite(value) else NOTHING
+    return Numeral(format(value, form), value) if math.isfinite(value) else NOTHING
 
 
 def four_digits(value: float) -> str:
@@ -60,14 +60,17 @@ def four_digits(value: float) -> str:
 
 def in_rpm(omega: float | None, *, with_unit: bool = False) -> str:
     """A speed in rpm."""
-    if omega is None:
+    if omega is None or math.isnan(omega):
         return NOTHING
-    return Measured(f"{rpm(omega)}{' rpm' * with_unit}", omega * RPM, unit="rpm")
+    return Numeral(f"{rpm(omega)}{' rpm' * with_unit}", omega * RPM, unit="rpm")
 
 
-def rpm_range(low: float, high: float) -> str:
-    """Two speeds in rpm."""
-    return Measured(f"{rpm(low)} to {rpm(high)}", low * RPM, high * RPM, unit="rpm")
+def span_of(low: str, high: str) -> str:
+    """From one number to another of the same unit."""
+    text = f"{low} to {high}"
+    if not (isinstance(low, Numeral) and isinstance(high, Numeral)):
+        return text
+    return Numeral(text, *low.numbers, *high.numbers, unit=low.unit)
 
 
 def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool = True) -> str:
@@ -80,7 +83,8 @@ def quantity(value: float | None, shown_unit: str, unit: str, *, with_unit: bool
     told = unit if small else shown_unit
     text = number(in_unit(value, told, unit))
     text = f"{text} {told}".strip() if with_unit else text
-    return Measured(text, in_unit(value, shown_unit, unit), unit=shown_unit)
+    # What is small is told without kilo; in a column every number has the same unit.
+    return Numeral(text, in_unit(value, shown_unit, unit), unit=shown_unit)
 
 
 def named(one: Quantity, value: float | None, *, with_unit: bool = True) -> str:
@@ -102,7 +106,7 @@ def bounds(low: float, high: float, shown_unit: str, unit: str) -> str:
     if not told:
         return NOTHING
     word = "at least " if ends[1] is None else "at most " if ends[0] is None else ""
-    return Measured(f"{word}{' to '.join(told)} {shown_unit}".strip(), *ends, unit=shown_unit)
+    return Numeral(f"{word}{' to '.join(told)} {shown_unit}".strip(), *ends, unit=shown_unit)
 
 
 def allowed(limits: Limits, name: str) -> str:
@@ -115,12 +119,14 @@ def percent(share: float | None) -> str:
     """A margin with its sign; where there is no end to be near to, nothing."""
     if share is None or not math.isfinite(share):
         return NOTHING
-    return Measured(f"{signed(100.0 * share)} %", 100.0 * share, unit="%")
+    return Numeral(f"{signed(100.0 * share)} %", 100.0 * share, unit="%")
 
 
 def signed(value: float) -> str:
     """Three significant digits with a sign."""
-    return Measured(f"{'+' * (value > 0.0)}{number(value)}", value)
+    if not math.isfinite(value):
+        return NOTHING
+    return Numeral(f"{'+' * (value > 0.0)}{number(value)}", value)
 
 
 def multiplier(value: complex) -> str:

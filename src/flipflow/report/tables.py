@@ -14,14 +14,14 @@ from flipflow.model.numerals import capitalized
 from flipflow.model.quantities import QUANTITIES
 from flipflow.report.blocks import Block, Table, TitleBlock, Values, Verdict
 from flipflow.report.html import Head, head_of
-from flipflow.report.numbers import NOTHING, Measured
+from flipflow.report.numbers import NOTHING, Numeral
 from flipflow.report.registry import blocks_of
 from flipflow.studies.assessment import Assessment, CaseAssessment
 from flipflow.studies.quantity_values import Working, number_or_nan
 
 BOOK, PREFIX = "tables.xlsx", "table-"
 UNIT, REMARK = "Unit", "remark"
-DIGITS = 12  # behind them stands what is left of a change of units
+DIGITS = 12  # more would show the rounding of a change of units
 RESPONSE = "Response over speed"
 # What the response lists beside speed, in the units of the machine file.
 LISTED = (
@@ -136,7 +136,7 @@ def _columns(table: Table, k: int) -> list[_Column]:
     words = ("least", "most") if column.ends else ("",)
     found = [
         _Column(f"{column.title}, {word}" if word else column.title, column.unit,
-                [_measure(cell.text, end) for cell in cells])
+                [_measure(cell.text, end, len(words)) for cell in cells])
         for end, word in enumerate(words)
     ]  # fmt: skip
     if any(cell.small for cell in cells):
@@ -145,18 +145,20 @@ def _columns(table: Table, k: int) -> list[_Column]:
     return found
 
 
-def _measure(text: str, end: int) -> tuple[Value, str]:
-    """The number that a cell shows, of a range one end, and its unit; else its text."""
-    if isinstance(text, Measured):
-        number = text.numbers[end]
-        return (None, "") if number is None else (float(f"{number:.{DIGITS}g}"), text.unit)
-    return (None if text == NOTHING or end else text), ""
+def _measure(text: str, end: int, ends: int) -> tuple[Value, str]:
+    """The number that a cell shows, of a range one of its ends, and its unit; else its text."""
+    if isinstance(text, Numeral) and len(text.numbers) <= ends:
+        number = text.numbers[min(end, len(text.numbers) - 1)]
+        if number is None:
+            return None, ""
+        return number if isinstance(number, int) else float(f"{number:.{DIGITS}g}"), text.unit
+    return (None if text == NOTHING or end else str(text)), ""
 
 
 def _row_units(columns: Sequence[_Column], rows: int) -> list[str]:
     """The unit of each row, over the columns whose unit differs from row to row."""
     units = [{column.cells[k][1] for column in columns} - {""} for k in range(rows)]
-    return [next(iter(own), "") for own in units]
+    return [min(own, default="") for own in units]
 
 
 def _file_name(sheet: str, taken: dict[str, bytes | str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 from flipflow.model.numerals import capitalized, case_words, rpm
@@ -19,7 +20,7 @@ from flipflow.report.blocks import (
 )
 from flipflow.report.first_page import limit_cells
 from flipflow.report.jump_risk import millimetres, moment_words
-from flipflow.report.numbers import NOTHING, in_rpm, number, quantity, written
+from flipflow.report.numbers import NOTHING, bounds, in_rpm, number, quantity, written
 from flipflow.report.registry import Part, section
 from flipflow.studies.assessment import NO_LIMIT, Assessment, LimitRow, running_limit
 from flipflow.studies.jump_risk import JumpRisk
@@ -212,7 +213,7 @@ def _case_row(case: CaseRuns) -> tuple[Cell, ...]:
 def _limits_table(assessment: Assessment) -> Table:
     columns = (
         Column("Greatest on the way"),
-        Column("Allowed"),
+        Column("Allowed", ends=True),
         Column("Worst", numeric=True),
         Column("Case"),
         Column("Margin", numeric=True),
@@ -231,5 +232,7 @@ def _limit_row(assessment: Assessment, row: LimitRow) -> tuple[Cell, ...]:
         return limit_cells(row)
     label, _, worst, case, margin, _ = limit_cells(row)
     most = running_limit(assessment.project, row)
-    allowed = "" if most is None else f"running: {quantity(most, row.shown_unit, row.unit)}"
-    return label, Cell(allowed), worst, case, margin, Cell(row.reason)
+    running = Cell(NOTHING)
+    if most is not None:
+        running = Cell(bounds(-math.inf, most, row.shown_unit, row.unit), "while running")
+    return label, running, worst, case, margin, Cell(row.reason)

@@ -28,6 +28,7 @@ LEAST_MACHINES = 30.0
 FACTORS = np.linspace(0.2, 1.0, 17)
 HALF = 0.5
 FOLDS = ("omega_lb", "omega_ub")
+MARGIN = "jump_margin"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +68,12 @@ class Tolerance(Result):
         nominal machine has not, or the other way round, (S, F).
     jump_share, jump_interval
         Share of these machines, (F,) and (F, 2); NaN where the study did not ask for
-        ``omega_lb`` and ``omega_ub``.
+        ``omega_lb`` and ``omega_ub``. Jumps at other folds than these, as at a resonance of a
+        multiple of the speed, are not seen; a note tells where there may be some.
     coexisting
-        Share of machines with another stable motion at that speed, in some case, (F,).
+        Share of machines with another motion at that speed, in some case, (F,): the speed lies
+        between ``omega_lb`` and ``omega_ub``, or ``jump_margin``, where the study asked for it, is
+        0. NaN where the study did not ask for the first two.
     halved, halved_interval
         The share where the tolerance of one field alone is half as wide, (D, F) and (D, F, 2);
         NaN where too few machines tell.
@@ -292,8 +296,19 @@ def _jumps(study: Study) -> tuple[Flags, Real]:
     nominal = study.omega > study.nominal[word][:, np.newaxis]
     known = study.reason == FOUND
     moved = ((jumped_motions(study) != nominal) & known).any(axis=1)
-    two = ((study.omega >= low) & (study.omega <= high)).any(axis=1)
-    return moved, two.mean(axis=0)
+    two = (study.omega >= low) & (study.omega <= high)
+    if MARGIN in study.values:
+        two |= study.values[MARGIN] == 0.0
+    return moved, two.any(axis=1).mean(axis=0)
+
+
+def _jump_elsewhere(study: Study) -> int:
+    """How many machines may jump at folds that are not those asked for."""
+    folds = np.stack([study.values[name] for name in FOLDS])
+    elsewhere = np.asarray(np.isnan(folds).all(axis=0))
+    if MARGIN in study.values:
+        elsewhere = elsewhere & np.any(np.isfinite(study.values[MARGIN]), axis=2)
+    return int(np.count_nonzero(elsewhere.any(axis=1)))
 
 
 def _shares(flags: Flags) -> tuple[Real, Real]:
@@ -393,5 +408,11 @@ def _notes(study: Study, unchecked: dict[str, str]) -> Iterator[str]:
         yield f"The limit on {QUANTITIES[name].label} is not checked: {why}."
     if not folds_known(study):
         yield "Which machines jump is not known: ask the study for omega_lb and omega_ub, too."
+    elif count := _jump_elsewhere(study):
+        may = "jump" if MARGIN in study.values else f"may jump, as {MARGIN} would tell,"
+        yield (
+            f"{count} of {study.size} machines {may} at other folds than omega_lb and omega_ub: "
+            "whether they have jumped is not known."
+        )
     if study.sample is None:
         yield "The machines are a list: what narrower tolerances would bring is not known."

@@ -77,7 +77,8 @@ class History(Result):
         Greatest size of each stop's force since the row before in N, (n, m), where it was sought;
         in the first row that of its own force.
     repeats_after
-        Turns after which the settled motion repeats; None where none is near.
+        Turns after which the periodic motion ahead repeats; None where none is near, or none was
+        looked for.
     """
 
     system: MechanicalSystem

@@ -21,8 +21,9 @@ from flipflow.model.system import Machine
 from flipflow.results.result import Result
 from flipflow.transient.history import History
 from flipflow.transient.speed_run import (
+    MOST_PERIODS,
     STATUS,
-    swings,
+    turn_amplitudes,
     turn_means,
     unbalance_weight,
 )
@@ -98,10 +99,11 @@ class RunUp(Result):
     passing
         Time in s between 0.8 and 1.25 times w01; None where it is not passed.
     peaks
-        ``"main_amplitude"`` (m; the greatest distance from rest in any direction, or along the
-        surface half the way from peak to peak in one turn of the shaft, where that direction alone
-        is known), ``"relative_amplitude"`` (m; half that way), ``"shear_strain"``,
-        ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the machine has them.
+        ``"main_amplitude"`` (m; the greatest distance from rest in any direction, or its amplitude
+        along the surface, where that direction alone is known), ``"relative_amplitude"`` (m),
+        ``"shear_strain"``, ``"foundation_force"`` (N) and ``"stop_force"`` (N), as far as the
+        machine has them. Amplitudes are half the way from peak to peak in one turn of the shaft;
+        at a steady end, whose motion may repeat after some turns, in six.
     power
         Means over the last turns in W: ``"motor"``, ``"friction"``, ``"dampers"``; empty where
         the speed is given or changes.
@@ -210,7 +212,7 @@ def judged(
     steady = outcome in {"reached", "captured", "short"}
     return RunUp(
         machine, drive, speed, history, outcome, final, near, first,
-        _passing(history, first), _peaks(machine, history),
+        _passing(history, first), _peaks(machine, history, MOST_PERIODS if steady else 1),
         _power(history) if steady and isinstance(drive, Drive) else {},
         (*_ended_early(history), *notes, *_notes(machine, drive)),
         float(history.angle[0]),
@@ -296,12 +298,14 @@ def _passing(history: History, omega: float) -> float | None:
     return float(history.t[within[-1]] - history.t[within[0]])
 
 
-def _peaks(machine: Machine, history: History) -> dict[str, Peak]:
+def _peaks(machine: Machine, history: History, turns: int) -> dict[str, Peak]:
+    """The greatest on the way; the motion at the end may repeat after some turns."""
     found = {}
     screen = machine if isinstance(machine, FlipFlowScreen) else None
     for which in ("main", "relative") if screen else history.system.named:
-        times, sizes = swings(history, which)
+        times, sizes = turn_amplitudes(history, which)
         if sizes.size:
+            sizes[-1] = turn_amplitudes(history, which, turns)[1][-1]
             found[f"{which}_amplitude"] = _greatest(history, times, sizes)
     if screen is not None:
         if history.normal is not None:

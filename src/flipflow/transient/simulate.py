@@ -82,8 +82,9 @@ def simulate(
     Returns
     -------
     History
-        Motion, stop forces, energies, whether the motion is periodic at the end and how far
-        from the periodic motion it still is. A motion is called settled within 1e-6 of its size.
+        Motion, stop forces, energies, whether the motion is periodic at the end, how far from the
+        periodic motion it still is, and after how many turns that repeats. A motion is called
+        settled within 1e-6 of its size.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""One run at varying speed as a history, and what is read off it: swings, means, forces."""
+"""One run at varying speed as a history, and what is read off it: amplitudes, means, forces."""
 
 from __future__ import annotations
 
@@ -195,11 +195,12 @@ def steady_power(
     return run.energy["dissipated"] / duration, start.settled
 
 
-def swings(history: History, which: Coordinate) -> tuple[Real, Real]:
-    """Times of a coordinate's turning points, and half its way from peak to peak in one turn.
+def turn_amplitudes(history: History, which: Coordinate, turns: int = 1) -> tuple[Real, Real]:
+    """Times in s of a coordinate's turning points behind the start, and its amplitude, (k,) each.
 
-    It is the shaft's turn that ends there, or what lies behind the turning point before where the
-    coordinate has not turned since. The start counts as a turning point.
+    Amplitude is half the way in m from the lowest to the highest turning point in the shaft's turn
+    that ends there, 2 pi of its way there and back; where only one lies in it, from the one before.
+    The start counts as a turning point.
     """
     t, x = history.t, history.displacement(which)
     times, ends = turning_points(t, x, history.velocity(which))
@@ -207,7 +208,7 @@ def swings(history: History, which: Coordinate) -> tuple[Real, Real]:
         times, ends = np.append(t[0], times), np.append(x[0], ends)
     turned = np.interp(times, t, np.append(0.0, np.cumsum(np.abs(np.diff(history.angle)))))
     rows = np.arange(times.size)
-    first = np.minimum(np.searchsorted(turned, turned - 2.0 * np.pi, "right"), rows - 1)[1:]
+    first = np.minimum(np.searchsorted(turned, turned - turns * 2.0 * np.pi, "right"), rows - 1)[1:]
     spans = np.column_stack([first, rows[1:] + 1]).ravel()
     ends = np.append(ends, 0.0)  # that of the last span lies behind the last turning point
     most, least = (of.reduceat(ends, spans)[::2] for of in (np.maximum, np.minimum))
