@@ -109,7 +109,7 @@ def test_not_settled_says_how_far(screen) -> None:
 
 
 def test_a_motion_of_two_turns_is_read_over_both(screen, command, tmp_path) -> None:
-    """Read over the last turn it was told 2.495 mm where the list of motions has 2.698 mm."""
+    """Read over the last turn it was told another amplitude than the list of motions has."""
     uneven, speed = screen.replace(clearance=0.0, clearance_minus=6e-3), 110.849
     history = ff.simulate(uneven, speed, 400)
     assert (history.settled, history.repeats_after) == (True, 2)

@@ -132,7 +132,7 @@ def greatest_half_turn(history):
 )
 @pytest.mark.parametrize("way", ["start_up", "coast_down"])
 def test_amplitude_on_the_way_is_from_peak_to_peak_of_a_turn(script, drawn, way):
-    """With more than two turning points a turn it was the way between neighbours, .58 of it."""
+    """With more than two turning points a turn it was the way between neighbours, .70 of it."""
     _, machine, speed = script("plausible_draw").draw(*drawn)
     found = getattr(ff, way)(machine, speed=speed)
     told = found.peaks["relative_amplitude"].value

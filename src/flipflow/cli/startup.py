@@ -234,8 +234,7 @@ def _run(run: RunUp, title: str, out: Console) -> None:
     for key, peak in run.peaks.items():
         word, scale, unit = WORDS[key]
         if key == "stop_force" and peak.value == 0.0:
-            told = "not reached" if run.history.system.opening else "no stop"
-            out.print(f"  {word:<28}{told:>12}")
+            out.print(f"  {word:<28}{'not reached':>12}")
             continue
         value = f"{digits(peak.value * scale)} {unit}"
         out.print(f"  {word:<28}{value:>12}{peak.omega * RPM:>10.0f}{peak.t:>9.2f}")

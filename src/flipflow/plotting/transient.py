@@ -17,7 +17,7 @@ from flipflow.plotting.panels import Axis, Line, Panel, Trace
 from flipflow.plotting.response import LABELS, SYMBOLS, coordinates, label
 from flipflow.plotting.scales import KN, MM, RPM
 from flipflow.transient.run_up import RunUp, foundation_force
-from flipflow.transient.speed_run import turn_amplitudes
+from flipflow.transient.speed_run import behind_first_turn, turn_amplitudes
 
 MOST_POINTS = 1500
 READING = (
@@ -108,6 +108,9 @@ def _amplitudes(run: RunUp, time: Axis) -> Panel:
     traces = []
     for index, which in enumerate(_shown(run)):
         t, size = turn_amplitudes(run.history, which)
+        if run.history.omega[0] > 0.0:  # it begins in motion, of which the first turn has a part
+            whole = behind_first_turn(run.history, t)
+            t, size = t[whole], size[whole]
         t, size = _envelope(t, size * MM)
         known = isinstance(which, str) and which in LABELS
         traces.append(

@@ -24,12 +24,12 @@ from flipflow.periodic.orbit import Orbit
 from flipflow.results.result import Result
 from flipflow.studies.periodic_orbits import attracting_orbits
 from flipflow.transient.history import History
-from flipflow.transient.speed_run import Start, run_history, turn_amplitudes
+from flipflow.transient.speed_run import Start, behind_first_turn, run_history, turn_amplitudes
 from flipflow.transient.startup import MOST_SECONDS
 
 BEYOND = 1e-4  # relative distance past the end of a motion at which the next one is looked for
 SOON = 0.05  # share of a fold's speed over which irregular motion beyond is looked at
-# Of irregular motions amplitudes were seen to scatter by 12 % of the median from turn to turn.
+# Amplitudes of an irregular motion scatter about as much from turn to turn.
 SMALL = 0.1  # share by which their median differs at most where there is no jump
 WIDER = 0.15  # share by which the branch reaches beyond the speeds of the ramp
 SHORTEST = 1e-6  # s, shortest ramp, far less than any machine's turn
@@ -226,9 +226,8 @@ def _irregular(point: SpecialPoint, before: float, beyond: Real) -> float | None
 def _amplitudes(history: History, which: Coordinate) -> tuple[Real, Real]:
     """Speed and amplitude at each turning point from the second turn on."""
     t, size = turn_amplitudes(history, which)
-    speed, angle = (np.interp(t, history.t, one) for one in (history.omega, history.angle))
-    whole = angle - history.angle[0] >= 2.0 * math.pi
-    return speed[whole], size[whole]
+    whole = behind_first_turn(history, t)
+    return np.interp(t[whole], history.t, history.omega), size[whole]
 
 
 def _again(jump: LateJump, found: list[LateJump]) -> bool:

@@ -212,7 +212,7 @@ def judged(
     steady = outcome in {"reached", "captured", "short"}
     return RunUp(
         machine, drive, speed, history, outcome, final, near, first,
-        _passing(history, first), _peaks(machine, history, MOST_PERIODS if steady else 1),
+        _passing(history, first), _peaks(machine, history, steady),
         _power(history) if steady and isinstance(drive, Drive) else {},
         (*_ended_early(history), *notes, *_notes(machine, drive)),
         float(history.angle[0]),
@@ -298,14 +298,15 @@ def _passing(history: History, omega: float) -> float | None:
     return float(history.t[within[-1]] - history.t[within[0]])
 
 
-def _peaks(machine: Machine, history: History, turns: int) -> dict[str, Peak]:
-    """The greatest on the way; the motion at the end may repeat after some turns."""
+def _peaks(machine: Machine, history: History, steady: bool) -> dict[str, Peak]:
+    """The greatest on the way; the motion of a steady end may repeat after some turns."""
     found = {}
     screen = machine if isinstance(machine, FlipFlowScreen) else None
     for which in ("main", "relative") if screen else history.system.named:
         times, sizes = turn_amplitudes(history, which)
+        if sizes.size and steady:
+            sizes[-1] = turn_amplitudes(history, which, MOST_PERIODS)[1][-1]
         if sizes.size:
-            sizes[-1] = turn_amplitudes(history, which, turns)[1][-1]
             found[f"{which}_amplitude"] = _greatest(history, times, sizes)
     if screen is not None:
         if history.normal is not None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flipflow.compiled import status
 from flipflow.compiled.arrays import Real
@@ -213,6 +214,12 @@ def turn_amplitudes(history: History, which: Coordinate, turns: int = 1) -> tupl
     ends = np.append(ends, 0.0)  # that of the last span lies behind the last turning point
     most, least = (of.reduceat(ends, spans)[::2] for of in (np.maximum, np.minimum))
     return times[1:], (most - least) / 2.0
+
+
+def behind_first_turn(history: History, times: Real) -> NDArray[np.bool_]:
+    """Which times in s, (k,), have a whole turn of the shaft behind them."""
+    turned = np.interp(times, history.t, history.angle) - history.angle[0]
+    return np.asarray(turned >= 2.0 * np.pi)
 
 
 def turning_points(t: Real, x: Real, v: Real) -> tuple[Real, Real]:
